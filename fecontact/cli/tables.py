@@ -58,6 +58,7 @@ def run_table(trajectory: "Trajectory") -> Any:
 
 def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
     """Shares of the contact states, of several bodies for each interface with its nodes."""
+    from fecontact.core.units import quantity
     from fecontact.reduction.assembly.contact_faces import contact_faces
 
     basis = trajectory.system.basis
@@ -67,6 +68,10 @@ def _contact_rows(trajectory: "Trajectory") -> list[tuple[str, str]]:
         return [(f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()]
     rows = [("bodies", dict(basis.summary()).get("bodies", "1"))]
     for face in faces:
+        if face.spring:
+            force = np.abs(trajectory.normal_force[:, face.nodes]).max()
+            rows.append((face.title, f"nonlinear spring, at most {quantity(force, 'N')}"))
+            continue
         shares = contact_shares(trajectory, face.nodes)
         rows.append((face.title, f"{len(face.abscissa)} nodes, " + ", ".join(
             f"{100.0 * share:.1f} % {name}" for name, share in shares.items())))

@@ -1,5 +1,5 @@
 from .fields import BodyFields
-from .pairing import Pairing, finer_face, pair_both_faces, pair_faces
+from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
 from .rotation import Rotation
 
@@ -8,6 +8,7 @@ __all__ = [
     "Pairing",
     "PairingReport",
     "Rotation",
+    "TwoPassPairing",
     "finer_face",
     "pair_both_faces",
     "pair_faces",

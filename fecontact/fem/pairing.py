@@ -81,6 +81,55 @@ class Pairing(Summarised):
         """That of the report."""
         return self.report.summary()
 
+    @property
+    def passes(self) -> "tuple[Pairing, ...]":
+        """The pairing itself."""
+        return (self,)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TwoPassPairing(Summarised):
+    """Two faces paired twice, with contact nodes on either; one interface.
+
+    Each pass stands for half of the lengths, so that totals of the interface, such as its
+    stiffness, are shared out over both. Made by :func:`pair_both_faces`.
+
+    Parameters
+    ----------
+    first : Pairing
+        With the nodes on the first face.
+    second : Pairing
+        With the nodes on the other one, whose normals are the opposite ones.
+    """
+
+    first: Pairing
+    second: Pairing
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Those of the reports of both passes."""
+        return [(f"{name}, pass {number}", text) for number, one in enumerate(self.passes, start=1)
+                for name, text in one.report.summary()]
+
+    @property
+    def passes(self) -> tuple[Pairing, ...]:
+        """Both passes, the first one first."""
+        return (self.first, self.second)
+
+    @property
+    def body(self) -> str:
+        """Name of the body with the first face."""
+        return self.first.body
+
+    @property
+    def other(self) -> str | None:
+        """Name of the body with the other face."""
+        return self.first.other
+
+    @property
+    def gaps(self) -> Array:
+        """Initial gaps (n,) of the nodes of both passes [m]."""
+        return np.concatenate([one.gaps for one in self.passes])
+
 
 def pair_faces(
     bodies: Mapping[str, ElasticBody], face: str, other: str, *,
@@ -135,19 +184,20 @@ def pair_faces(
 def pair_both_faces(
     bodies: Mapping[str, ElasticBody], face: str, other: str, *,
     nodes: Literal["all"] | int = "all", reach: float | None = None, overlap: float = 0.01,
-) -> tuple[Pairing, Pairing]:
+) -> TwoPassPairing:
     """Pair two faces twice, with nodes on ``face`` and on ``other``, each with half its length.
 
     Loads are more even than in one pass. For compliant normal laws only: rigid constraints would be
-    redundant. Arguments and errors are those of :func:`pair_faces`.
+    redundant. Arguments and errors are those of :func:`pair_faces`. One interface takes both:
+    ``Interface(name, pair_both_faces(bodies, face, other), normal, friction)``.
     """
     first, second = _face(bodies, face, "face"), _face(bodies, other, "other")
     _check_options("face", reach, overlap)
     _check_apart(first, second)
     one, two = (_paired(*pair, nodes, reach, overlap)
                 for pair in ((first, second), (second, first)))
-    return (replace(one, tributary=0.5 * one.tributary),
-            replace(two, tributary=0.5 * two.tributary, swapped=True))
+    return TwoPassPairing(replace(one, tributary=0.5 * one.tributary),
+                          replace(two, tributary=0.5 * two.tributary, swapped=True))
 
 
 def finer_face(bodies: Mapping[str, ElasticBody], face: str, other: str) -> str:

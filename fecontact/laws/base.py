@@ -161,6 +161,9 @@ class NodeLaw:
 class NormalLaw(NodeLaw):
     """A normal law; ``kernel`` is a :func:`fecontact.laws.normal_law`."""
 
+    # Whether it pulls as well as pushes, as a spring does and no contact.
+    bilateral: ClassVar[bool] = False
+
     @property
     def penetration_scale(self) -> float:
         """Characteristic penetration of the law [m], the smallest of all nodes.

@@ -84,8 +84,9 @@ def check_law(law: NormalLaw | FrictionLaw) -> None:
 
     - values are finite;
     - derivatives agree with finite differences, at a kink with either side or a value between;
-    - normal laws do not pull at u > 0, their elastic force F(u, 0) does not decrease, their damping
-      dissipates energy, and the stored energy is the integral of F(u, 0) and not negative;
+    - normal laws do not pull at u > 0 (unless their class says ``bilateral = True``), their
+      elastic force F(u, 0) does not decrease, their damping dissipates energy, and the stored
+      energy is the integral of F(u, 0) and not negative;
     - friction is zero without normal force; without memory it opposes the slip velocity, with
       memory every cycle of slip dissipates energy.
 
@@ -127,7 +128,8 @@ def _check_normal(law: NormalLaw, p: Array) -> None:
     still = normal_values(law.kernel.address, p, u, np.zeros_like(u))
     points, force = np.column_stack([u, v]), values[:, 0]
     _require(law, "(u, v)", points, np.isfinite(values).all(axis=1), values, "must be finite")
-    _require(law, "(u, v)", points, (u <= 0.0) | (force >= 0.0), force, "must not pull at u > 0")
+    pushes = law.bilateral | (u <= 0.0) | (force >= 0.0)
+    _require(law, "(u, v)", points, pushes, force, "must not pull at u > 0")
     _require(law, "(u, v)", points, still[:, 1] >= 0.0, still[:, :2],
              "must not fall as u grows: dF/du < 0 at v = 0")
     damping = (force - still[:, 0]) * v

@@ -31,7 +31,14 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         profile,
         random_roughness,
     )
-    from fecontact.laws.normal import linear, measured_surface, power, rough_surface, statistical
+    from fecontact.laws.normal import (
+        bilateral,
+        linear,
+        measured_surface,
+        power,
+        rough_surface,
+        statistical,
+    )
     from fecontact.laws.signals import harmonic, transient
 
     return {
@@ -49,6 +56,9 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "greenwood-williamson": statistical.GreenwoodWilliamson,
             "two-sided-stop": linear.TwoSidedStop,
             "prescribed-force": linear.PrescribedForce,
+            "bilateral-cubic": bilateral.BilateralCubic,
+            "bilateral-play": bilateral.BilateralPlay,
+            "bilateral-piecewise": bilateral.BilateralPiecewise,
         },
         FrictionLaw: {
             "exponential": stribeck.ExponentialFriction,

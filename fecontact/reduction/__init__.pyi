@@ -1,7 +1,9 @@
 from .assembly.assembled_basis import PointPairing, assembled_basis
 from .assembly.bodies_convergence import BodiesConvergence, bodies_convergence
+from .assembly.face_weld import FaceWeld
 from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, Spring, Weld, linked
+from .assembly.nonlinear_springs import CubicSpring, PiecewiseSpring, PlaySpring
 from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
@@ -17,12 +19,16 @@ __all__ = [
     "BodiesConvergence",
     "BodyPart",
     "Bushing",
+    "CubicSpring",
+    "FaceWeld",
     "Hinge",
     "InterfaceCompliance",
     "ModalRotation",
     "ModeConvergence",
     "ModeShapes",
     "Normalisation",
+    "PiecewiseSpring",
+    "PlaySpring",
     "PointPairing",
     "ReductionQuality",
     "Spring",

@@ -73,6 +73,11 @@ class ModalBasis(Summarised):
         The bodies, if there are several.
     link_load : (m,) array or None
         Constant modal forces of preloaded links between bodies.
+    springs : tuple of str
+        Groups that are no interfaces, but nonlinear springs: one node each, which moves along its
+        normal only.
+    first_passes : tuple of (str, int)
+        Interfaces of two passes, and how many of the nodes belong to the first one.
 
     Raises
     ------
@@ -101,6 +106,8 @@ class ModalBasis(Summarised):
     on_ground: NDArray[np.bool_] | None = None
     parts: tuple[BodyPart, ...] = ()
     link_load: Array | None = None
+    springs: tuple[str, ...] = ()
+    first_passes: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
         m = len(self.angular_frequencies)
@@ -128,6 +135,10 @@ class ModalBasis(Summarised):
             raise InputError(f"Modal basis: the interfaces {groups} do not add up to the "
                              f"{len(self.tributary)} contact nodes.")
         object.__setattr__(self, "groups", groups)
+        object.__setattr__(self, "springs", tuple(map(str, self.springs)))
+        if unknown := set(self.springs) - {name for name, _ in groups}:
+            raise InputError(f"Modal basis: springs names {choices(sorted(unknown))}, but the "
+                             f"groups are {choices([name for name, _ in groups])}.")
         points = 2 + len(self.tributary) + len(self.extra)
         for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2)),
                             ("inertia_rows", (2, m)),
@@ -174,7 +185,7 @@ class ModalBasis(Summarised):
         middle = hertz if len(hertz) < 6 else [*hertz[:3], "...", hertz[-1]]
         diagonal = (self.damping == np.diag(np.diag(self.damping))).all()
         full = "full matrix" + _skew(self.damping, ", in part gyroscopic")
-        groups = [f"{count} {name}" for name, count in self.groups]
+        groups = [f"{count} {name}" for name, count in self.groups if name not in self.springs]
         return [
             ("modes", f"{self.modes}, {self.rigid_modes} rigid"),
             ("frequencies", f"{', '.join(middle)} Hz" if hertz else "none"),
@@ -187,8 +198,9 @@ class ModalBasis(Summarised):
             *([("bodies", listed([
                 part.name + f" ({count(part.modes[1], 'mode')})" * (part.modes[1] > 0)
                 for part in self.parts]))] if self.parts else []),
-            ("contact nodes", f"{self.contact_nodes}"
-             + (f" ({listed(groups)})" if len(groups) > 1 or self.parts else "")),
+            ("contact nodes", f"{np.count_nonzero(~self.spring_nodes)}"
+             + (f" ({listed(groups)})" if len(groups) > 1 or (groups and self.parts) else "")),
+            *([("nonlinear springs", listed(list(self.springs)))] if self.springs else []),
             ("points", listed(["B", "C", *self.extra])),
             ("shapes over the body", "none" if self.mode_shapes is None
              else f"at {len(self.mode_shapes.nodes)} nodes"),
@@ -222,6 +234,12 @@ class ModalBasis(Summarised):
         if self.on_ground is None:
             return np.ones(self.contact_nodes, dtype=bool)
         return self.on_ground
+
+    @property
+    def spring_nodes(self) -> NDArray[np.bool_]:
+        """Whether each contact node (n,) is a nonlinear spring between two points."""
+        return np.repeat([name in self.springs for name, _ in self.groups],
+                         [count for _, count in self.groups]).astype(bool)
 
     @property
     def stiffness_matrix(self) -> Array:

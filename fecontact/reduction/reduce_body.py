@@ -14,10 +14,11 @@ from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import body_elements, linear_cells, stress_of
-from fecontact.fem.pairing import Pairing
+from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
-from fecontact.reduction.assembly.links import Bushing, Link, Weld
+from fecontact.reduction.assembly.face_weld import FaceWeld
+from fecontact.reduction.assembly.links import Bushing, Link, Links, Weld
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.reduction.modal_basis import ModalBasis
@@ -162,8 +163,8 @@ def modal_basis(
 
 def reduce_bodies(
     bodies: Mapping[str, ElasticBody],
-    pairings: Sequence[Pairing] = (),
-    links: Sequence[Link] = (),
+    pairings: Sequence[Pairing | TwoPassPairing] = (),
+    links: Links = (),
     *,
     modes: int | Mapping[str, int] = 20,
     each: Mapping[str, Mapping[str, Any]] | None = None,
@@ -171,17 +172,18 @@ def reduce_bodies(
 ) -> dict[str, ModalBasis]:
     """Modal bases of several bodies that can carry the forces between them.
 
-    By default modes with residual vectors of forces at the nodes and feet of the pairings, and of
-    forces and moments at the points of the links. B and C are those that ``each`` gives to one
+    By default modes with residual vectors of forces at the nodes and feet of the pairings and on
+    welded faces (bodies with these get all of them, tolerance = 0), and of forces and moments at
+    the points of the links. B and C are those that ``each`` gives to one
     body, or of the one mesh that has points of that name.
 
     Parameters
     ----------
     bodies : mapping of name to ElasticBody
         The bodies.
-    pairings : sequence of Pairing
+    pairings : sequence of Pairing or TwoPassPairing
         Where the bodies may touch each other or the ground; they name the bodies.
-    links : sequence of links
+    links : sequence, or mapping of name to link
         What joins them; points of the meshes need not be among ``points``.
     modes : int or mapping of name to int
         Number of modes of each body, rigid ones included, without residual vectors.
@@ -211,17 +213,24 @@ def reduce_bodies(
                                  f"{nearest(str(name), bodies)}; the bodies are "
                                  f"{choices(bodies)}.")
     found = {}
+    passes = [part for one in pairings for part in one.passes]
+    joints = [*links.values()] if isinstance(links, Mapping) else links
     ends = ends_of_bodies(bodies, {name: {**options, **each.get(name, {})} for name in bodies})
     for name, body in bodies.items():
         if name not in counts:
             raise InputError(f"reduce_bodies: modes lacks the body '{name}'.")
-        rows = [one.nodes for one in pairings if one.body == name]
-        rows += [one.feet for one in pairings if one.other == name]
+        rows = [one.nodes for one in passes if one.body == name]
+        rows += [one.feet for one in passes if one.other == name]
         given: dict[str, Any] = {"contact": (), "reduction": "residual", **options,
                                  **each.get(name, {}), **ends[name]}
         with located(f"Body '{name}':"):
-            given["points"], joints = _joints(name, body, given, links)
-            rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + joints
+            given["points"], ending = _joints(name, body, given, joints)
+            seams = [row for link in joints if isinstance(link, FaceWeld)
+                     for row in link.rows(name)]
+            if seams:
+                # Faces that lack some of their motions could not follow each other.
+                given["tolerance"] = 0.0
+            rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + ending + seams
             found[name] = modal_basis(body, counts[name], rows=rows, **given)
     return found
 
@@ -270,6 +279,8 @@ def _joints(
     """Points of a body with those of its links, and the rows on which their forces act."""
     known, rows = dict(options.get("points") or {}), []
     for link in links:
+        if isinstance(link, FaceWeld):
+            continue
         for end in (link.first, link.second):
             owner, _, point = (end or "").partition(".")
             if owner == name:

@@ -12,8 +12,10 @@ from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.registry import PART_CLASSES
+from fecontact.reduction.assembly.links import NonlinearSpring
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import InterfaceSettings, Reduced
+from fecontact.study.links_section import LinkSettings
 from fecontact.system.contact_system import (
     NO_FRICTION_LAW,
     NO_NORMAL_LAW,
@@ -38,6 +40,10 @@ class Described(Protocol):
         """Laws of single interfaces."""
 
     @property
+    def links(self) -> Mapping[str, LinkSettings]:
+        """What joins several bodies."""
+
+    @property
     def load(self) -> Load:
         """Loads."""
 
@@ -60,10 +66,13 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         For laws, loads or a gap that do not fit the basis; the message names the section.
     """
     basis, several = reduced.basis, reduced.gaps is not None
-    groups = dict(basis.groups)
-    if not groups:
+    springs = {name: one for name, one in study.links.items()
+               if isinstance(one, NonlinearSpring)}
+    groups = {name: count for name, count in basis.groups if name not in springs}
+    if not groups and not springs:
         raise InputError(f"{title}: there are no contact nodes; name the faces that touch in "
-                         f"[interfaces.NAME]." if several else
+                         f"[interfaces.NAME], or join the bodies by a nonlinear spring in "
+                         f"[links.NAME]." if several else
                          f"{title}: [basis]: contact = [] leaves the body without contact nodes; "
                          f"name the boundary that touches the ground.")
     for name in study.interfaces:
@@ -95,7 +104,9 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         own = _own(study, part)
         if own or several:
             usual = parts[part] or ConstantFriction(0.0)
-            parts[part] = dict.fromkeys(groups, usual) | own
+            parts[part] = dict.fromkeys(groups, usual) | own | {
+                name: one.law if part == "normal" else ConstantFriction(0.0)
+                for name, one in springs.items()}
     parts["sliding"] = {name: one.sliding for name, one in study.interfaces.items()
                         if one.sliding is not None}
     with located(f"{title}:", "ContactSystem"):
@@ -106,7 +117,8 @@ def _rubs(study: Described, basis: ModalBasis) -> bool:
     """Whether a node of an interface without own friction law can move along its other side."""
     own, first = _own(study, "friction"), 0
     for name, count in basis.groups:
-        if name not in own and basis.contact_T[first : first + count, 0].any():
+        moves = basis.contact_T[first : first + count, 0].any()
+        if moves and name not in own and name not in basis.springs:
             return True
         first += count
     return False
@@ -121,6 +133,8 @@ def _gaps(study: Described, reduced: Reduced, title: str) -> Any:
     for name, count in reduced.basis.groups:
         nodes = slice(first, first + count)
         first += count
+        if name in reduced.basis.springs:
+            continue
         with located(f"{title}: [interfaces.{name}]:", "Crown"):
             gaps[nodes] += np.asarray(gap_values(study.interfaces[name].gap,
                                                  reduced.basis.contact_x[nodes]))
@@ -141,5 +155,5 @@ def _laws(study: Described, groups: Mapping[str, int]) -> Iterator[tuple[str, An
             yield f"interfaces.{group}.{part}", law, groups[group]
         for count in [sum(groups.values())] if not own else [
                 count for group, count in groups.items() if group not in own]:
-            if getattr(study, part) is not None:
+            if getattr(study, part) is not None and count:
                 yield part, getattr(study, part), count

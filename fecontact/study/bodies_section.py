@@ -9,16 +9,16 @@ import numpy as np
 
 from fecontact.core.docstrings import inherit_documentation
 from fecontact.core.errors import InputError, choices, nearest, require_finite
-from fecontact.core.tables import from_table, located, require_known, shown, to_table
+from fecontact.core.tables import from_table, located, plain, require_known, shown, to_table
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.pairing import Pairing, pair_faces
+from fecontact.fem.pairing import Pairing, TwoPassPairing, pair_both_faces, pair_faces
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import assembled_basis
-from fecontact.reduction.assembly.links import Bushing, Hinge, Link, Spring, Weld
+from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
@@ -27,15 +27,14 @@ from fecontact.study.geometry_section import (
     geometry_mesh,
     geometry_table,
 )
+from fecontact.study.links_section import LinkSettings, made_links
 from fecontact.study.sections import BasisSettings, BodySettings
 from fecontact.system.gap import Crown
 
 Gap = float | tuple[float, ...] | Crown
 
-LINKS: Mapping[str, type] = {"spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld}
-
 # Keys of an interface on which the modal bases of its bodies depend.
-PAIRING_KEYS = ("face", "other", "nodes", "nodes_on", "reach", "overlap")
+PAIRING_KEYS = ("face", "other", "passes", "nodes", "nodes_on", "reach", "overlap")
 
 
 @dataclass(frozen=True)
@@ -141,6 +140,10 @@ class InterfaceSettings:
         several bodies only.
     other : str
         'BODY.BOUNDARY' of the other face, or 'ground'.
+    passes : 1 or 2
+        One pass has contact nodes on one of the faces; two have them on both, which loads them more
+        evenly. Totals refer to both passes together. For compliant laws, not on the ground and not
+        where the other side slides.
     nodes : int or 'all'
         Every displacement node, or so many segments of equal length.
     nodes_on : 'finer' or 'face', optional
@@ -161,6 +164,7 @@ class InterfaceSettings:
     friction: FrictionLaw | None = None
     face: str | None = None
     other: str = "ground"
+    passes: Literal[1, 2] = 1
     nodes: int | Literal["all"] = "all"
     nodes_on: Literal["finer", "face"] | None = None
     reach: Annotated[float | None, Unit("m")] = None
@@ -191,7 +195,7 @@ class Bodies(Protocol):
         """Where they may touch."""
 
     @property
-    def links(self) -> Mapping[str, Link]:
+    def links(self) -> Mapping[str, LinkSettings]:
         """What joins them."""
 
     @property
@@ -307,29 +311,6 @@ def _known_body(body: str, bodies: Mapping[str, Any], where: str) -> str:
     return body
 
 
-def links_from_tables(tables: Any, title: str) -> dict[str, Link]:
-    """All links from ``[links]``; the key ``kind`` names the class of each."""
-    if not isinstance(tables, Mapping):
-        raise InputError(f"{title}: [links] must be a table of links, [links.NAME], not "
-                         f"{shown(tables)}.")
-    found: dict[str, Link] = {}
-    for name, table in tables.items():
-        where = f"{title}: [links.{name}]"
-        kind = table.get("kind") if isinstance(table, Mapping) else None
-        if not isinstance(kind, str) or kind not in LINKS:
-            raise InputError(f"{where}: kind = {shown(kind)} must be one of {choices(LINKS)}"
-                             f"{nearest(str(kind), LINKS)}.")
-        found[name] = from_table(LINKS[kind], {key: value for key, value in table.items()
-                                               if key != "kind"}, where)
-    return found
-
-
-def link_table(link: Link, *, defaults: bool = True) -> dict[str, Any]:
-    """Table of a link; the inverse of :func:`links_from_tables`."""
-    kind = {cls: name for name, cls in LINKS.items()}[type(link)]
-    return {"kind": kind, **to_table(link, defaults=defaults)}
-
-
 def body_meshes(study: Bodies, title: str) -> dict[str, Mesh]:
     """Meshes of all bodies in their places."""
     found = {}
@@ -355,9 +336,9 @@ def elastic_bodies(study: Bodies, meshes: Mapping[str, Mesh], title: str) -> dic
 
 def pairings(
     study: Bodies, bodies: Mapping[str, ElasticBody], title: str
-) -> dict[str, Pairing]:
+) -> dict[str, Pairing | TwoPassPairing]:
     """Pairings of the faces of all interfaces."""
-    found = {}
+    found: dict[str, Pairing | TwoPassPairing] = {}
     for name, one in study.interfaces.items():
         with located(f"{title}: [interfaces.{name}]:", "pair_faces"):
             assert one.face is not None
@@ -367,23 +348,40 @@ def pairings(
                     raise InputError(f"the mesh of body '{body}' has no boundary '{boundary}'"
                                      f"{nearest(boundary, known)}; its boundaries are: "
                                      f"{choices(known)}.")
-            found[name] = pair_faces(bodies, one.face, one.other, nodes=one.nodes,
-                                     nodes_on=one.side_of_nodes, reach=one.reach,
-                                     overlap=one.overlap)
-            if one.sliding is not None and found[name].swapped:
+            if one.passes == 2:
+                found[name] = _both_faces(bodies, one)
+                continue
+            found[name] = made = pair_faces(
+                bodies, one.face, one.other, nodes=one.nodes, nodes_on=one.side_of_nodes,
+                reach=one.reach, overlap=one.overlap)
+            if one.sliding is not None and made.swapped:
                 raise InputError(f"sliding is that of {one.other}, but with nodes_on = 'finer' "
                                  f"the contact nodes lie on it; leave nodes_on out.")
     return found
 
 
+def _both_faces(bodies: Mapping[str, ElasticBody], one: InterfaceSettings) -> TwoPassPairing:
+    """Two passes of an interface."""
+    assert one.face is not None
+    wrong = {"other": one.other == "ground", "nodes_on": one.nodes_on is not None,
+             "sliding": one.sliding is not None}
+    for key, is_wrong in wrong.items():
+        if is_wrong:
+            raise InputError(f"passes = 2 puts contact nodes on both faces, which {key} = "
+                             f"{shown(plain(getattr(one, key)))} does not allow; set passes = 1.")
+    return pair_both_faces(bodies, one.face, one.other, nodes=one.nodes, reach=one.reach,
+                           overlap=one.overlap)
+
+
 def body_bases(
-    study: Bodies, bodies: Mapping[str, ElasticBody], faces: Mapping[str, Pairing], title: str
+    study: Bodies, bodies: Mapping[str, ElasticBody],
+    faces: Mapping[str, Pairing | TwoPassPairing], title: str
 ) -> dict[str, ModalBasis]:
     """Modal bases of all bodies, with the forces at their interfaces; see ``reduce_bodies``."""
     found = {}
     with located(f"{title}: [bodies]:"):
         bases = reduce_bodies(
-            bodies, list(faces.values()), list(study.links.values()),
+            bodies, list(faces.values()), made_links(study.links, bodies, title),
             modes={name: one.basis.modes for name, one in study.bodies.items()},
             each={name: one.basis.options for name, one in study.bodies.items()})
     for name, one in study.bodies.items():
@@ -393,10 +391,12 @@ def body_bases(
 
 
 def reduced_bodies(
-    bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing], links: Mapping[str, Link],
-    title: str,
+    bases: Mapping[str, ModalBasis], faces: Mapping[str, Pairing | TwoPassPairing],
+    links: Mapping[str, LinkSettings], bodies: Mapping[str, ElasticBody], title: str,
 ) -> Reduced:
-    """The assembled basis, and the gaps of the geometry."""
+    """The assembled basis, and the gaps of the geometry, zero for nonlinear springs."""
     with located(f"{title}:"):
-        return Reduced(assembled_basis(bases, faces, list(links.values())),
-                       np.concatenate([np.zeros(0), *(one.gaps for one in faces.values())]))
+        made = made_links(links, bodies, title)
+        springs = np.zeros(len(nonlinear_springs(made)))
+        return Reduced(assembled_basis(bases, faces, made), np.concatenate(
+            [*(one.gaps for one in faces.values()), springs]))

@@ -10,8 +10,7 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.tables import located
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.pairing import Pairing
-from fecontact.reduction.assembly.links import Link
+from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import (
     BodySections,
@@ -24,6 +23,7 @@ from fecontact.study.bodies_section import (
     reduced_bodies,
 )
 from fecontact.study.geometry_section import Geometry, geometry_mesh
+from fecontact.study.links_section import LinkSettings
 from fecontact.study.sections import BasisSettings, BodySettings
 
 # Cached objects of a study, and that on which each depends.
@@ -50,7 +50,7 @@ class StudyModels:
     basis: BasisSettings
     bodies: Mapping[str, BodySections]
     interfaces: Mapping[str, InterfaceSettings]
-    links: Mapping[str, Link]
+    links: Mapping[str, LinkSettings]
     path: Path | None
 
     @property
@@ -88,7 +88,7 @@ class StudyModels:
         self._require_several("elastic_bodies", "elastic_body")
         return dict(self._bodies)
 
-    def pairings(self) -> dict[str, Pairing]:
+    def pairings(self) -> dict[str, Pairing | TwoPassPairing]:
         """Pairings of the faces of several bodies, by the names of the interfaces."""
         self._require_several("pairings", "mesh")
         return dict(self._pairings)
@@ -156,7 +156,7 @@ class StudyModels:
         return elastic_bodies(self, self._meshes, self.title)
 
     @cached_property
-    def _pairings(self) -> dict[str, Pairing]:
+    def _pairings(self) -> dict[str, Pairing | TwoPassPairing]:
         return pairings(self, self._bodies, self.title)
 
     @cached_property
@@ -166,7 +166,8 @@ class StudyModels:
     @cached_property
     def _reduced(self) -> Reduced:
         if self.bodies:
-            return reduced_bodies(self._bases, self._pairings, self.links, self.title)
+            return reduced_bodies(self._bases, self._pairings, self.links, self._bodies,
+                                  self.title)
         body = self._body
         with located(f"{self.title}: [basis]:"):
             return Reduced(self.basis.modal_basis(body, self.body.rotation))

@@ -10,8 +10,8 @@ from fecontact.core.docstrings import documented, summary
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import described
 from fecontact.laws.registry import is_kind, law_names
-from fecontact.study.bodies_section import LINKS
 from fecontact.study.geometry_section import SHAPES, MeshFile
+from fecontact.study.links_section import LINKS
 from fecontact.study.study import Study
 from fecontact.system.gap import Crown
 
@@ -64,8 +64,8 @@ def _parts() -> Iterator[tuple[str, str]]:
             name = f"{name}.NAME"
         yield from _sections(name, _inner(hints[entry.name]), printed)
     kinds = [_table(cls, f'`kind = "{name}"`: {_summary(cls)}') for name, cls in LINKS.items()]
-    yield "links.NAME", _section("links.NAME", "What joins bodies at points and does not open.",
-                                 *kinds)
+    yield "links.NAME", _section(
+        "links.NAME", "What joins bodies at points or faces and does not open.", *kinds)
 
 
 def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:

@@ -29,7 +29,6 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES, with_folder
-from fecontact.reduction.assembly.links import Link
 from fecontact.study.assembly import contact_system
 from fecontact.study.bodies_section import (
     BodySections,
@@ -37,10 +36,9 @@ from fecontact.study.bodies_section import (
     InterfaceSettings,
     bodies_from_tables,
     check_bodies,
-    link_table,
-    links_from_tables,
 )
 from fecontact.study.geometry_section import Geometry, geometry_from_table, geometry_table
+from fecontact.study.links_section import LinkSettings, link_table, links_from_tables
 from fecontact.study.models import StudyModels
 from fecontact.study.preload_section import PreloadSettings
 from fecontact.study.sections import (
@@ -105,8 +103,8 @@ class Study(Summarised, StudyModels):
     bodies : mapping of name to BodySections
         ``[bodies.NAME.geometry]``, ...: several bodies, in place of ``[geometry]``, ``[body]`` and
         ``[basis]``.
-    links : mapping of name to Spring, Bushing, Hinge or Weld
-        ``[links.NAME]``: what joins bodies at points and does not open; ``kind = "weld"``.
+    links : mapping of name to link
+        ``[links.NAME]``: what joins bodies at points or faces and does not open; ``kind = "weld"``.
     path : Path or None
         The study file; paths of other files are relative to it.
     """
@@ -129,7 +127,7 @@ class Study(Summarised, StudyModels):
     preload: PreloadSettings | None = None
     sweep: SweepSettings | None = None
     bodies: Mapping[str, BodySections] = field(default_factory=dict)
-    links: Mapping[str, Link] = field(default_factory=dict)
+    links: Mapping[str, LinkSettings] = field(default_factory=dict)
     path: Path | None = field(default=None, compare=False)
 
     def summary(self) -> list[tuple[str, str]]:

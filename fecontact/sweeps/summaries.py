@@ -133,7 +133,10 @@ def _mean(trajectory: Trajectory, values: NDArray[Any]) -> float:
 
 
 def _part(trajectory: Trajectory, state: ContactState) -> float:
-    lengths = trajectory.system.basis.tributary
+    basis = trajectory.system.basis
+    lengths = np.where(basis.spring_nodes, 0.0, basis.tributary)
+    if not lengths.any():
+        return float("nan")
     return float((trajectory.contact_state == state).mean(axis=0) @ lengths / lengths.sum())
 
 
@@ -180,8 +183,9 @@ def open_fraction(trajectory: Trajectory) -> float:
 
 
 def mean_normal_force(trajectory: Trajectory) -> float:
-    """Mean over time of the sum of the normal forces."""
-    return _mean(trajectory, trajectory.normal_force.sum(axis=1))
+    """Mean over time of the sum of the normal forces, without those of nonlinear springs."""
+    touching = ~trajectory.system.basis.spring_nodes
+    return _mean(trajectory, trajectory.normal_force[:, touching].sum(axis=1))
 
 
 def peak_normal_force(trajectory: Trajectory) -> float:

@@ -18,7 +18,7 @@ from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
-from fecontact.reduction.assembly.links import Link
+from fecontact.reduction.assembly.links import Links
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
@@ -93,8 +93,9 @@ class ContactSystem(Summarised):
     interfaces : sequence of Interface, optional
         Where they may touch, with the laws; these become ``normal``, ``friction``, ``gap`` and
         ``sliding``.
-    links : sequence of links, optional
-        Welds, hinges, bushings and springs between the bodies.
+    links : sequence, or mapping of name to link, optional
+        Welds, hinges, bushings and springs between the bodies. Parameters of nonlinear springs are
+        ``links.NAME.stiffness``.
 
     Raises
     ------
@@ -117,11 +118,11 @@ class ContactSystem(Summarised):
     sliding: Mapping[str, Sliding] = field(default_factory=dict)
     bodies: InitVar[Mapping[str, ModalBasis] | None] = None
     interfaces: InitVar[Sequence[Interface] | None] = None
-    links: InitVar[Sequence[Link] | None] = None
+    links: InitVar[Links | None] = None
 
     def __post_init__(
         self, bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-        links: Sequence[Link] | None,
+        links: Links | None,
     ) -> None:
         if bodies is not None or interfaces is not None or links is not None:
             if any(getattr(self, name) is not None for name in ("basis", "normal", "friction")):
@@ -135,7 +136,7 @@ class ContactSystem(Summarised):
         """Check all parts and bring them into their stored form."""
         if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
             raise InputError("ContactSystem: there are no contact nodes; give the basis contact "
-                             "nodes, or the bodies an interface.")
+                             "nodes, or the bodies an interface or a nonlinear spring.")
         if self.normal is None:
             raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
         if self.friction is None:
@@ -188,7 +189,9 @@ class ContactSystem(Summarised):
         return [
             *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
               if name in own),
-            *((kind, _law_names(getattr(self, kind))) for kind in ("normal", "friction")),
+            *((kind, names) for kind in ("normal", "friction")
+              if (names := _law_names(getattr(self, kind),
+                                      self.basis.springs if kind == "friction" else ()))),
             *([("sliding", listed([f"{name} {_sliding_speed(one)}"
                                    for name, one in self.sliding.items()]))]
               if self.sliding else []),
@@ -377,7 +380,8 @@ class ContactSystem(Summarised):
         """
         return {outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
-                for name, value in parameters_of(getattr(self, part)).items()}
+                for name, value in parameters_of(getattr(self, part)).items()
+                if part != "friction" or name.partition(".")[0] not in self.basis.springs}
 
     def parameter(self, name: str) -> Any:
         """Value of one parameter by its dotted name, as for :meth:`with_`; None where not given.
@@ -419,8 +423,9 @@ def _load_summary(load: Load) -> str:
     return ", ".join(parts)
 
 
-def _law_names(law: Any) -> str:
+def _law_names(law: Any, without: tuple[str, ...]) -> str:
     """Class of a law, or those of the interfaces."""
     if isinstance(law, Mapping):
-        return listed([f"{type(one).__name__} ({group})" for group, one in law.items()])
+        return listed([f"{type(one).__name__} ({group})" for group, one in law.items()
+                       if group not in without]) if set(law) - set(without) else ""
     return type(law).__name__

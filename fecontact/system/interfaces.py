@@ -17,14 +17,15 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import listed
-from fecontact.fem.pairing import Pairing
+from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import PointPairing, assembled_basis
-from fecontact.reduction.assembly.links import Link
+from fecontact.reduction.assembly.links import Link, Links
+from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 
@@ -42,8 +43,8 @@ class Interface:
     ----------
     name : str
         Its laws are ``interfaces.NAME.normal`` and ``interfaces.NAME.friction``.
-    pairing : Pairing or PointPairing
-        Contact nodes of one side, their feet on the other, normals and gaps.
+    pairing : Pairing, TwoPassPairing or PointPairing
+        Contact nodes of one side, their feet on the other, normals and gaps; or those of both.
     normal : normal law
         Extensive parameters are totals of the interface.
     friction : friction law, optional
@@ -60,7 +61,7 @@ class Interface:
     """
 
     name: str
-    pairing: Pairing | PointPairing
+    pairing: Pairing | TwoPassPairing | PointPairing
     normal: NormalLaw
     friction: FrictionLaw | None = None
     sliding: Sliding | None = None
@@ -69,11 +70,15 @@ class Interface:
     def __post_init__(self) -> None:
         require_kind("Interface", str, name=self.name)
         owner = f"Interface '{self.name}'"
-        require_kind(owner, (Pairing, PointPairing), pairing=self.pairing)
+        require_kind(owner, (Pairing, TwoPassPairing, PointPairing), pairing=self.pairing)
         require_kind(owner, NormalLaw, normal=self.normal)
         require_kind(owner, (FrictionLaw, type(None)), friction=self.friction)
         require_kind(owner, (SlidingTranslation, SlidingRotation, type(None)),
                      sliding=self.sliding)
+        if self.sliding is not None and isinstance(self.pairing, TwoPassPairing):
+            raise InputError(f"{owner}: sliding is that of the other side, but with two passes "
+                             f"contact nodes lie on it too; pair the faces in one pass, by "
+                             f"pair_faces with nodes_on='face'.")
         if self.sliding is not None and isinstance(self.pairing, Pairing) and self.pairing.swapped:
             raise InputError(f"{owner}: sliding is that of the other side, but the contact nodes "
                              f"lie on it, the finer face '{self.pairing.report.face}'; pair the "
@@ -82,7 +87,7 @@ class Interface:
 
 def system_fields(
     bodies: Mapping[str, ModalBasis] | None, interfaces: Sequence[Interface] | None,
-    links: Sequence[Link] | None,
+    links: Links | None,
 ) -> dict[str, Any]:
     """Basis, laws, gap and sliding of a contact system of several bodies.
 
@@ -93,7 +98,8 @@ def system_fields(
         that slide without friction law.
     """
     require_kind("ContactSystem", Mapping, bodies=bodies)
-    require_kind("ContactSystem", (Sequence, type(None)), interfaces=interfaces, links=links)
+    require_kind("ContactSystem", (Sequence, type(None)), interfaces=interfaces)
+    require_kind("ContactSystem", (Sequence, Mapping, type(None)), links=links)
     assert bodies is not None
     given: dict[str, Interface] = {}
     for one in interfaces or ():
@@ -104,21 +110,32 @@ def system_fields(
         given[one.name] = one
     basis = assembled_basis(bodies, {name: one.pairing for name, one in given.items()},
                             links or ())
-    _require_joined(bodies, given, links or ())
-    friction, gaps, first = {}, [], 0
+    springs = nonlinear_springs(links or ())
+    _require_joined(bodies, given, [*(links.values() if isinstance(links, Mapping) else links
+                                      or ())])
+    friction: dict[str, FrictionLaw] = {}
+    gaps: list[Array] = []
+    first = 0
     for name, count in basis.groups:
-        one, nodes = given[name], slice(first, first + count)
+        nodes = slice(first, first + count)
         first += count
+        if name in springs:
+            friction[name] = ConstantFriction(0.0)
+            gaps.append(np.zeros(count))
+            continue
+        one = given[name]
         if one.friction is None and basis.contact_T[nodes, 0].any():
             raise InputError(f"Interface '{name}' lacks friction, although its contact nodes can "
                              f"move along the other side: give a friction law with its "
                              f"coefficients, such as ConstantFriction(0.0) for no friction.")
         friction[name] = ConstantFriction(0.0) if one.friction is None else one.friction
         with located(f"Interface '{name}':"):
-            gaps.append(one.pairing.gaps + np.asarray(gap_values(one.gap, basis.contact_x[nodes])))
+            gaps.append(np.asarray(one.pairing.gaps, dtype=float)
+                        + np.asarray(gap_values(one.gap, basis.contact_x[nodes])))
     return {
         "basis": basis,
-        "normal": {name: one.normal for name, one in given.items()},
+        "normal": {**{name: one.normal for name, one in given.items()},
+                   **{name: one.law for name, one in springs.items()}},
         "friction": friction,
         "gap": np.concatenate([np.zeros(0), *gaps]),
         "sliding": {name: one.sliding for name, one in given.items() if one.sliding is not None},
@@ -210,7 +227,7 @@ def checked_sliding(
         whose normal leans.
     """
     require_kind("ContactSystem", Mapping, sliding=sliding)
-    names = [group for group, _ in basis.groups]
+    names = [group for group, _ in basis.groups if group not in basis.springs]
     for group, one in sliding.items():
         if group not in names:
             raise InputError(f"ContactSystem: sliding names the interface {group!r}"
@@ -260,8 +277,10 @@ def prescribed_motion(
 
 
 def inner_name(name: str) -> str:
-    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness``."""
+    """``normal.NAME.stiffness`` for ``interfaces.NAME.normal.stiffness`` or ``links.NAME...``."""
     first, _, rest = name.partition(".")
+    if first == "links":
+        return f"normal.{rest}"
     group, _, parameter = rest.partition(".")
     kind, _, last = parameter.partition(".")
     if first != "interfaces" or kind not in _PARTS:
@@ -270,11 +289,13 @@ def inner_name(name: str) -> str:
 
 
 def outer_name(system: Any, name: str) -> str:
-    """The reverse, for laws and sliding of the interfaces of a system."""
+    """The reverse, for laws and sliding of the interfaces of a system, and its springs."""
     kind, _, rest = name.partition(".")
     if kind not in _PARTS or not isinstance(getattr(system, kind), Mapping):
         return name
     group, _, last = rest.partition(".")
     if group not in getattr(system, kind):
         return name
+    if group in system.basis.springs and kind == "normal":
+        return f"links.{group}.{last}" if last else f"links.{group}"
     return f"interfaces.{group}.{kind}.{last}" if last else f"interfaces.{group}.{kind}"

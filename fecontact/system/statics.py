@@ -104,6 +104,8 @@ def equilibrium(
     slides = bool(arrays.leans and ground.wavy and arrays.Tx.any() and not standing)
     problem = Balance(arrays._replace(leans=0), time, system.penetration_scale)
     solution = problem.equilibrium()
+    if system.basis.springs:
+        solution = _among_springs(system, problem, solution, friction)
     if solution is None:
         raise AnalysisError(_reason(system, problem, friction))
     if not slides:
@@ -116,6 +118,16 @@ def equilibrium(
                             "ground carry the body away; give it a spring at B along the ground "
                             "(drive.stiffness_x) or a support.")
     return found
+
+
+def _among_springs(
+    system: ContactSystem, problem: "Balance", solution: Array | None, friction: bool
+) -> Array | None:
+    """A stable equilibrium beside springs that may soften, whose energy is not convex."""
+    if solution is not None and (friction or problem.stable(solution)):
+        return solution
+    start = np.zeros(system.basis.modes) if solution is None else solution
+    return problem.slide(start, system.penetration_scale, system.stored_energy)
 
 
 def at_rest(arrays: kernels.SystemArrays, travel: float) -> kernels.SystemArrays:
@@ -165,6 +177,9 @@ class Balance:
         kernels.contact_state(time, self._state, arrays, undisplaced)
         self.face_force = values + self.face_stiffness * (
             undisplaced[:, kernels.PENETRATION] - far)
+        # Of preloaded springs, which cancel within their law.
+        self._initial = np.abs(arrays.Ty).T @ np.where(
+            arrays.on_ground, 0.0, np.abs(undisplaced[:, kernels.NORMAL_FORCE]))
         tangential = (arrays.Tx**2).T @ self.face_stiffness
         normal = (arrays.Ty**2).T @ self.face_stiffness
         diagonal = np.abs(np.diag(arrays.stiffness))
@@ -309,7 +324,11 @@ class Balance:
             elif (reach := 0.5 * reach) < 1e-9 * longest:
                 break
         rest = self.solve(q, 1.0)
-        return rest if rest is not None and self._curved(rest)[1][0] >= -1e-9 else None
+        return rest if rest is not None and self.stable(rest) else None
+
+    def stable(self, q: Array) -> bool:
+        """Whether the energy has a minimum at an equilibrium q."""
+        return bool(self._curved(q)[1][0] >= -1e-9)
 
     def _curved(self, q: Array) -> tuple[Array, Array, Array]:
         """Out-of-balance force (m,), curvatures of the energy and their directions, all scaled."""
@@ -374,7 +393,7 @@ class Balance:
         arrays = self.arrays
         terms = np.abs(arrays.stiffness) @ np.abs(q) + np.abs(load * self.load)
         contact = self.force(q, load) - load * self.load + arrays.stiffness @ q
-        rounding = 1e-11 * self._size(terms + np.abs(contact))
+        rounding = 1e-11 * self._size(terms + np.abs(contact) + self._initial)
         applied = self._size(load * self.load)
         return min(rounding, _UNBALANCED * applied) if applied > 0.0 else rounding
 

@@ -390,7 +390,7 @@ def test_nodes_stand_on_the_finer_face():
 
 def test_two_passes_halve_the_lengths_and_even_the_loads():
     bodies = two_blocks(5, 7)
-    one, two = pair_both_faces(bodies, "pad.bottom", "disc.top")
+    one, two = pair_both_faces(bodies, "pad.bottom", "disc.top").passes
     assert (one.body, two.body) == ("pad", "disc")
     assert one.tributary.sum() == pytest.approx(0.5, abs=1e-14)
     assert two.tributary.sum() == pytest.approx(0.5, abs=1e-14)

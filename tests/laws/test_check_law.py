@@ -11,6 +11,9 @@ import fecontact as fc
 from fecontact.cli import execute
 from fecontact.laws import (
     BackBurdekinContact,
+    BilateralCubic,
+    BilateralPiecewise,
+    BilateralPlay,
     BoucWenFriction,
     CosineSurface,
     ExponentialContact,
@@ -43,6 +46,8 @@ NEEDED = {
     LinearContact: (1e6, 3.0), PowerContact: (1e9, 1.5, 2.0),
     RestitutionContact: (1e9, 0.5, 1.0), ExponentialContact: (10.0, 1e-6),
     BackBurdekinContact: (1e-4, 1e-9), TwoSidedStop: (1e6, 1e-4, 1.5), PrescribedForce: (3.0,),
+    BilateralCubic: (1e6, 1e15, 3.0), BilateralPlay: (1e6, 1e-5, 3.0),
+    BilateralPiecewise: ((-1e-3, 0.0, 1e-3), (-1e3, 0.0, 2e3), 3.0),
     GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6),
 }
 

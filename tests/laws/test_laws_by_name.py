@@ -37,6 +37,7 @@ GIVEN = {
     "time": 0.1,
     "rms_height": 1e-6, "length": 1e-2, "seed": 3, "hurst_exponent": 0.8,
     "start": 0.1, "cut_off_wavelength": 1e-4, "roll_off_wavelength": 5e-3, "kind": "half-sine",
+    "cubic_stiffness": 1e15, "elongations": (-1e-3, 0.0, 1e-3), "forces": (-1e3, 0.0, 2e3),
 }
 ALL = [(kind, name) for kind, names in law_names().items() for name in names]
 SURFACE = """
@@ -87,7 +88,8 @@ def test_every_law_is_documented(kind, name):
         assert "Raises" in text
         assert "References" in text or name in (
             "linear", "prescribed-force", "two-sided-stop", "constant", "parabolic-surface",
-            "cosine-surface", "gaussian-surface", "measured-surface", "hyperbolic", "cubic")
+            "cosine-surface", "gaussian-surface", "measured-surface", "hyperbolic", "cubic",
+            "bilateral-cubic", "bilateral-play", "bilateral-piecewise")
 
 
 @pytest.mark.parametrize(("kind", "name"), [

@@ -14,6 +14,9 @@ from scipy.integrate import quad
 from fecontact import InputError
 from fecontact.laws import (
     BackBurdekinContact,
+    BilateralCubic,
+    BilateralPiecewise,
+    BilateralPlay,
     CosineSurface,
     ExponentialContact,
     GaussianSurface,
@@ -31,6 +34,7 @@ from fecontact.laws import (
     normal_law,
 )
 from fecontact.laws.check import require_sound
+from fecontact.laws.normal.bilateral import BilateralLaw
 from fecontact.laws.sampling import stored_energy
 
 R = 5e-6
@@ -86,6 +90,11 @@ LAWS = {
     "prescribed": (PrescribedForce(14.0), MICRO),
     "stop": (TwoSidedStop(1e6, 3e-5, 1.0, 0.4), (-1e-4, 6e-5)),
     "stop 1.5": (TwoSidedStop(1e9, 3e-5, 1.5, 0.4), (-1e-4, 6e-5)),
+    "cubic spring": (BilateralCubic(1e6, 1e14, 40.0, 3.0, 1e-5), (-1e-4, 6e-5)),
+    "play": (BilateralPlay(1e6, 3e-5, 40.0), (-1e-4, 6e-5)),
+    "preloaded play": (BilateralPlay(1e6, 3e-5, 40.0, 4.0, 1e-5), (-1e-4, 6e-5)),
+    "table": (BilateralPiecewise((-2e-5, 0.0, 1e-5, 3e-5), (-30.0, 0.0, 1.0, 9.0), 40.0, 2.0, 5e-6),
+              (-1e-4, 6e-5)),
     "user": (TwoSlopes(), MICRO),
 }
 
@@ -93,7 +102,8 @@ LAWS = {
 @pytest.mark.parametrize("name", LAWS)
 def test_contract(name):
     law, u_range = LAWS[name]
-    check_normal_law(law, u_range, (-5.0, 5.0), two_sided=isinstance(law, TwoSidedStop))
+    check_normal_law(law, u_range, (-5.0, 5.0),
+                     two_sided=isinstance(law, TwoSidedStop | BilateralLaw))
 
 
 @pytest.mark.parametrize("law", [

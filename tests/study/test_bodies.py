@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from sweep_study import Serial
 
 import fecontact as fc
@@ -11,7 +12,15 @@ from fecontact.cli import execute
 from fecontact.cli.templates import template
 from fecontact.fem.pairing import pair_faces
 from fecontact.laws import ConstantFriction, RoughSurface, SlidingTranslation
-from fecontact.reduction import Spring, assembled_basis, reduce_bodies
+from fecontact.reduction import (
+    CubicSpring,
+    FaceWeld,
+    PiecewiseSpring,
+    PlaySpring,
+    Spring,
+    assembled_basis,
+    reduce_bodies,
+)
 from fecontact.sweeps.case import of_basis
 
 SHORT = {"simulation.t_end": 2e-3, "simulation.outputs": 11, "output.frames": 2}
@@ -374,3 +383,88 @@ def test_changes_of_unknown_interfaces_name_the_nearest(study):
     name = "interfaces.linng.friction.friction_coefficient"
     with pytest.raises(fc.InputError, match=r"interface 'linng' .*'lining'.*; there are: 'l"):
         study.with_(**{name: 0.5})
+
+
+@pytest.mark.parametrize(("kind", "keys"), [
+    ("cubic-spring", {"stiffness": 1e4, "cubic_stiffness": 1e12, "preload": 30.0}),
+    ("play-spring", {"stiffness": 1e6, "clearance": 1e-4, "preload": 30.0}),
+    ("piecewise-spring", {"elongations": [-1e-3, 0.0, 1e-3], "forces": [-10.0, 0.0, 90.0],
+                          "preload": 30.0})])
+def test_nonlinear_springs_join_points_of_bodies(study, kind, keys):
+    """The same system as in Python; its preload presses the pad on the block."""
+    point = {"bodies.pad.basis.points": {"P": [0.06, 0.06]}}
+    bolt = {"kind": kind, "first": "pad.P", "direction": [0.0, 1.0], **keys}
+    linked = study.with_(**point, **{"links.bolt": bolt})
+    made = {"cubic-spring": CubicSpring, "play-spring": PlaySpring,
+            "piecewise-spring": PiecewiseSpring}[kind]
+    system = in_python({"P": (0.06, 0.06)},
+                       {"bolt": made("pad.P", direction=(0.0, 1.0), **keys)})
+    assert linked.system().basis.groups == (("lining", 6), ("bolt", 1))
+    assert linked.system().parameters() == system.parameters()
+    assert (linked.system().basis.T == system.basis.T).all()
+    assert fc.Study.from_toml(linked.to_toml()) == linked
+    looser = linked.with_(**{"links.bolt.preload": 0.0})
+    forces = [one.run().normal_force[-1, :6].sum() for one in (linked, looser)]
+    assert forces[0] - forces[1] == pytest.approx(30.0, rel=0.01)
+    with pytest.raises(fc.InputError, match=r"\[links\.bolt\]: preload = \"x\""):
+        study.with_(**point, **{"links.bolt": bolt | {"preload": "x"}})
+
+
+def test_a_study_of_bodies_that_only_a_nonlinear_spring_joins(study):
+    tables = study.tables(defaults=False)
+    del tables["interfaces"], tables["bodies"]["block"]
+    tables["bodies"]["pad"]["basis"]["points"] = {"P": [0.03, 0.04], "Q": [0.09, 0.04]}
+    spring = {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0],
+              "stiffness": 1e6, "cubic_stiffness": 1e14, "damping": 100.0}
+    tables["links"] = {"mount": spring, "other": spring | {"first": "pad.Q"}}
+    run = fc.Study.from_tables(tables).run()
+    assert run.system.basis.groups == (("mount", 1), ("other", 1))
+    # Each carries half of the load of 200 N: c e + c_3 e^3 = -100 N.
+    e = brentq(lambda e: 1e6 * e + 1e14 * e**3 + 100.0, -1.0, 0.0, xtol=1e-16)
+    assert run.normal_force[0] == pytest.approx([100.0, 100.0], rel=1e-6)
+    assert run.displacement("pad.P")[0, 1] == pytest.approx(e, rel=1e-6)
+    with pytest.raises(fc.InputError, match=r"\[links\.mount\]: stiffness and cubic_stiffness"):
+        fc.Study.from_tables({**tables, "links": {
+            "mount": {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0]}}})
+
+
+def welded_study(study, **weld):
+    """The pad welded on the block, with a nonlinear spring at its corner."""
+    tables = study.tables(defaults=False)
+    del tables["interfaces"]
+    tables["bodies"]["pad"]["basis"]["points"] = {"P": [0.09, 0.06]}
+    tables["links"] = {
+        "seam": {"kind": "face-weld", "first": "pad.contact", "second": "block.top", **weld},
+        "mount": {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0],
+                  "stiffness": 1e6, "cubic_stiffness": 1e14}}
+    return tables
+
+
+@pytest.mark.parametrize("nodes", ["all", 6])
+def test_faces_are_welded_in_a_study(study, nodes):
+    described = fc.Study.from_tables(welded_study(study, nodes=nodes))
+    bodies = described.elastic_bodies()
+    weld = FaceWeld(pair_faces(bodies, "pad.contact", "block.top", nodes=nodes))
+    mount = described.links["mount"]
+    bases = reduce_bodies(bodies, links={"seam": weld, "mount": mount}, modes=4, each={
+        "block": {"damping": 0.02}, "pad": {"damping": 0.05, "B": "left", "C": "top",
+                                                "points": {"P": (0.09, 0.06)}}})
+    basis = assembled_basis(bases, {}, {"seam": weld, "mount": mount})
+    found = described.system().basis
+    assert (found.angular_frequencies == basis.angular_frequencies).all()
+    assert found.rigid_modes == 0
+    assert found.groups == (("mount", 1),)
+    assert fc.Study.from_toml(described.to_toml()) == described
+    assert np.isfinite(described.run().normal_force).all()
+
+
+@pytest.mark.parametrize(("weld", "message"), [
+    ({"second": "block.left"}, r"\[links\.seam\]:"),
+    ({"second": "blok.top"}, r"\[links\.seam\]: second = \"blok\.top\": there is no body 'blok'"),
+    ({"second": "block.tp"}, "tp"),
+    ({"nodes": 0}, r"\[links\.seam\]: nodes"),
+    ({"reach": -1.0}, r"\[links\.seam\]: reach"),
+])
+def test_bad_welds_of_faces_are_explained(study, weld, message):
+    with pytest.raises(fc.FecontactError, match=message):
+        fc.Study.from_tables(welded_study(study, **weld)).system()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.events import AnyEvent, Events
 from fecontact.integrate.nonsmooth import problem as kinds
@@ -221,6 +221,10 @@ def _problem(
         int(system.prescribed_motion.base.motion is None), compiled_derivative.address,
         compiled_change.address)
     rubbing = np.any(rows != 0.0, axis=1)
+    if restitution is not None and system.basis.springs:
+        raise InputError(f"SetValued: restitution puts rigid stops in place of all normal laws, "
+                         f"but the system has nonlinear springs, {choices(system.basis.springs)}; "
+                         f"leave restitution out.")
     if restitution is not None:
         rough = _rough_nodes(groups, problem.static)
         rubbing &= np.array([rough[cluster == c].any() for c in range(len(rows))])

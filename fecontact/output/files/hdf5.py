@@ -157,6 +157,11 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
         group["boundary_rows"].attrs["names"] = list(basis.boundaries)
     group.attrs["groups"] = [name for name, _ in basis.groups]
     group.attrs["group_sizes"] = [count for _, count in basis.groups]
+    if basis.springs:
+        group.attrs["springs"] = list(basis.springs)
+    if basis.first_passes:
+        group.attrs["first_passes"] = [name for name, _ in basis.first_passes]
+        group.attrs["first_pass_sizes"] = [count for _, count in basis.first_passes]
     if basis.thickness is not None:
         group.attrs["thickness"] = basis.thickness
     if basis.quality is not None:
@@ -213,6 +218,10 @@ def stored_basis(group: Any) -> ModalBasis:
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
         boundaries=boundaries, parts=_read_parts(group) if "parts" in group else (), **given,
         thickness=float(group.attrs["thickness"]) if "thickness" in group.attrs else None,
+        springs=tuple(str(name) for name in np.atleast_1d(group.attrs.get("springs", ()))),
+        first_passes=tuple((str(name), int(count)) for name, count in zip(*(
+            np.atleast_1d(group.attrs.get(key, ())) for key in (
+                "first_passes", "first_pass_sizes")), strict=True)),
         rotation=_read_rotation(member(group, "rotation"), m) if "rotation" in group else None)
 
 

@@ -20,7 +20,7 @@ from fecontact.output.plots.face_panels import abscissa_unit, face_panels
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import COLOURS, DASHES, add_note, distinct_colours
-from fecontact.reduction.assembly.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import touching_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -225,7 +225,7 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     require_kind("plot_friction_work", Trajectory, trajectory=trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    faces = contact_faces(trajectory.system.basis)
+    faces = touching_faces(trajectory.system.basis, "friction work")
     work = trajectory.friction_work[-1] / trajectory.system.basis.tributary
     touching = trajectory.normal_force != 0.0
     speed = np.abs(trajectory.slip_velocity) * touching

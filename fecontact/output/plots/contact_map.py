@@ -14,7 +14,7 @@ from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import STATE_COLOURS, add_note, state_names
-from fecontact.reduction.assembly.contact_faces import ContactFace, contact_faces
+from fecontact.reduction.assembly.contact_faces import ContactFace, touching_faces
 from fecontact.reduction.modal_basis import ModalBasis
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     basis = trajectory.system.basis
-    faces = contact_faces(basis)
+    faces = touching_faces(basis, "contact map")
     single = not faces[0].name
     size = (10.0, 6.2) if single else (12.0, 0.9 + 2.6 * len(faces))
     with new_figure(*size, path) as figure:

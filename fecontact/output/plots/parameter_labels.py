@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any, get_args, get_type_hints
 
 from fecontact.core.units import Unit
+from fecontact.laws.base import NormalLaw
 from fecontact.laws.registry import is_kind, law_names
 from fecontact.system.contact_system import ContactSystem
 
@@ -17,7 +18,7 @@ def parameter_label(name: str, owner: type = ContactSystem) -> str:
     ``ground.speed`` becomes ``ground speed [m/s]``. Names that are not parameters of the dataclass
     ``owner``, or whose unit depends on the law, get no unit.
     """
-    inner = re.sub(r"^interfaces\.[^.]+\.", "", name)
+    inner = re.sub(r"^links\.[^.]+\.", "links.", re.sub(r"^interfaces\.[^.]+\.", "", name))
     units = _units(owner).get(inner, frozenset())
     words = re.sub(r"\b(\w+) \1\b", r"\1", re.sub(r"[._]", " ", name.removeprefix("interfaces.")))
     return f"{words} [{next(iter(units))}]" if len(units) == 1 else words
@@ -27,6 +28,10 @@ def parameter_label(name: str, owner: type = ContactSystem) -> str:
 def _units(owner: type) -> dict[str, frozenset[str]]:
     """Units of each dotted name; several or none if laws differ."""
     found: dict[str, set[str]] = {"gap": {"m"}}
+    laws: Any = law_names()[NormalLaw]
+    for law in laws.values():
+        if law.bilateral:
+            found |= {f"links.{name}": {unit} for name, unit in _units_of(law).items()}
     for entry, hint in get_type_hints(owner).items():
         section = entry.removesuffix("_settings")
         for place, cls in _classes(hint, section):

@@ -12,7 +12,7 @@ from fecontact.core.units import quantity, suitable_unit
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS
-from fecontact.reduction.assembly.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import touching_faces
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES
 
@@ -58,7 +58,8 @@ def plot_shear(
     require_kind("plot_shear", LoadHistory, history=history)
     early = vertex == -1 and history.status != "finished"
     row = len(history) - 1 if early else history.row(vertex)
-    length, faces = history.system.basis.tributary, contact_faces(history.system.basis)
+    length = history.system.basis.tributary
+    faces = touching_faces(history.system.basis, "contact at a load step")
     shear = history.friction_force[row] / length
     limit = history.friction_limit[row] / length
     slip, states = history.slip[row], history.state(row).contact_state

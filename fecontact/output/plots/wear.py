@@ -11,7 +11,7 @@ from fecontact.core.units import suitable_unit
 from fecontact.integrate.wear import WearHistory
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS
-from fecontact.reduction.assembly.contact_faces import ContactFace, contact_faces
+from fecontact.reduction.assembly.contact_faces import ContactFace, touching_faces
 from fecontact.reduction.modal_basis import ModalBasis
 
 if TYPE_CHECKING:
@@ -92,4 +92,4 @@ def _faces(history: WearHistory, basis: ModalBasis | None) -> tuple[ContactFace,
     if basis.contact_nodes != len(history.x):
         raise InputError(f"plot_wear: the basis has {basis.contact_nodes} contact nodes, but the "
                          f"wear history {len(history.x)}; give the basis of the worn system.")
-    return contact_faces(basis)
+    return touching_faces(basis, "wear")

@@ -56,7 +56,8 @@ def body_labels(basis: ModalBasis) -> tuple[tuple[str, int], ...]:
     if field is None:
         return ()
     # Arrows of the ground's forces lie below a body, those of other bodies inside.
-    contacts = basis.positions[2 : 2 + basis.contact_nodes][~basis.ground_nodes]
+    contacts = basis.positions[2 : 2 + basis.contact_nodes][
+        ~basis.ground_nodes & ~basis.spring_nodes]
     for part in basis.parts:
         first, count = part.nodes
         nodes = field.nodes[first : first + count]
@@ -133,7 +134,8 @@ class Motion:
     @cached_property
     def footed(self) -> NDArray[np.intp]:
         """Contact nodes (f,) whose other side is a body, not the ground."""
-        return np.flatnonzero(~self.trajectory.system.basis.ground_nodes)
+        basis = self.trajectory.system.basis
+        return np.flatnonzero(~basis.ground_nodes & ~basis.spring_nodes)
 
     @cached_property
     def has_ground(self) -> bool:

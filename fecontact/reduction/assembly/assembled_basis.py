@@ -15,8 +15,9 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array, ArrayLike
-from fecontact.fem.pairing import Pairing
-from fecontact.reduction.assembly.links import Link, linked
+from fecontact.fem.pairing import Pairing, TwoPassPairing
+from fecontact.reduction.assembly.links import Links, NonlinearSpring, linked
+from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
 
@@ -57,6 +58,11 @@ class PointPairing:
     normals: ArrayLike = (0.0, 1.0)
     gaps: ArrayLike = 0.0
     tributary: ArrayLike | None = None
+
+    @property
+    def passes(self) -> "tuple[PointPairing, ...]":
+        """The pairing itself."""
+        return (self,)
 
     def __post_init__(self) -> None:
         require_kind("PointPairing", str, body=self.body)
@@ -110,29 +116,34 @@ class _Side:
 
 @dataclass(frozen=True, eq=False)
 class _Contact:
-    """Contact nodes of one interface and both sides; the other one is None on the ground."""
+    """Contact nodes of one interface and both sides; the other one is None on the ground.
+
+    A nonlinear spring is one node, whose other side may be the base.
+    """
 
     places: Array
     normals: Array
     tributary: Array
     side: _Side
     other: _Side | None
+    spring: bool = False
 
     @property
     def frames(self) -> Any:
-        """Sparse (3 n, 3 n): x, y, rotation to tangent, normal, rotation."""
+        """Sparse (3 n, 3 n): x, y, rotation to tangent, normal, rotation; springs: normal alone."""
         import scipy.sparse as sp
 
         x, y = self.normals.T
-        zero, one = np.zeros_like(x), np.ones_like(x)
-        frames = np.array([[y, -x, zero], [x, y, zero], [zero, zero, one]]).transpose(2, 0, 1)
+        zero, one = np.zeros_like(x), np.full_like(x, 0.0 if self.spring else 1.0)
+        frames = np.array([[y * one, -x * one, zero], [x, y, zero],
+                           [zero, zero, one]]).transpose(2, 0, 1)
         return sp.csr_array(sp.block_diag(list(frames), format="csr"))
 
 
 def assembled_basis(
     bases: Mapping[str, ModalBasis],
-    pairings: Mapping[str, Pairing | PointPairing],
-    links: Sequence[Link] = (),
+    pairings: Mapping[str, Pairing | TwoPassPairing | PointPairing],
+    links: Links = (),
 ) -> ModalBasis:
     """One basis of several bodies, for a contact system of all of them.
 
@@ -146,26 +157,40 @@ def assembled_basis(
     ----------
     bases : mapping of name to ModalBasis
         The bodies, which do not rotate.
-    pairings : mapping of name to Pairing or PointPairing
+    pairings : mapping of name to Pairing, TwoPassPairing or PointPairing
         The interfaces.
-    links : sequence of links, optional
+    links : sequence, or mapping of name to link, optional
         Welds, hinges, bushings and springs; with any, the modes are those of the linked bodies
-        instead of blocks, see :func:`fecontact.reduction.linked`.
+        instead of blocks, see :func:`fecontact.reduction.linked`. Nonlinear springs leave the modes
+        as they are: each becomes a group of one node after the interfaces, with its name, or
+        ``spring_1`` and on.
 
     Raises
     ------
     InputError
-        For names that are not those of bodies and points, names with a dot, pairings of other
-        meshes, bodies that rotate, and B or C at two bodies.
+        For names that are not those of bodies and points, names with a dot or used twice, pairings
+        of other meshes, bodies that rotate, and B or C at two bodies.
     """
     require_kind("Several bodies", Mapping, bodies=bases, interfaces=pairings)
     _check_bodies(bases)
     for name in pairings:
         _check_name("interface", name)
-    contacts = []
+    contacts, counts, halves = [], [], []
     for name, pairing in pairings.items():
         with located(f"Interface '{name}':", "PointPairing"):
-            contacts.append(_contact(bases, pairing))
+            made = [_contact(bases, one) for one in pairing.passes]
+        contacts += made
+        counts.append(sum(len(one.tributary) for one in made))
+        if len(made) > 1:
+            halves.append((name, len(made[0].tributary)))
+    springs = nonlinear_springs(links)
+    for name, spring in springs.items():
+        _check_name("link", name)
+        if name in pairings:
+            raise InputError(f"The name '{name}' of a nonlinear spring is that of an interface "
+                             f"too; give each its own.")
+        contacts.append(_spring_contact(bases, name, spring))
+        counts.append(1)
     places = _Places(bases)
     named = [_named_point(bases, point) for point in ("B", "C")]
     extra = [(name, point) for name, basis in bases.items()
@@ -182,7 +207,7 @@ def assembled_basis(
         nodal.append(places.nodal(sides, frames.shape[0]))
     T += [places.modal([(1.0, side)], 3) for side in further]
     nodal += [places.nodal([(1.0, side)], 3) for side in further]
-    counts = [len(contact.tributary) for contact in contacts]
+    sizes = [len(contact.tributary) for contact in contacts]
     whole = ModalBasis(
         angular_frequencies=np.concatenate([one.angular_frequencies for one in bases.values()]),
         damping=places.blocks([one.damping for one in bases.values()]),
@@ -194,7 +219,7 @@ def assembled_basis(
         tributary=np.concatenate([np.zeros(0), *(contact.tributary for contact in contacts)]),
         extra=tuple(f"{name}.{point}" for name, point in extra),
         mode_shapes=places.joined_shapes(nodal),
-        groups=tuple(zip(pairings, counts, strict=True)),
+        groups=tuple(zip((*pairings, *springs), counts, strict=True)),
         thickness=_common([one.thickness for one in bases.values()]),
         inertia_rows=_beside([one.inertia_rows for one in bases.values()]),
         boundaries=tuple(f"{name}.{boundary}" for name, basis in bases.items()
@@ -203,10 +228,15 @@ def assembled_basis(
         stiffness=places.blocks([one.stiffness_matrix for one in bases.values()]) if any(
             one.stiffness is not None for one in bases.values()) else None,
         contact_normals=np.concatenate([np.zeros((0, 2)), *(one.normals for one in contacts)]),
-        on_ground=np.repeat([contact.other is None for contact in contacts], counts).astype(bool),
+        on_ground=np.repeat([contact.other is None and not contact.spring for contact in contacts],
+                            sizes).astype(bool),
         parts=places.parts,
+        springs=tuple(springs),
+        first_passes=tuple(halves),
     )
-    return linked(whole, links) if links else whole
+    joints = [link for link in (links.values() if isinstance(links, Mapping) else links)
+              if not isinstance(link, NonlinearSpring)]
+    return linked(whole, joints) if joints else whole
 
 
 class _Places:
@@ -309,6 +339,15 @@ def _contact(bases: Mapping[str, ModalBasis], pairing: Pairing | PointPairing) -
         side = _faces(bases[body], body, pairing.nodes)
         feet = None if other is None else _faces(bases[other], other, pairing.feet)
     return _Contact(places, np.asarray(pairing.normals), np.asarray(pairing.tributary), side, feet)
+
+
+def _spring_contact(
+    bases: Mapping[str, ModalBasis], name: str, spring: NonlinearSpring
+) -> _Contact:
+    row = spring_row(bases, name, spring)
+    side, *other = (_points(bases[body], body, [point]) for body, point in row.ends)
+    return _Contact(row.place[None], row.direction[None], np.ones(1), side,
+                    other[0] if other else None, spring=True)
 
 
 def _points(basis: ModalBasis, name: str, points: Any) -> _Side:

@@ -4,11 +4,12 @@ For what shows or stores results: systems of several bodies have contact nodes o
 direction, whose rows in ``T`` are those of the motion relative to the other side.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -34,6 +35,10 @@ class ContactFace:
         Which of them.
     tributary : (k,) array
         Lengths of the face that the nodes represent [m].
+    spring : bool
+        Whether it is no face, but a nonlinear spring between two points.
+    nodes_on : str
+        Of one of two passes, the body with its contact nodes.
     """
 
     name: str
@@ -42,13 +47,16 @@ class ContactFace:
     abscissa: Array
     axis: Literal["x", "s"]
     tributary: Array
+    spring: bool = False
+    nodes_on: str = ""
 
     @property
     def title(self) -> str:
         """``shoe: pad and disc``; empty for a single body."""
         bodies = " and ".join(self.bodies) if len(self.bodies) > 1 else (
             f"{self.bodies[0]} with itself" if self.bodies else "")
-        return f"{self.name}: {bodies}" if bodies else self.name
+        nodes = f", nodes on {self.nodes_on}" if self.nodes_on else ""
+        return f"{self.name}: {bodies}{nodes}" if bodies else self.name
 
     @property
     def label(self) -> str:
@@ -72,22 +80,57 @@ def contact_directions(basis: ModalBasis) -> tuple[Array, Array]:
 
 def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
     """One face for each interface; for a single body one of all its contact nodes, along x."""
-    x, length = basis.contact_x, basis.tributary
+    found: dict[str, ContactFace] = {}
+    for one in _passes(basis):
+        first = found.get(one.name, one)
+        found[one.name] = one if first is one else replace(
+            first, nodes=slice(first.nodes.start, one.nodes.stop), nodes_on="",
+            abscissa=np.append(first.abscissa, one.abscissa),
+            axis="x" if first.axis == one.axis == "x" else "s",
+            tributary=0.5 * np.append(first.tributary, one.tributary))
+    return tuple(found.values())
+
+
+def _passes(basis: ModalBasis) -> tuple[ContactFace, ...]:
+    """As :func:`contact_faces`, but one for each pass of interfaces of two, with whole lengths."""
+    x, length = basis.contact_x, np.array(basis.tributary)
     if not several_bodies(basis):
         return (ContactFace("", (), slice(0, len(x)), x, "x", length),)
     ground, (tangents, normals) = basis.ground_nodes, contact_directions(basis)
     places = basis.positions[2 : 2 + len(x)]
     found, first = [], 0
-    for name, count in basis.groups:
-        nodes = slice(first, first + count)
-        first += count
+    halves = dict(basis.first_passes)
+    sizes = ((name, size) for name, count in basis.groups for size in (
+        (halves[name], count - halves[name]) if name in halves else (count,)))
+    for name, size in sizes:
+        nodes = slice(first, first + size)
+        first += size
+        length[nodes] *= 2.0 if name in halves else 1.0
         flat = bool(ground[nodes].all() or np.abs(normals[nodes, 0]).max(initial=0.0) < _FLAT)
         abscissa = x[nodes] if flat else _arc_length(places[nodes], normals[nodes],
                                                      tangents[nodes], length[nodes])
         bodies = _bodies_at(basis, nodes) + ["ground"] * bool(ground[nodes].any())
+        if name in basis.springs and len(bodies) == 1:
+            bodies.append("base")
         found.append(ContactFace(name, tuple(bodies), nodes, abscissa, "x" if flat else "s",
-                                 length[nodes]))
+                                 length[nodes], name in basis.springs,
+                                 _owner(basis, nodes) if name in halves else ""))
     return tuple(found)
+
+
+def touching_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
+    """The faces of :func:`contact_faces` without nonlinear springs, and one for each pass.
+
+    Raises
+    ------
+    AnalysisError
+        If there are none, for ``what`` is shown on them.
+    """
+    found = tuple(face for face in _passes(basis) if not face.spring)
+    if not found:
+        raise AnalysisError(f"There is no {what}: nonlinear springs join the bodies, which touch "
+                            f"at no interface.")
+    return found
 
 
 def node_name(basis: ModalBasis, node: int) -> str:
@@ -115,7 +158,7 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
     -------
     (sparse (2 n, 2 N), sparse (2 n, 2 N))
         Along x and y, node by node. What lies on the other side enters the relative rows with
-        weights of sum -1; rows of feet on the ground are zero.
+        weights below zero; rows of feet on the ground are zero.
     """
     import scipy.sparse as sp
     from scipy.sparse.csgraph import connected_components
@@ -128,7 +171,8 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
     turned = sp.bsr_array((np.stack([tangents, normals], axis=2), np.arange(n), np.arange(n + 1)),
                           shape=(2 * n, 2 * n))
     both = sp.csr_array(turned @ local)
-    weights = sp.coo_array(both[::2][:, ::2])
+    # Of nonlinear springs only the parts along their direction.
+    weights = sp.coo_array(both[::2][:, ::2] + both[1::2][:, 1::2])
     weights.sum_duplicates()
     row, node = weights.coords
     # Mesh nodes of one side hang together along the outline, also where a body touches itself.
@@ -162,6 +206,14 @@ def _bodies_at(basis: ModalBasis, nodes: slice) -> list[str]:
         if touches:
             found.append(part.name)
     return found
+
+
+def _owner(basis: ModalBasis, nodes: slice) -> str:
+    """The body that contact nodes lie on: its part of their motion has weights of sum one."""
+    assert basis.mode_shapes is not None, "faces with two passes have meshes"
+    row = basis.mode_shapes.restriction.tocsr()[[6 + 3 * nodes.start + 1]].toarray()[0]
+    along = row.reshape(-1, 2) @ basis.normals[nodes.start]
+    return max(basis.parts, key=lambda part: along[part.nodes[0] : sum(part.nodes)].sum()).name
 
 
 def _arc_length(places: Array, normals: Array, tangents: Array, tributary: Array) -> Array:

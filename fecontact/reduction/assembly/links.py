@@ -5,11 +5,12 @@ space of G; springs add ``k r^T r`` for the row r of their elongation. Stiffness
 left have the eigenmodes P, by which all rows are multiplied.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import as_floats, as_unit_pair, require_kind
 from fecontact.core.errors import (
@@ -20,6 +21,8 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
+from fecontact.laws.base import NormalLaw
+from fecontact.reduction.assembly.face_weld import FaceWeld, welded_rows
 from fecontact.reduction.eigenmodes import fixed_signs
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -69,14 +72,25 @@ class Spring:
     shortening: Annotated[float, Unit("m")] = 0.0
 
     def __post_init__(self) -> None:
-        _check_points(self)
+        check_ends(self)
         require_not_negative("Spring", stiffness=self.stiffness, damping=self.damping)
         require_finite("Spring", preload=self.preload, shortening=self.shortening)
-        if self.direction is not None:
-            object.__setattr__(self, "direction", as_unit_pair(
-                self.direction, "Spring: direction"))
-        elif self.second is None:
-            raise InputError("Spring: a spring to the base needs direction = (x, y).")
+
+
+class NonlinearSpring:
+    """A spring between two points that is no part of the stiffness matrix.
+
+    See :mod:`fecontact.reduction.assembly.nonlinear_springs`.
+    """
+
+    first: str
+    second: str | None
+    direction: tuple[float, float] | None
+
+    @property
+    def law(self) -> NormalLaw:
+        """Law of its node, whose normal force is minus the tension."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -155,7 +169,9 @@ class Weld(Hinge):
     held: ClassVar[tuple[int, ...]] = (0, 1, 2)
 
 
-Link = Spring | Bushing | Hinge
+Link = Spring | Bushing | Hinge | FaceWeld | NonlinearSpring
+# Names are of use for nonlinear springs, whose groups and parameters have them.
+Links = TypeAliasType("Links", Sequence[Link] | Mapping[str, Link])
 
 
 def _check_points(link: "Link") -> None:
@@ -164,6 +180,23 @@ def _check_points(link: "Link") -> None:
     require_kind(owner, (str, type(None)), second=link.second)
     if link.first == link.second:
         raise InputError(f"{owner}: first and second are the same point '{link.first}'.")
+
+
+def check_ends(spring: Spring | NonlinearSpring) -> None:
+    """Check the points of a spring, and make its direction a unit vector.
+
+    Raises
+    ------
+    InputError
+        For equal points, a direction of length zero, or a spring to the base without one.
+    """
+    _check_points(spring)
+    owner = type(spring).__name__
+    if spring.direction is not None:
+        object.__setattr__(spring, "direction", as_unit_pair(
+            spring.direction, f"{owner}: direction"))
+    elif spring.second is None:
+        raise InputError(f"{owner}: a spring to the base needs direction = (x, y).")
 
 
 def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
@@ -177,8 +210,9 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     ----------
     basis : ModalBasis
         Of one or several bodies that do not rotate.
-    links : sequence of Spring, Bushing, Hinge or Weld
-        Between points of the basis.
+    links : sequence of Spring, Bushing, Hinge, Weld or FaceWeld
+        Between points of the basis; nonlinear springs only count in
+        :func:`~fecontact.reduction.assembled_basis`.
 
     Raises
     ------
@@ -192,14 +226,22 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     damping = np.array(basis.damping)
     load = np.zeros(m) if basis.link_load is None else np.array(basis.link_load)
     for link in links:
-        require_kind("Links", (Spring, Bushing, Hinge), link=link)
+        require_kind("Links", (Spring, Bushing, Hinge, FaceWeld, NonlinearSpring), link=link)
+        if isinstance(link, NonlinearSpring):
+            raise InputError(f"{_described(link)} is nonlinear and no part of the modes; give it "
+                             f"to assembled_basis or ContactSystem, links=.")
+        if isinstance(link, FaceWeld):
+            held.append(_felt(link, welded_rows(basis, link)))
+            continue
         relative = _relative_rows(basis, link)
         if isinstance(link, Hinge):
             _require_one_place(basis, link)
             held.append(_felt(link, relative[list(link.held)]))
             continue
         if isinstance(link, Spring):
-            rows = _direction(basis, link)[None] @ relative[:2]
+            ends = [end for end in (link.first, link.second) if end is not None]
+            rows = spring_direction(link, *(basis.positions[basis.point_index(end)]
+                                            for end in ends))[None] @ relative[:2]
             c, b = np.array([link.stiffness]), np.array([link.damping])
             load -= (link.preload + link.stiffness * link.shortening) * rows[0]
         else:
@@ -286,15 +328,20 @@ def _felt(link: Link, rows: Array) -> Array:
     return rows
 
 
-def _direction(basis: ModalBasis, link: Spring) -> Array:
+def spring_direction(link: Spring | NonlinearSpring, first: Array, *second: Array) -> Array:
+    """Unit vector (2,) of a spring between two places (2,), or from one to the base.
+
+    Raises
+    ------
+    InputError
+        If it has neither a direction nor a length.
+    """
     if link.direction is not None:
         return np.array(link.direction)
-    assert link.second is not None, "checked by the spring"
-    first, second = (basis.positions[basis.point_index(name)] for name in (link.first, link.second))
-    length = float(np.linalg.norm(first - second))
+    length = float(np.linalg.norm(first - second[0]))
     if not length > 0.0:
         raise InputError(f"{_described(link)} has length zero; give its direction = (x, y).")
-    return np.asarray((first - second) / length)
+    return np.asarray((first - second[0]) / length)
 
 
 def _require_one_place(basis: ModalBasis, link: Hinge) -> None:

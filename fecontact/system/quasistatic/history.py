@@ -127,12 +127,14 @@ class LoadHistory(Summarised):
 
     def summary(self) -> list[tuple[str, str]]:
         """Points, status, nodes by their state at the end, work and loss."""
-        states = self.contact_state[-1]
+        touching = ~self.system.basis.spring_nodes
+        states = self.contact_state[-1, touching]
         return [
             ("points", f"{len(self)} of {sum(self.path.section_steps) + 1}, {self.status}"),
             ("at the end", ", ".join(f"{np.count_nonzero(states == code)} {name}"
                                      for code, name in enumerate(STATES))),
-            ("normal force", quantity(float(self.normal_force[-1].sum()), "N", 4)),
+            ("normal force", quantity(
+                float(self.normal_force[-1, touching].sum()), "N", 4)),
             ("friction force", quantity(float(self.friction_force[-1].sum()), "N", 4)),
             ("work", quantity(float(self.work[-1]), "J", 4)),
             ("loss", quantity(float(self.loss[-1]), "J", 4)),

@@ -1,0 +1,102 @@
+"""Sections of links between bodies: ``[links.NAME]``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.tables import from_table, located, shown, to_table
+from fecontact.core.units import Unit
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.pairing import pair_faces
+from fecontact.reduction.assembly.face_weld import FaceWeld
+from fecontact.reduction.assembly.links import (
+    Bushing,
+    Hinge,
+    Link,
+    NonlinearSpring,
+    Spring,
+    Weld,
+)
+from fecontact.reduction.assembly.nonlinear_springs import (
+    CubicSpring,
+    PiecewiseSpring,
+    PlaySpring,
+)
+
+
+@dataclass(frozen=True)
+class FaceWeldSettings:
+    """A face of one body welded to a face of another, whose meshes need not match.
+
+    Parameters
+    ----------
+    first, second : str
+        'BODY.BOUNDARY', the two faces, which touch each other.
+    nodes : int or 'all'
+        At every displacement node of the finer face, or in the mean over so many segments.
+    reach : float, optional
+        Largest distance between welded places [m]: shorter for faces that part; by default the
+        extent of the larger face.
+    """
+
+    first: str
+    second: str
+    nodes: int | Literal["all"] = "all"
+    reach: Annotated[float | None, Unit("m")] = None
+
+    def __post_init__(self) -> None:
+        require_kind("FaceWeldSettings", str, first=self.first, second=self.second)
+
+
+LinkSettings = Spring | Bushing | Hinge | NonlinearSpring | FaceWeldSettings
+
+LINKS: Mapping[str, type] = {
+    "spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld,
+    "face-weld": FaceWeldSettings, "cubic-spring": CubicSpring, "play-spring": PlaySpring,
+    "piecewise-spring": PiecewiseSpring}
+
+
+def links_from_tables(tables: Any, title: str) -> dict[str, LinkSettings]:
+    """All links from ``[links]``; the key ``kind`` names the class of each."""
+    if not isinstance(tables, Mapping):
+        raise InputError(f"{title}: [links] must be a table of links, [links.NAME], not "
+                         f"{shown(tables)}.")
+    found: dict[str, LinkSettings] = {}
+    for name, table in tables.items():
+        where = f"{title}: [links.{name}]"
+        kind = table.get("kind") if isinstance(table, Mapping) else None
+        if not isinstance(kind, str) or kind not in LINKS:
+            raise InputError(f"{where}: kind = {shown(kind)} must be one of {choices(LINKS)}"
+                             f"{nearest(str(kind), LINKS)}.")
+        found[name] = from_table(LINKS[kind], {key: value for key, value in table.items()
+                                               if key != "kind"}, where)
+    return found
+
+
+def link_table(link: LinkSettings, *, defaults: bool = True) -> dict[str, Any]:
+    """Table of a link; the inverse of :func:`links_from_tables`."""
+    kind = {cls: name for name, cls in LINKS.items()}[type(link)]
+    return {"kind": kind, **to_table(link, defaults=defaults)}
+
+
+def made_links(
+    links: Mapping[str, LinkSettings], bodies: Mapping[str, ElasticBody], title: str
+) -> dict[str, Link]:
+    """The links of a study; faces that are welded are paired.
+
+    Raises
+    ------
+    InputError
+        For faces that cannot be welded, naming the section.
+    """
+    found: dict[str, Link] = {}
+    for name, one in links.items():
+        if isinstance(one, FaceWeldSettings):
+            with located(f"{title}: [links.{name}]:", "FaceWeld", "pair_faces"):
+                found[name] = FaceWeld(pair_faces(bodies, one.first, one.second, nodes=one.nodes,
+                                                  reach=one.reach))
+        else:
+            found[name] = one
+    return found
