@@ -5,6 +5,7 @@ from contextlib import redirect_stdout
 
 import numpy as np
 import pytest
+from fecontact.system.parameter_labels import parameter_label
 from meshes_for_tests import rectangle
 from scipy.optimize import brentq
 from scipy.special import ellipk
@@ -26,7 +27,6 @@ from fecontact.reduction import (
     reduce_bodies,
 )
 from fecontact.reduction.assembly.contact_faces import contact_sides
-from fecontact.system.parameter_labels import parameter_label
 
 UP = (0.0, 1.0)
 

@@ -1,0 +1,112 @@
+"""Blocks of bodies and interfaces in the integrator: the same runs as by full matrices."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fecontact import (
+    Beam,
+    ContactSystem,
+    ElasticBody,
+    Interface,
+    Load,
+    PointLoad,
+    generate,
+    sensitivity,
+    simulate,
+)
+from fecontact.fem import pair_faces
+from fecontact.integrate.rodas5p.blocks import blocks_of
+from fecontact.laws import ConstantFriction, Harmonic, LinearContact, LuGreFriction
+from fecontact.reduction import reduce_bodies
+
+HEIGHT = 0.004
+ORDER = ("middle", "top", "bottom", "lid")
+MODES = {"middle": 4, "top": 3, "bottom": 2, "lid": 3}
+
+
+@pytest.fixture(scope="module")
+def stacked():
+    """Four beams on each other and the ground, told in another order than they stand in."""
+    mesh = generate(Beam(length=0.1, height=HEIGHT, element_size=0.004))
+    upwards = ("bottom", "middle", "top", "lid")
+    bodies = {name: ElasticBody(mesh.placed((0.0, upwards.index(name) * HEIGHT)), thickness=0.01,
+                                fixed={"left": "xy"}) for name in ORDER}
+    faces = [pair_faces(bodies, "bottom.contact", "ground", nodes=3, nodes_on="face"),
+             *(pair_faces(bodies, f"{upper}.contact", f"{lower}.top", nodes=2, nodes_on="face")
+               for lower, upper in pairwise(upwards))]
+    bases = reduce_bodies(bodies, faces, modes=MODES, reduction="vibration", damping=0.01,
+                          each={name: {"B": "", "C": "top" if name == "lid" else "",
+                                       "points": {"end": "right"}} for name in bodies})
+    return bases, faces
+
+
+def system(stacked, friction):
+    bases, faces = stacked
+    return ContactSystem(
+        bodies=bases, interfaces=[
+            Interface(f"face{k}", face, LinearContact(2e6, 20.0), friction)
+            for k, face in enumerate(faces)],
+        load=Load(30.0, (PointLoad("lid.end", "x", signal=Harmonic(20.0, 800.0)),
+                         PointLoad("middle.end", "y", signal=Harmonic(5.0, 1100.0)))))
+
+
+def in_one_block(whole):
+    """The same system without word of its bodies."""
+    return replace(whole, basis=replace(whole.basis, parts=()))
+
+
+def test_blocks_hold_all_that_is_not_zero(stacked):
+    whole = system(stacked, ConstantFriction(0.3, smoothing_slope=1e4))
+    arrays, found = whole.arrays, blocks_of(whole.basis, whole.arrays)
+    m, n = whole.basis.modes, whole.basis.contact_nodes
+    covered = np.zeros(found.shapes.shape, dtype=int)
+    for top, bottom, left, right in found.tiles:
+        covered[top:bottom, left:right] += 1
+    # Nine nodes; each moves with the modes of its one or two bodies and no others.
+    assert covered.max() == 1 and np.array_equal(covered > 0, found.shapes != 0.0)
+    wanted = np.zeros((m, m), dtype=bool)
+    for j in range(n):
+        moved = found.shapes[:, j] != 0.0
+        wanted |= np.outer(moved, moved)
+        spans = np.concatenate([np.arange(*span) for span in found.spans[j]])
+        assert np.array_equal(np.flatnonzero(moved), np.sort(spans))
+    coupled = np.zeros((m, m), dtype=bool)
+    for top, bottom, left, right, row, column in found.coupled:
+        coupled[top:bottom, left:right] = True
+        assert np.array_equal(found.position[top:bottom], np.arange(row, row + bottom - top))
+        assert found.reach[1, row] >= found.reach[0, row] >= column + right - left
+    assert np.array_equal(coupled, wanted)
+    assert not arrays.stiffness[~coupled].any() and np.array_equal(
+        np.sort(found.position), np.arange(m))
+    # In the order of elimination the beams are a chain: a band of two bodies.
+    assert (found.reach[0] - np.arange(m)).max() <= 7
+
+
+def test_one_body_is_one_block(stacked):
+    bases, _ = stacked
+    whole = in_one_block(system(stacked, ConstantFriction(0.3, smoothing_slope=1e4)))
+    found = blocks_of(whole.basis, whole.arrays)
+    assert found.tiles.tolist() == [[0, 12, 0, 18]] and found.coupled.tolist() == [[0, 12] * 2 + [0, 0]]
+
+
+@pytest.mark.parametrize("friction", [ConstantFriction(0.3, smoothing_slope=1e4),
+                                      LuGreFriction(0.4, 0.3, 1e6)], ids=["slope", "memory"])
+def test_runs_are_those_of_full_matrices(stacked, friction):
+    whole = system(stacked, friction)
+    runs = [simulate(one, 4e-3, outputs=101, rtol=1e-7) for one in (whole, in_one_block(whole))]
+    one, other = runs
+    assert one.statistics["steps"] == pytest.approx(other.statistics["steps"], rel=0.02)
+    assert len(np.unique(one.contact_state)) > 1
+    for name in ("modal_displacements", "modal_velocities", "work"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert np.abs(a - b).max() < 1e-6 * np.abs(b).max()
+
+
+def test_derivatives_are_those_of_full_matrices(stacked):
+    whole = system(stacked, ConstantFriction(0.3, smoothing_slope=1e3))
+    runs = [sensitivity(one, 5e-4, outputs=3) for one in (whole, in_one_block(whole))]
+    a, b = (run.transitions[-1] for run in runs)
+    assert np.abs(a - b).max() < 1e-6 * np.abs(b).max()
