@@ -176,12 +176,14 @@ def run(
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_run
-    from fecontact.cli.tables import notes, run_table
+    from fecontact.cli.tables import run_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.files.locks import locked
 
     described = read_study(study, set_)
     _ = described.t_end
+    from fecontact.analysis.run_facts import notes
+
     with waiting("Compiling, once after an installation"):
         pass
     with (output_folder(output or described.results) as folder,

@@ -1,0 +1,69 @@
+"""One HTML file that holds its data, styles and script, and asks no network for anything."""
+
+import base64
+import hashlib
+import warnings
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+
+from fecontact.core.errors import ModelWarning
+from fecontact.core.files.atomic_write import write_text
+
+# In the order in which they need each other; together one script.
+SCRIPTS = ("payload.js", "chart.js", "player.js", "report.js")
+LARGE = 20e6  # bytes of a file that mail and browsers take without complaint
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'sha256-{seal}'; \
+style-src 'sha256-{style_seal}'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<noscript><p>This report needs JavaScript.</p></noscript>
+<script type="text/plain" id="payload">{block}</script>
+<script type="module">{script}</script>
+</body>
+</html>
+"""
+
+
+def script() -> str:
+    """The script of a page, without comments and indents."""
+    lines = (line.strip() for name in SCRIPTS for line in _asset(name).splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
+
+
+def page(title: str, block: str) -> str:
+    """A page with a block of data.
+
+    All text of a study lies in the block, which has no letters that HTML knows, and is written by
+    the script as text; the policy of the page runs no other script and loads nothing.
+    """
+    code, style = script(), _asset("report.css")
+    return _PAGE.format(title=escape(title), style=style, block=block, script=code,
+                        seal=_seal(code), style_seal=_seal(style))
+
+
+def write_page(path: Path, title: str, block: str) -> Path:
+    """Write a page, whole or not at all; a ModelWarning tells of a file that is large."""
+    text = page(title, block)
+    if len(text) > LARGE:
+        warnings.warn(f"{path} has {len(text) / 1e6:.0f} MB, which browsers open slowly; store "
+                      f"fewer outputs of the run, or report a part of it.", ModelWarning,
+                      stacklevel=3)
+    write_text(path, text)
+    return path
+
+
+def _asset(name: str) -> str:
+    return (files("fecontact.output.report") / "page" / name).read_text(encoding="utf-8")
+
+
+def _seal(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")

@@ -1,0 +1,275 @@
+// Charts on two layers: curves, drawn once for each size, and the cursor, drawn for each instant.
+
+const root = document.documentElement;
+const css = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+function el(tag, props = {}, ...children) {
+  const { data, ...rest } = props;
+  const node = Object.assign(document.createElement(tag), rest);
+  for (const key in data) node.dataset[key] = data[key];
+  node.append(...children);
+  return node;
+}
+
+// Colours of prints are too dark before a dark page.
+function themed(colour) {
+  if (!colour) return css("--ink");
+  if (!matchMedia("(prefers-color-scheme: dark)").matches) return colour;
+  const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+  return `rgb(${parts.map((part) => Math.round(part + 0.35 * (255 - part)))})`;
+}
+
+function ticks(low, high, most) {
+  const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * ([1, 2, 5].find((digit) => digit * power >= rough) ?? 10);
+  const found = [];
+  for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  return found.map((value) => [value, Math.abs(value) < 1e5 && digits < 5
+    ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1") : value.toPrecision(3)]);
+}
+
+// Index of the last time that is not after t.
+function before(times, t) {
+  let low = 0, high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= t) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+function layer(canvas, width, height) {
+  const ratio = devicePixelRatio || 1, context = canvas.getContext("2d");
+  canvas.width = Math.round(width * ratio);
+  canvas.height = Math.round(height * ratio);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return context;
+}
+
+class Chart {
+  // lines: [{name, colour, x?, y}] with arrays; without x over the time of the clock.
+  constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 150, kind = "" }) {
+    Object.assign(this, { clock, lines, xLabel, height });
+    this.base = el("canvas");
+    this.top = el("canvas");
+    this.box = el("div", { className: "plot" }, this.base, this.top);
+    this.node = el("figure", { className: `chart ${kind}` }, el("figcaption", {},
+      el("b", {}, unit ? `${title} [${unit}]` : title), ...this.legend(legend)), this.box);
+    const move = (event) => {
+      const at = this.top.getBoundingClientRect();
+      this.clock.set(this.timeAt(event.clientX - at.left, event.clientY - at.top));
+    };
+    this.top.onpointerdown = (event) => { this.top.setPointerCapture(event.pointerId); move(event); };
+    this.top.onpointermove = (event) => { if (event.buttons) move(event); };
+  }
+
+  legend(lines) {
+    if (lines.length < 2) return [];
+    return lines.map(({ name, colour }) => {
+      const swatch = el("i");
+      swatch.style.background = themed(colour);
+      return el("span", {}, swatch, name);
+    });
+  }
+
+  resize() {
+    this.width = this.box.clientWidth || 300;
+    this.box.style.height = `${this.height}px`;
+    this.inner = { left: 52, right: this.width - 10, top: 6, bottom: this.height - 22 };
+    this.context = layer(this.base, this.width, this.height);
+    this.cursor = layer(this.top, this.width, this.height);
+    this.draw();
+    this.point();
+  }
+
+  get overTime() { return !this.lines[0].x; }
+
+  limits() {
+    const [i0, i1] = this.clock.window();
+    let x = [Infinity, -Infinity], y = [Infinity, -Infinity];
+    const widen = (range, values) => {
+      for (let i = i0; i <= i1; i++) {
+        if (values[i] < range[0]) range[0] = values[i];
+        if (values[i] > range[1]) range[1] = values[i];
+      }
+    };
+    for (const line of this.lines) {
+      widen(y, line.y);
+      if (line.x) widen(x, line.x);
+    }
+    const wide = ([low, high]) => {
+      const room = 0.06 * (high - low) || 0.1 * Math.abs(high) || 1;
+      return [low - room, high + room];
+    };
+    return { x: this.overTime ? this.clock.shown() : wide(x), y: wide(y) };
+  }
+
+  draw() {
+    const { left, right, top, bottom } = this.inner, c = this.context;
+    const { x, y } = this.limits();
+    this.px = (value) => left + (right - left) * (value - x[0]) / (x[1] - x[0]);
+    this.py = (value) => bottom - (bottom - top) * (value - y[0]) / (y[1] - y[0]);
+    this.range = { x, y };
+    c.clearRect(0, 0, this.width, this.height);
+    c.font = `11px ${css("--font")}`;
+    c.fillStyle = css("--soft");
+    c.strokeStyle = css("--grid");
+    c.lineWidth = 1;
+    const xs = ticks(...x, clamp((right - left) / 80, 2, 10)), ys = ticks(...y, this.height / 42);
+    c.beginPath();
+    for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
+    for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
+    c.stroke();
+    c.textBaseline = "middle";
+    c.textAlign = "right";
+    for (const [value, text] of ys) c.fillText(text, left - 6, this.py(value));
+    this.bottomLabels(c, xs);
+    c.save();
+    c.beginPath();
+    c.rect(left, top - 1, right - left, bottom - top + 2);
+    c.clip();
+    for (const line of this.lines) {
+      c.strokeStyle = themed(line.colour);
+      c.lineWidth = line.name === "total" ? 1.8 : 1.2;
+      c.beginPath();
+      if (line.x) this.trace(c, line); else this.envelope(c, line.y);
+      c.stroke();
+    }
+    c.restore();
+  }
+
+  bottomLabels(c, xs) {
+    c.textAlign = "center";
+    const y = this.inner.bottom + 13, width = c.measureText(this.xLabel).width;
+    c.textAlign = "right";
+    c.fillText(this.xLabel, this.width - 2, y);
+    c.textAlign = "center";
+    for (const [value, text] of xs) {
+      if (this.px(value) + 16 < this.width - width) c.fillText(text, this.px(value), y);
+    }
+  }
+
+  trace(c, { x, y }) {
+    const [i0, i1] = this.clock.window();
+    for (let i = i0; i <= i1; i++) c.lineTo(this.px(x[i]), this.py(y[i]));
+  }
+
+  // Of many values in a column of pixels: what comes in, the lowest, the highest, what goes out.
+  envelope(c, y) {
+    const [i0, i1] = this.clock.window(), times = this.clock.axis;
+    for (let i = i0; i <= i1;) {
+      const column = Math.floor(this.px(times[i]));
+      let low = y[i], high = low, last = i;
+      while (last < i1 && Math.floor(this.px(times[last + 1])) === column) {
+        last++;
+        if (y[last] < low) low = y[last];
+        if (y[last] > high) high = y[last];
+      }
+      c.lineTo(this.px(times[i]), this.py(y[i]));
+      if (last > i + 2) { c.lineTo(column, this.py(low)); c.lineTo(column + 0.5, this.py(high)); }
+      if (last > i) c.lineTo(this.px(times[last]), this.py(y[last]));
+      i = last + 1;
+    }
+  }
+
+  timeAt(x, y) {
+    if (this.overTime) {
+      const [low, high] = this.range.x, { left, right } = this.inner;
+      return (low + (high - low) * clamp((x - left) / (right - left), 0, 1)) * this.clock.unit;
+    }
+    let best = Infinity, found = 0;
+    const [i0, i1] = this.clock.window();
+    for (const line of this.lines) {
+      for (let i = i0; i <= i1; i++) {
+        const away = (this.px(line.x[i]) - x) ** 2 + (this.py(line.y[i]) - y) ** 2;
+        if (away < best) { best = away; found = i; }
+      }
+    }
+    return this.clock.times[found];
+  }
+
+  point() {
+    const c = this.cursor, { index, axis } = this.clock, { top, bottom } = this.inner;
+    c.clearRect(0, 0, this.width, this.height);
+    if (this.overTime) this.line(c, this.px(this.clock.time / this.clock.unit), top, bottom);
+    for (const line of this.lines) {
+      if (!line.y) continue;
+      c.fillStyle = themed(line.colour);
+      c.beginPath();
+      c.arc(this.px(line.x ? line.x[index] : axis[index]), this.py(line.y[index]), 3.5, 0, 7);
+      c.fill();
+    }
+  }
+
+  line(c, x, top, bottom) {
+    c.strokeStyle = css("--accent");
+    c.lineWidth = 1;
+    c.beginPath();
+    c.moveTo(x, top);
+    c.lineTo(x, bottom);
+    c.stroke();
+  }
+}
+
+// State or force of the nodes of one face over time.
+class ContactMap extends Chart {
+  constructor(clock, contact, face, shades) {
+    const states = contact.states.map((name, k) => ({ name, colour: contact.colours[k] || "#e3e0da" }));
+    super(clock, { title: face.title, lines: [{ name: "" }], legend: states, xLabel: clock.label,
+      height: clamp(60 + 9 * face.abscissa.length, 90, 220), kind: "map" });
+    Object.assign(this, { contact, face, shades, what: "state" });
+    const pick = el("select", { ariaLabel: "quantity of the contact map" },
+      ...["state", "normal force", "tangential force"].map((name) => el("option", {}, name)));
+    pick.onchange = () => { this.what = pick.value; this.draw(); };
+    this.node.firstChild.append(pick);
+  }
+
+  draw() {
+    const { contact, face, what } = this, { left, right, top, bottom } = this.inner;
+    const c = this.context, times = this.clock.times, n = face.abscissa.length;
+    const x = this.clock.shown(), [i0, i1] = this.clock.window();
+    this.range = { x };
+    this.px = (value) => left + (right - left) * (value - x[0]) / (x[1] - x[0]);
+    c.clearRect(0, 0, this.width, this.height);
+    const columns = Math.max(1, Math.round(right - left)), rows = Math.round(bottom - top);
+    const order = face.abscissa.map((_, k) => k).sort((a, b) => face.abscissa[b] - face.abscissa[a]);
+    const image = new ImageData(columns, n);
+    const colours = contact.colours.map((colour) => colour
+      ? [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16)) : null);
+    const source = what === "state" ? contact.state : what === "normal force" ? contact.normal
+      : contact.along;
+    for (let column = 0; column < columns; column++) {
+      const edge = (k) => (x[0] + (x[1] - x[0]) * k / columns) * this.clock.unit;
+      const from = clamp(before(times, edge(column + 0.5)), i0, i1);
+      const until = clamp(before(times, edge(column + 1.5)), from + 1, i1 + 1);
+      order.forEach((node, row) => {
+        const at = face.first + node;
+        let value = source.values[from * source.columns + at];
+        for (let i = from + 1; what !== "state" && i < until; i++) {
+          const next = source.values[i * source.columns + at];
+          if (Math.abs(next) > Math.abs(value)) value = next;
+        }
+        const colour = what === "state" ? colours[value] : value === 0 ? null
+          : this.shades[Math.round(63 * Math.min(1, Math.abs(value) / contact.largest))];
+        if (colour) image.data.set([...colour, 255], 4 * (row * columns + column));
+      });
+    }
+    const small = el("canvas", { width: columns, height: n });
+    small.getContext("2d").putImageData(image, 0, 0);
+    c.fillStyle = css("--open");
+    c.fillRect(left, top, columns, rows);
+    c.imageSmoothingEnabled = false;
+    c.drawImage(small, left, top, columns, rows);
+    c.font = `11px ${css("--font")}`;
+    c.fillStyle = css("--soft");
+    c.textBaseline = "middle";
+    c.textAlign = "right";
+    const millimetres = (k) => (1e3 * face.abscissa[order[k]]).toPrecision(3).replace(/\.0*$/, "");
+    c.fillText(millimetres(0), left - 6, top + 6);
+    c.fillText(millimetres(n - 1), left - 6, bottom - 6);
+    if (n > 1) c.fillText(`${face.label.slice(-1)} [mm]`, left - 6, 0.5 * (top + bottom));
+    this.bottomLabels(c, ticks(...x, clamp((right - left) / 80, 2, 10)));
+  }
+}
