@@ -182,8 +182,6 @@ def run(
 
     described = read_study(study, set_)
     _ = described.t_end
-    from fecontact.analysis.run_facts import notes
-
     with waiting("Compiling, once after an installation"):
         pass
     with (output_folder(output or described.results) as folder,
@@ -199,6 +197,8 @@ def run(
             raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
                              f"exist; run the study without --resume.")
         trajectory = described.run(True, checkpoint)
+        from fecontact.analysis.run_facts import notes
+
         with waiting("Writing"):
             files = write_run(described, trajectory, folder)
         ended = trajectory.status.name

@@ -13,6 +13,7 @@ import numpy as np
 
 from fecontact.core.types import Array
 from fecontact.output.files.frames import blocks, displacement, von_mises
+from fecontact.output.render.frames_data import body_labels
 from fecontact.output.report.payload import Payload
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
@@ -113,9 +114,9 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
         [cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     used = [k for k in range(len(_COMPONENTS)) if field.stress[:, k].any()] or [0]
     stress = field.stress[:, used]
-    parts = [{"name": part.name, "nodes": list(part.nodes)} for part in basis.parts]
-    w = basis.angular_frequencies
-    ratios = np.divide(np.diag(basis.damping), 2.0 * w, out=np.zeros_like(w), where=w > 0.0)
+    parts = [{"name": name, "label": node} for name, node in body_labels(basis)]
+    ratios = [f"{50.0 * rate / w:.3g} %" if w > 0.0 else ""
+              for rate, w in zip(np.diag(basis.damping), basis.angular_frequencies, strict=True)]
     # The modes that complete the bases of several bodies are not told from vibrations.
     kinds = [kind if kind == "rigid" or not basis.parts else ""
              for kind in BasisReport(basis).kinds]
@@ -130,9 +131,8 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
             stress, motions.largest_stress / _VON_MISES)),
         "components": [_COMPONENTS[k] for k in used],
         "parts": parts,
-        "modes": [{"name": name, "hz": float(hz), "damping": float(ratio), "kind": kind}
-                  for name, hz, ratio, kind in zip(
-                      mode_names(basis), basis.frequencies_hz, ratios, kinds, strict=True)],
+        "modes": [[name, f"{hz:.6g}", ratio, kind] for name, hz, ratio, kind in zip(
+            mode_names(basis), basis.frequencies_hz, ratios, kinds, strict=True)],
         "largest": {"displacement": motions.largest_displacement,
                     "stress": motions.stress_range, "peak": motions.largest_stress},
         "peak": motions.peak_node,

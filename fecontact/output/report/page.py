@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import re
 import warnings
 from html import escape
 from importlib.resources import files
@@ -11,7 +12,14 @@ from fecontact.core.errors import ModelWarning
 from fecontact.core.files.atomic_write import write_text
 
 # In the order in which they need each other; together one script.
-SCRIPTS = ("payload.js", "chart.js", "player.js", "report.js")
+SCRIPTS = ("payload.js", "chart.js", "player.js", "widgets.js", "run.js")
+_COMMENTS = re.compile(r"^\s*//.*$", re.MULTILINE)
+_LITERALS = re.compile(r"""("(?:\\.|[^"\\])*"|`(?:\\.|[^`\\])*`)""")
+# Beside these letters no blank matters, unless a + or a - meets another.
+_BLANKS = re.compile(r"\s*([{}()\[\];,:?=*/<>&|!%])\s*|(?<![-+]) *([-+]) *(?![-+ ])")
+_INDENTS = re.compile(r"\n\s*")
+_SHORTER = tuple((re.compile(pattern), instead) for pattern, instead in (
+    (r"\bconst\b", "let"), (r";}", "}"), (r"\((\w+)\)=>", r"\1=>"), (r"(?<![\w.])0\.(?=\d)", ".")))
 LARGE = 20e6  # bytes of a file that mail and browsers take without complaint
 
 _PAGE = """<!doctype html>
@@ -34,9 +42,17 @@ style-src 'sha256-{style_seal}'">
 
 
 def script() -> str:
-    """The script of a page, without comments and indents."""
-    lines = (line.strip() for name in SCRIPTS for line in _asset(name).splitlines())
-    return "\n".join(line for line in lines if line and not line.startswith("//"))
+    """The script of a page, without comments and needless letters."""
+    text = _COMMENTS.sub("", "\n".join(_asset(name) for name in SCRIPTS))
+    return "".join(_INDENTS.sub("\n", part) if part[0] in "\"`" else _shortened(part)
+                   for part in _LITERALS.split(text) if part)
+
+
+def _shortened(code: str) -> str:
+    code = _BLANKS.sub(r"\1\2", code)
+    for pattern, instead in _SHORTER:
+        code = pattern.sub(instead, code)
+    return code
 
 
 def page(title: str, block: str) -> str:

@@ -12,6 +12,7 @@ from fecontact.analysis.histories import Point
 from fecontact.analysis.run_facts import notes, run_facts
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
+from fecontact.core.units import UNITS
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.case import library_versions
 from fecontact.output.render.frames_data import Motion
@@ -23,6 +24,7 @@ from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 
 _SHADES = 64  # of a colour map
+_NOT_OF_RUNS = ("branch", "sweep", "wear", "preload", "render", "output")  # sections of a study
 
 
 def report(
@@ -94,6 +96,8 @@ def run_block(
                     f"motion of finite numbers.")
     system = found.system
     drawn = system.basis.mode_shapes is not None
+    if not drawn:
+        told.append("The modal basis holds no shapes over the body, so that no body is drawn.")
     motion = Motion(found, np.arange(len(found.time)), given_scale=scale) if drawn else None
     charts, phases = chart_tables(found, points, payload)
     header: dict[str, Any] = {
@@ -108,7 +112,9 @@ def run_block(
         "versions": list(map(list, (versions or library_versions()).items())),
         "time": payload.add(found.time, 1e-9 * float(np.ptp(found.time) or 1.0)),
         "charts": charts, "phases": phases, "energies": energy_charts(found, payload),
-        "balance": found.energies.imbalance,
+        "balance": f"error of the energy balance: {found.energies.imbalance:.1e} of the largest "
+                   f"term",
+        "units": UNITS,
         "contact": contact_table(found, motion, payload) if system.basis.contact_nodes else None,
     }
     if motion is not None:
@@ -125,19 +131,23 @@ def run_block(
 
 
 def study_tables(study: str | None) -> list[dict[str, Any]]:
-    """Sections of a study with their keys and values as text; sections of sections by dotted names.
+    """Sections of a study that matter for a run, with their keys and values as text.
+
+    Sections of sections have dotted names; keys without a value are left out.
     """
     found: list[dict[str, Any]] = []
 
     def collect(name: str, table: Mapping[str, Any]) -> None:
-        rows = [[key, _text(value)] for key, value in table.items() if not isinstance(value, dict)]
+        rows = [[key, text] for key, value in table.items()
+                if not isinstance(value, dict) and (text := _text(value))]
         if rows:
             found.append({"name": name, "rows": rows})
         for key, value in table.items():
             if isinstance(value, dict):
                 collect(f"{name}.{key}" if name else key, value)
 
-    collect("", tomllib.loads(study or ""))
+    tables = tomllib.loads(study or "")
+    collect("", {name: table for name, table in tables.items() if name not in _NOT_OF_RUNS})
     return found
 
 

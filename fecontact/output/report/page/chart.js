@@ -1,13 +1,14 @@
 // Charts on two layers: curves, drawn once for each size, and the cursor, drawn for each instant.
 
+const { abs, floor, hypot, max, min, round } = Math;
 const root = document.documentElement;
 const css = (name) => getComputedStyle(root).getPropertyValue(name).trim();
-const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+const clamp = (x, low, high) => min(max(x, low), high);
 
-function el(tag, props = {}, ...children) {
-  const { data, ...rest } = props;
-  const node = Object.assign(document.createElement(tag), rest);
-  for (const key in data) node.dataset[key] = data[key];
+// An element by "tag.class", with properties and children, of which strings are text.
+function el(name, props = {}, ...children) {
+  const [tag, className = ""] = name.split(".");
+  const node = Object.assign(document.createElement(tag), { className }, props);
   node.append(...children);
   return node;
 }
@@ -17,16 +18,16 @@ function themed(colour) {
   if (!colour) return css("--ink");
   if (!matchMedia("(prefers-color-scheme: dark)").matches) return colour;
   const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
-  return `rgb(${parts.map((part) => Math.round(part + 0.35 * (255 - part)))})`;
+  return `rgb(${parts.map((part) => round(part + 0.35 * (255 - part)))})`;
 }
 
 function ticks(low, high, most) {
-  const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough));
+  const rough = (high - low) / most, power = 10 ** floor(Math.log10(rough));
   const step = power * ([1, 2, 5].find((digit) => digit * power >= rough) ?? 10);
   const found = [];
   for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  return found.map((value) => [value, Math.abs(value) < 1e5 && digits < 5
+  const digits = max(0, -floor(Math.log10(step) + 1e-9));
+  return found.map((value) => [value, abs(value) < 1e5 && digits < 5
     ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1") : value.toPrecision(3)]);
 }
 
@@ -42,20 +43,20 @@ function before(times, t) {
 
 function layer(canvas, width, height) {
   const ratio = devicePixelRatio || 1, context = canvas.getContext("2d");
-  canvas.width = Math.round(width * ratio);
-  canvas.height = Math.round(height * ratio);
+  canvas.width = round(width * ratio);
+  canvas.height = round(height * ratio);
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   return context;
 }
 
 class Chart {
   // lines: [{name, colour, x?, y}] with arrays; without x over the time of the clock.
-  constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 150, kind = "" }) {
+  constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart" }) {
     Object.assign(this, { clock, lines, xLabel, height });
     this.base = el("canvas");
     this.top = el("canvas");
-    this.box = el("div", { className: "plot" }, this.base, this.top);
-    this.node = el("figure", { className: `chart ${kind}` }, el("figcaption", {},
+    this.box = el("div.plot", {}, this.base, this.top);
+    this.node = el(`figure.${kind}`, {}, el("figcaption", {},
       el("b", {}, unit ? `${title} [${unit}]` : title), ...this.legend(legend)), this.box);
     const move = (event) => {
       const at = this.top.getBoundingClientRect();
@@ -67,9 +68,9 @@ class Chart {
 
   legend(lines) {
     if (lines.length < 2) return [];
-    return lines.map(({ name, colour }) => {
+    return lines.map(({ name, colour, back }) => {
       const swatch = el("i");
-      swatch.style.background = themed(colour);
+      swatch.style.background = back || themed(colour);
       return el("span", {}, swatch, name);
     });
   }
@@ -88,22 +89,18 @@ class Chart {
 
   limits() {
     const [i0, i1] = this.clock.window();
-    let x = [Infinity, -Infinity], y = [Infinity, -Infinity];
-    const widen = (range, values) => {
-      for (let i = i0; i <= i1; i++) {
-        if (values[i] < range[0]) range[0] = values[i];
-        if (values[i] > range[1]) range[1] = values[i];
+    const span = (name) => {
+      let low = Infinity, high = -low;
+      for (const line of this.lines) {
+        for (let i = i0; i <= i1; i++) {
+          low = min(low, line[name][i]);
+          high = max(high, line[name][i]);
+        }
       }
-    };
-    for (const line of this.lines) {
-      widen(y, line.y);
-      if (line.x) widen(x, line.x);
-    }
-    const wide = ([low, high]) => {
-      const room = 0.06 * (high - low) || 0.1 * Math.abs(high) || 1;
+      const room = 0.06 * (high - low) || 0.1 * abs(high) || 1;
       return [low - room, high + room];
     };
-    return { x: this.overTime ? this.clock.shown() : wide(x), y: wide(y) };
+    return { x: this.overTime ? this.clock.shown() : span("x"), y: span("y") };
   }
 
   draw() {
@@ -117,7 +114,7 @@ class Chart {
     c.fillStyle = css("--soft");
     c.strokeStyle = css("--grid");
     c.lineWidth = 1;
-    const xs = ticks(...x, clamp((right - left) / 80, 2, 10)), ys = ticks(...y, this.height / 42);
+    const xs = ticks(...x, clamp((right - left) / 80, 2, 10)), ys = ticks(...y, this.height / 32);
     c.beginPath();
     for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
     for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
@@ -141,7 +138,6 @@ class Chart {
   }
 
   bottomLabels(c, xs) {
-    c.textAlign = "center";
     const y = this.inner.bottom + 13, width = c.measureText(this.xLabel).width;
     c.textAlign = "right";
     c.fillText(this.xLabel, this.width - 2, y);
@@ -160,9 +156,9 @@ class Chart {
   envelope(c, y) {
     const [i0, i1] = this.clock.window(), times = this.clock.axis;
     for (let i = i0; i <= i1;) {
-      const column = Math.floor(this.px(times[i]));
+      const column = floor(this.px(times[i]));
       let low = y[i], high = low, last = i;
-      while (last < i1 && Math.floor(this.px(times[last + 1])) === column) {
+      while (last < i1 && floor(this.px(times[last + 1])) === column) {
         last++;
         if (y[last] < low) low = y[last];
         if (y[last] > high) high = y[last];
@@ -193,7 +189,10 @@ class Chart {
   point() {
     const c = this.cursor, { index, axis } = this.clock, { top, bottom } = this.inner;
     c.clearRect(0, 0, this.width, this.height);
-    if (this.overTime) this.line(c, this.px(this.clock.time / this.clock.unit), top, bottom);
+    if (this.overTime) {
+      c.fillStyle = css("--accent");
+      c.fillRect(this.px(this.clock.time / this.clock.unit) - 0.5, top, 1, bottom - top);
+    }
     for (const line of this.lines) {
       if (!line.y) continue;
       c.fillStyle = themed(line.colour);
@@ -202,27 +201,17 @@ class Chart {
       c.fill();
     }
   }
-
-  line(c, x, top, bottom) {
-    c.strokeStyle = css("--accent");
-    c.lineWidth = 1;
-    c.beginPath();
-    c.moveTo(x, top);
-    c.lineTo(x, bottom);
-    c.stroke();
-  }
 }
 
 // State or force of the nodes of one face over time.
 class ContactMap extends Chart {
   constructor(clock, contact, face, shades) {
-    const states = contact.states.map((name, k) => ({ name, colour: contact.colours[k] || "#e3e0da" }));
+    const states = contact.states.map((name, k) => ({ name, back: contact.colours[k] || "var(--open)" }));
     super(clock, { title: face.title, lines: [{ name: "" }], legend: states, xLabel: clock.label,
       height: clamp(60 + 9 * face.abscissa.length, 90, 220), kind: "map" });
     Object.assign(this, { contact, face, shades, what: "state" });
-    const pick = el("select", { ariaLabel: "quantity of the contact map" },
+    const pick = el("select", { ariaLabel: "quantity", onchange: () => { this.what = pick.value; this.draw(); } },
       ...["state", "normal force", "tangential force"].map((name) => el("option", {}, name)));
-    pick.onchange = () => { this.what = pick.value; this.draw(); };
     this.node.firstChild.append(pick);
   }
 
@@ -233,7 +222,7 @@ class ContactMap extends Chart {
     this.range = { x };
     this.px = (value) => left + (right - left) * (value - x[0]) / (x[1] - x[0]);
     c.clearRect(0, 0, this.width, this.height);
-    const columns = Math.max(1, Math.round(right - left)), rows = Math.round(bottom - top);
+    const columns = max(1, round(right - left)), rows = round(bottom - top);
     const order = face.abscissa.map((_, k) => k).sort((a, b) => face.abscissa[b] - face.abscissa[a]);
     const image = new ImageData(columns, n);
     const colours = contact.colours.map((colour) => colour
@@ -249,10 +238,10 @@ class ContactMap extends Chart {
         let value = source.values[from * source.columns + at];
         for (let i = from + 1; what !== "state" && i < until; i++) {
           const next = source.values[i * source.columns + at];
-          if (Math.abs(next) > Math.abs(value)) value = next;
+          if (abs(next) > abs(value)) value = next;
         }
         const colour = what === "state" ? colours[value] : value === 0 ? null
-          : this.shades[Math.round(63 * Math.min(1, Math.abs(value) / contact.largest))];
+          : this.shades[round(63 * min(1, abs(value) / contact.largest))];
         if (colour) image.data.set([...colour, 255], 4 * (row * columns + column));
       });
     }
@@ -267,8 +256,8 @@ class ContactMap extends Chart {
     c.textBaseline = "middle";
     c.textAlign = "right";
     const millimetres = (k) => (1e3 * face.abscissa[order[k]]).toPrecision(3).replace(/\.0*$/, "");
-    c.fillText(millimetres(0), left - 6, top + 6);
-    c.fillText(millimetres(n - 1), left - 6, bottom - 6);
+    c.fillText(millimetres(0), left - 6, top + 8);
+    c.fillText(millimetres(n - 1), left - 6, bottom - 8);
     if (n > 1) c.fillText(`${face.label.slice(-1)} [mm]`, left - 6, 0.5 * (top + bottom));
     this.bottomLabels(c, ticks(...x, clamp((right - left) / 80, 2, 10)));
   }

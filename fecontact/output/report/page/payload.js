@@ -1,4 +1,3 @@
-"use strict";
 // The data of the page: a header whose arrays are whole numbers times a step.
 
 async function readBlock(text) {

@@ -39,16 +39,16 @@ function times(rows, count, q, out) {
   return out;
 }
 
-function vonMises(names, s, at) {
-  const part = (name) => { const k = names.indexOf(name); return k < 0 ? 0 : s[at + k]; };
-  const xx = part("xx"), yy = part("yy"), zz = part("zz");
+function vonMises(s, at, [a, b, d, e, f, g]) {
+  const xx = s[at + a] || 0, yy = s[at + b] || 0, zz = s[at + d] || 0;
+  const xy = s[at + e] || 0, yz = s[at + f] || 0, zx = s[at + g] || 0;
   return Math.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
-    + 3 * (part("xy") ** 2 + part("yz") ** 2 + part("zx") ** 2));
+    + 3 * (xy ** 2 + yz ** 2 + zx ** 2));
 }
 
 class Player {
   constructor(data, clock) {
-    Object.assign(this, { data, clock, mode: -1, paint: "von Mises stress", arrows: true });
+    Object.assign(this, { data, clock, mode: -1, paint: "von Mises stress", arrows: true, swing: 1 });
     const { bodies } = data;
     this.d = bodies.dimension;
     this.count = bodies.points.rows;
@@ -60,7 +60,7 @@ class Player {
     this.values = new Float32Array(this.count);
     this.turn = [1, 0, 0, 0, 1, 0, 0, 0, 1];
     [this.below, this.canvas, this.above] = [el("canvas"), el("canvas"), el("canvas")];
-    this.node = el("div", { className: "stage" }, this.below, this.canvas, this.above);
+    this.node = el("div.stage", {}, this.below, this.canvas, this.above);
     this.begin();
     this.steer();
   }
@@ -73,9 +73,8 @@ class Player {
   begin() {
     const gl = this.gl = this.canvas.getContext("webgl2", { antialias: true });
     if (!gl) {
-      this.node.append(el("p", { className: "missing" }, "This browser offers no WebGL 2, which " +
-        "draws the bodies. Everything else of this report works. Switch on hardware acceleration, " +
-        "or open the file in another browser."));
+      this.node.append(el("p.missing", {}, "This browser offers no WebGL 2, which " +
+        "draws the bodies. Turn on hardware acceleration or take another browser."));
       return;
     }
     const { bodies } = this.data;
@@ -101,7 +100,6 @@ class Player {
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
-    this.canvas.addEventListener("webglcontextlost", () => { this.gl = null; });
   }
 
   close() { this.gl?.getExtension("WEBGL_lose_context")?.loseContext(); }
@@ -112,8 +110,14 @@ class Player {
       const box = area.getBoundingClientRect();
       return [event.clientX - box.left, event.clientY - box.top];
     };
-    const spread = () => { const [a, b] = [...held.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]); };
-    area.onpointerdown = (event) => { area.setPointerCapture(event.pointerId); held.set(event.pointerId, at(event)); };
+    const spread = () => {
+      const [a, b] = held.values();
+      return hypot(a[0] - b[0], a[1] - b[1]);
+    };
+    area.onpointerdown = (event) => {
+      area.setPointerCapture(event.pointerId);
+      held.set(event.pointerId, at(event));
+    };
     area.onpointerup = area.onpointercancel = (event) => held.delete(event.pointerId);
     area.onpointermove = (event) => {
       const last = held.get(event.pointerId);
@@ -125,10 +129,10 @@ class Player {
       else if (this.d === 3 && !event.shiftKey) this.rotate(dx, dy);
       else this.shift(dx, dy);
     };
-    area.addEventListener("wheel", (event) => {
+    area.onwheel = (event) => {
       event.preventDefault();
       this.zoom(Math.exp(-0.0015 * event.deltaY), at(event));
-    }, { passive: false });
+    };
     area.ondblclick = () => { this.fit(); this.draw(); };
   }
 
@@ -165,8 +169,8 @@ class Player {
     const [left, right, low, high] = this.data.box;
     this.width = this.node.clientWidth || 300;
     const shape = (high - low) / (right - left) + (this.data.ground ? 0.12 : 0.04);
-    this.height = Math.round(clamp(this.width * shape, Math.max(240, 0.34 * this.width),
-      Math.max(300, Math.min(0.6 * this.width, 0.62 * innerHeight))));
+    this.height = round(clamp(this.width * shape, max(240, 0.34 * this.width),
+      max(300, min(0.6 * this.width, 0.62 * innerHeight))));
     this.node.style.height = `${this.height}px`;
     this.ground = layer(this.below, this.width, this.height);
     this.over = layer(this.above, this.width, this.height);
@@ -178,7 +182,7 @@ class Player {
 
   fit() {
     const [left, right, low, high] = this.data.box;
-    this.size = Math.min(0.9 * this.width / (right - left), 0.74 * this.height / (high - low));
+    this.size = min(0.9 * this.width / (right - left), 0.74 * this.height / (high - low));
     this.centre = [0.5 * (left + right), 0.5 * (low + high), 0];
     if (this.data.ground) this.centre[1] -= 0.04 * this.height / this.size;
   }
@@ -192,7 +196,7 @@ class Player {
   // Between stored instants coordinates are interpolated, so that slow motion is smooth.
   coordinates() {
     const { values, columns } = this.data.coordinates, { index, times, time } = this.clock;
-    const next = Math.min(index + 1, times.length - 1);
+    const next = min(index + 1, times.length - 1);
     const part = next > index ? clamp((time - times[index]) / (times[next] - times[index]), 0, 1) : 0;
     for (let k = 0; k < columns; k++) {
       this.q[k] = (1 - part) * values[index * columns + k] + part * values[next * columns + k];
@@ -204,7 +208,7 @@ class Player {
     let scale = this.scale, drift = 0;
     if (this.mode >= 0) {
       q.fill(0);
-      q[this.mode] = Math.sin(this.phase ?? 0.5 * Math.PI);
+      q[this.mode] = Math.sin(this.phase);
       scale = this.shake();
     } else {
       this.coordinates();
@@ -225,8 +229,8 @@ class Player {
   shake() {
     const { values, columns } = this.data.bodies.shapes, m = this.q.length;
     let largest = 0;
-    for (let at = this.mode; at < values.length; at += m) largest = Math.max(largest, Math.abs(values[at]));
-    return 0.1 * Math.min(this.width, 2 * this.height) / this.size / (largest || 1) * (this.swing ?? 1);
+    for (let at = this.mode; at < values.length; at += m) largest = max(largest, abs(values[at]));
+    return 0.1 * min(this.width, 2 * this.height) / this.size / (largest || 1) * this.swing;
   }
 
   colour() {
@@ -234,17 +238,22 @@ class Player {
     const kinds = bodies.components.length, alone = this.mode >= 0;
     if (paint.includes("stress")) times(bodies.stress, count * kinds, this.q, stress);
     const part = bodies.components.indexOf(paint.slice(7));
+    // Components that are zero everywhere are not stored.
+    const order = ["xx", "yy", "zz", "xy", "yz", "zx"].map((name) => {
+      const k = bodies.components.indexOf(name);
+      return k < 0 ? NaN : k;
+    });
     for (let p = 0; p < count; p++) {
       if (paint === "displacement") {
         let sum = 0;
         for (let k = 0; k < d; k++) sum += moved[p * d + k] ** 2;
         values[p] = Math.sqrt(sum);
-      } else if (paint === "von Mises stress") values[p] = vonMises(bodies.components, stress, p * kinds);
+      } else if (paint === "von Mises stress") values[p] = vonMises(stress, p * kinds, order);
       else if (part >= 0) values[p] = stress[p * kinds + part];
     }
-    const swing = Math.abs(Math.sin(this.phase ?? 0.5 * Math.PI)) || 1;
+    const swing = abs(Math.sin(this.phase)) || 1;
     let end = paint === "displacement" ? bodies.largest.displacement : bodies.largest.stress;
-    if (alone) end = values.reduce((sum, value) => Math.max(sum, Math.abs(value)), 0) / swing;
+    if (alone) end = values.reduce((sum, value) => max(sum, abs(value)), 0) / swing;
     this.limits = [part >= 0 ? -end : 0, end || 1];
   }
 
@@ -268,7 +277,7 @@ class Player {
     };
     set(this.buffers[0], this.places);
     set(this.buffers[1], this.values);
-    const solid = this.d === 3, deep = 0.2 * this.size / Math.max(this.width, this.height);
+    const solid = this.d === 3, deep = 0.2 * this.size / max(this.width, this.height);
     solid ? gl.enable(gl.DEPTH_TEST) : gl.disable(gl.DEPTH_TEST);
     gl.uniformMatrix3fv(this.at("turn"), false, this.turn);
     gl.uniform3fv(this.at("centre"), this.centre);
@@ -303,7 +312,7 @@ class Player {
     const profile = ground.profile.values, world = (px) => (px - 0.5 * this.width) / this.size + this.centre[0];
     const height = (x) => {
       const at = clamp((x - way - ground.first) / ground.spacing, 0, profile.length - 1);
-      const k = Math.min(Math.floor(at), profile.length - 2);
+      const k = min(floor(at), profile.length - 2);
       return level + scale * (ground.wavy ? profile[k] + (at - k) * (profile[k + 1] - profile[k]) : 0);
     };
     c.beginPath();
@@ -316,8 +325,9 @@ class Player {
     c.fillStyle = css("--ground");
     c.fill();
     // Marks move with the ground.
-    const [left, right] = this.data.box, spacing = ticks(left, right, 12)[1][0] - ticks(left, right, 12)[0][0];
-    c.strokeStyle = css("--grid-strong");
+    const [left, right] = this.data.box, [[first], [second]] = ticks(left, right, 12);
+    const spacing = second - first;
+    c.strokeStyle = css("--mark");
     c.beginPath();
     for (let k = Math.ceil((world(0) - way) / spacing); k * spacing + way < world(this.width); k++) {
       const x = k * spacing + way, [px, py] = this.project(x, height(x));
@@ -333,23 +343,15 @@ class Player {
     if (contact && this.mode < 0) this.drawContact(c, contact);
     c.font = `600 12px ${css("--font")}`;
     c.textAlign = "center";
-    for (const { name, nodes } of bodies.parts) this.label(c, name, nodes);
-    if (this.paint !== "none") this.bar(c);
-  }
-
-  label(c, name, [first, size]) {
-    let x = 0, y = Infinity, z = 0;
-    for (let p = first; p < first + size; p++) {
-      const [px, py] = this.project(...this.places.subarray(3 * p, 3 * p + 3));
-      x += px / size;
-      z = Math.max(z, py);
-      y = Math.min(y, py);
-    }
     c.lineWidth = 3;
     c.strokeStyle = css("--panel");
-    c.strokeText(name, x, y - 8);
     c.fillStyle = css("--ink");
-    c.fillText(name, x, y - 8);
+    for (const { name, label } of bodies.parts) {
+      const at = this.project(...this.places.subarray(3 * label, 3 * label + 3));
+      c.strokeText(name, ...at);
+      c.fillText(name, ...at);
+    }
+    if (this.paint !== "none") this.bar(c);
   }
 
   drawContact(c, contact) {
@@ -357,23 +359,26 @@ class Player {
     const size = contact.places.rows, moved = times(contact.rows, size * d, this.q, new Float64Array(size * d));
     const shown = Array.from({ length: size }, (_, k) => {
       const p = [0, 1, 2].map((i) => i < d ? contact.places.values[k * d + i] + scale * moved[k * d + i] : 0);
-      return this.project(p[0] + drift, p[1], p[2]);
+      p[0] += drift;
+      return this.project(...p);
     });
-    const reach = 0.2 * Math.min(this.height, this.width) / (contact.largest || 1);
-    c.strokeStyle = c.fillStyle = css("--force");
+    const reach = 0.2 * min(this.height, this.width) / (contact.largest || 1);
+    c.strokeStyle = c.fillStyle = css("--accent");
     c.lineWidth = 1.6;
     for (let k = 0; this.arrows && k < size; k++) {
       const node = k < n ? k : contact.feet[k - n], sign = k < n ? reach : -reach;
       const F = contact.normal.values[at + node] * sign, R = contact.along.values[at + node] * sign;
       const [tip, foot] = [this.project(0, 0), this.project(...[0, 1, 2].map((i) =>
-        ((contact.normals[node][i] ?? 0) * F + (contact.tangents[node][i] ?? 0) * R) / this.size))];
+        ((contact.normals[node][i] || 0) * F + (contact.tangents[node][i] || 0) * R) / this.size))];
       this.arrow(c, shown[k], foot[0] - tip[0], foot[1] - tip[1]);
     }
     c.lineWidth = 1;
+    const apart = n > 1 ? hypot(shown[1][0] - shown[0][0], shown[1][1] - shown[0][1]) : 12;
+    const radius = clamp(0.3 * apart, 1.5, 3.6);
     for (let k = 0; k < size; k++) {
       const state = contact.state.values[at + (k < n ? k : contact.feet[k - n])];
       c.beginPath();
-      c.arc(...shown[k], k < n ? 3.6 : 2.4, 0, 7);
+      c.arc(...shown[k], radius * (k < n ? 1 : 0.65), 0, 7);
       c.fillStyle = contact.colours[state] || css("--panel");
       c.strokeStyle = css("--ink");
       c.fill();
@@ -383,9 +388,9 @@ class Player {
 
   // A force that pushes ends at its point, so that it does not lie on the body.
   arrow(c, [x, y], dx, dy) {
-    const length = Math.hypot(dx, dy);
+    const length = hypot(dx, dy);
     if (length < 1.5) return;
-    const [ux, uy] = [dx / length, dy / length], head = Math.min(7, 0.5 * length);
+    const [ux, uy] = [dx / length, dy / length], head = min(7, 0.5 * length);
     c.beginPath();
     c.moveTo(x - dx, y - dy);
     c.lineTo(x - head * ux, y - head * uy);
@@ -398,9 +403,8 @@ class Player {
   }
 
   bar(c) {
-    const width = Math.min(180, 0.3 * this.width), left = this.width - width - 14, top = 12;
-    const shades = this.shades();
-    shades.forEach((one, k) => {
+    const width = min(180, 0.3 * this.width), left = this.width - width - 14, top = 12;
+    this.shades().forEach((one, k) => {
       c.fillStyle = `rgb(${one})`;
       c.fillRect(left + width * k / 64, top, width / 64 + 0.6, 7);
     });
@@ -408,15 +412,13 @@ class Player {
     c.fillStyle = css("--soft");
     c.textBaseline = "top";
     const alone = this.mode >= 0, what = this.paint.includes("stress") ? "Pa" : "m";
-    const said = (value) => alone ? "" : quantity(value, what);
+    const [low, high] = this.limits, { peak } = this.data.bodies.largest;
+    const beyond = what === "Pa" && !alone && high < peak;
     c.textAlign = "left";
-    c.fillText(said(this.limits[0]) || (this.limits[0] < 0 ? "−" : "0"), left, top + 11);
+    c.fillText(alone ? "" : quantity(low, what), left, top + 11);
     c.textAlign = "right";
-    const beyond = what === "Pa" && !alone && this.limits[1] < this.data.bodies.largest.peak;
-    c.fillText((beyond ? "≥ " : "") + (said(this.limits[1]) || "largest"), left + width, top + 11);
-    if (beyond && this.paint.startsWith("von")) {
-      c.fillText(`peak ${quantity(this.data.bodies.largest.peak, "Pa")}`, left + width, top + 25);
-    }
+    c.fillText(alone ? "largest" : quantity(high, what) + (beyond ? `, peak ${quantity(peak, what)}` : ""),
+      left + width, top + 11);
     c.textBaseline = "alphabetic";
   }
 }
