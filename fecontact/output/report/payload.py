@@ -82,8 +82,9 @@ def unpacked(block: str) -> tuple[dict[str, Any], bytes]:
 def stored_array(described: Mapping[str, Any], content: bytes) -> Array:
     """The array that a header describes."""
     shape = tuple(described["shape"])
-    rows = shape[0]
-    columns = int(np.prod(shape[1:], dtype=int)) if rows else 0
+    rows, columns = shape[0], int(np.prod(shape[1:], dtype=int))
+    if not rows * columns:
+        return np.zeros(shape)
     planes = np.frombuffer(content, np.uint8, described["planes"] * rows * columns,
                            described["at"]).reshape(described["planes"], columns, rows)
     zigzag = sum(plane.astype(np.int64) << 8 * k for k, plane in enumerate(planes))

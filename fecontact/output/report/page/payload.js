@@ -18,7 +18,7 @@ async function readBlock(text) {
 // Values row by row; steps belong to columns, differences run down the rows of each.
 function readArray({ at, planes, shape, step }, bytes) {
   const rows = shape[0];
-  const columns = rows ? shape.slice(1).reduce((a, b) => a * b, 1) : 0;
+  const columns = shape.slice(1).reduce((a, b) => a * b, 1);
   const size = rows * columns;
   const values = columns > 1 ? new Float32Array(size) : new Float64Array(size);
   for (let column = 0, k = at; column < columns; column++) {

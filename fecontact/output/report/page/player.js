@@ -61,6 +61,7 @@ class Player {
     this.turn = [1, 0, 0, 0, 1, 0, 0, 0, 1];
     [this.below, this.canvas, this.above] = [el("canvas"), el("canvas"), el("canvas")];
     this.node = el("div.stage", {}, this.below, this.canvas, this.above);
+    this.node.player = this;
     this.begin();
     this.steer();
   }

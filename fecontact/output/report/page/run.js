@@ -37,7 +37,7 @@ async function build(host) {
   units = data.units;
   const clock = new Clock(data.time.values);
   const player = data.bodies ? new Player(data, clock) : null;
-  const charts = data.charts.map((one) => new Chart(clock, { ...columns(one, clock), kind: "history" }));
+  const charts = data.charts.map((one) => new Chart(clock, columns(one, clock)));
   const phases = data.phases.map(({ title, x, y }) => {
     const [one, other] = [x, y].map(([chart, line]) => ({ unit: data.charts[chart].unit, ...charts[chart].lines[line] }));
     return new Chart(clock, { title: `velocity [${other.unit}], ${title}`, xLabel: `displacement [${one.unit}]`,
@@ -45,7 +45,7 @@ async function build(host) {
   });
   const maps = data.contact ? data.contact.faces.map((face) => new ContactMap(clock, data.contact, face,
     data.maps?.von_mises ?? Array.from({ length: 64 }, (_, k) => [255 - 3 * k, 255 - 3 * k, 255]))) : [];
-  const energies = data.energies.map((one) => new Chart(clock, { ...columns(one, clock), kind: "energy" }));
+  const energies = data.energies.map((one) => new Chart(clock, columns(one, clock)));
   const all = [...charts, ...phases, ...maps, ...energies];
   const resize = () => { for (const one of all) one.resize(); };
   const timing = controls(data, clock, player, resize);
@@ -70,7 +70,7 @@ async function build(host) {
   refresh();
   clock.set(clock.time);
   let width = innerWidth;
-  addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; refresh(); } });
+  window.onresize = () => { if (innerWidth !== width) { width = innerWidth; refresh(); } };
   matchMedia("(prefers-color-scheme: dark)").onchange = () => location.reload();
   root.dataset.ready = 1;
 }

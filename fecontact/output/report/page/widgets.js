@@ -92,16 +92,16 @@ function controls(data, clock, player, resize) {
   });
   speeds.oninput();
   play.onclick = timing.toggle;
-  addEventListener("keydown", (event) => {
+  window.onkeydown = (event) => {
     if (/INPUT|SELECT|BUTTON/.test(event.target.tagName)) return;
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (event.key === " ") { event.preventDefault(); timing.toggle(); }
     if (step) clock.set(clock.times[clamp(clock.index + step, 0, clock.times.length - 1)]);
-  });
+  };
   const closer = (textContent, factor, title) => el("button", { textContent, title, ariaLabel: title,
     onclick() { clock.show(factor); resize(); clock.set(clock.time); } });
   timing.bar = el("div.controls", {}, play, scrub, now,
-    closer("+", 0.5, "shorter part of the time"), closer("−", 2, "longer part of the time"));
+    closer("+", 0.5, "shorter time"), closer("−", 2, "longer time"));
   timing.more = el("div.controls", {}, field("speed", speeds), pace);
   if (player) addPlayer(data, player, timing.more);
   const frame = (at) => {
@@ -122,10 +122,10 @@ function controls(data, clock, player, resize) {
 }
 
 function addPlayer(data, player, more) {
-  const factor = el("output"), { paints } = player, top = Math.log(10 * data.scale);
+  const factor = el("output"), { paints } = player, given = Math.log(data.scale);
   const colour = el("select", { ariaLabel: "colour", onchange() { player.paint = colour.value; player.draw(); } },
     ...paints.map((name) => el("option", {}, name)));
-  const magnify = slider("deformation", 0, top, Math.log(data.scale), () => {
+  const magnify = slider("deformation", min(0, given), max(2.3, given + 2.3), given, () => {
     player.scale = Math.exp(magnify.value);
     player.swing = player.scale / data.scale;
     factor.textContent = `${+player.scale.toPrecision(2)} ×`;
