@@ -183,17 +183,19 @@ def test_clicks_on_charts_move_the_time(browser, path, trajectory):
             assert opened.time == pytest.approx(width * trajectory.time[-1], rel=0.01)
         # In the phase plane the nearest point of the orbit is meant.
         before = opened.picture()
-        box = opened.page.locator(".phase .plot").first.bounding_box()
+        plane = opened.page.locator(".phase .plot").first
+        plane.scroll_into_view_if_needed()
+        box = plane.bounding_box()
         x, y = box["x"] + 0.5 * box["width"], box["y"] + 8.0
         opened.page.mouse.click(x, y)
-        assert opened.time in trajectory.time
+        assert np.abs(trajectory.time - opened.time).min() < 1e-12
         speeds = trajectory.velocity("B")[:, 0]
         nearest = int(np.argmin(np.abs(trajectory.time - opened.time)))
         assert speeds[nearest] > 0.8 * speeds.max()
         assert np.abs(opened.picture() - before).max() > 30
 
 
-def test_it_plays_at_a_readable_pace(browser, path, record_property):
+def test_it_plays_at_a_readable_pace(browser, path):
     with Opened(browser, path) as opened:
         opened.page.get_by_role("button", name="play").click()
         opened.page.wait_for_timeout(1500)
@@ -201,7 +203,7 @@ def test_it_plays_at_a_readable_pace(browser, path, record_property):
         opened.page.wait_for_timeout(700)
         assert opened.time != first
         cost = float(opened.page.evaluate("document.documentElement.dataset.frame"))
-        record_property("milliseconds of a frame", cost)
+        print(f"a frame takes {cost} ms")
         assert cost < 50.0
         opened.page.keyboard.press("Tab")
         opened.page.get_by_role("button", name="pause").click()
