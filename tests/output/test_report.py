@@ -160,7 +160,7 @@ def test_arrays_come_back_to_within_half_a_step(values, step):
     header, content = payload.unpacked(block.block({"found": described}))
     found = payload.stored_array(header["found"], content)
     assert found.shape == values.shape
-    error = np.abs(found - values).reshape(len(values), -1)
+    error = np.abs(found - values).reshape(len(values), int(np.prod(values.shape[1:])))
     assert (error <= 0.5000001 * np.broadcast_to(step, error.shape)).all()
 
 

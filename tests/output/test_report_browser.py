@@ -6,6 +6,7 @@ Needs Chromium and Playwright: ``apt-get install chromium``, ``pip install playw
 import io
 import shutil
 from importlib.resources import files
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -100,7 +101,7 @@ def test_it_draws_and_asks_for_nothing(browser, path):
             pictures.append(opened.picture())
         for picture in pictures:
             assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
-        for one, other in zip(pictures, pictures[1:], strict=False):
+        for one, other in pairwise(pictures):
             assert (np.abs(one - other).max(axis=2) > 30).mean() > 0.01
         assert opened.asked == [path.as_uri()]
         assert not opened.complaints

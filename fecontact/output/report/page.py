@@ -26,8 +26,8 @@ _PAGE = """<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'sha256-{seal}'; \
-style-src 'sha256-{style_seal}'">
+<meta http-equiv="Content-Security-Policy" \
+content="default-src 'none'; script-src 'sha256-{seal}'; style-src 'sha256-{style_seal}'">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
 <style>{style}</style>

@@ -148,6 +148,7 @@ def study_tables(study: str | None) -> list[dict[str, Any]]:
 
     tables = tomllib.loads(study or "")
     collect("", {name: table for name, table in tables.items() if name not in _NOT_OF_RUNS})
+    found.sort(key=lambda section: not section["name"])
     return found
 
 
@@ -163,10 +164,10 @@ def _text(value: Any) -> str:
 
 def _finite(run: Trajectory) -> Trajectory:
     """The run up to its last state of finite numbers."""
-    good = np.isfinite(run.modal_coordinates).all(axis=1) & np.isfinite(run.states).all(axis=1)
-    end = len(good) if good.all() else int(np.argmin(good))
-    if end == len(good):
+    bad = np.flatnonzero(~np.isfinite(run.states).all(axis=1))
+    if not len(bad):
         return run
+    end = int(bad[0])
     if end < 2:
         raise InputError("The run has no motion to report: its numbers are not finite.")
     return run.between(None, float(run.time[end - 1]))

@@ -114,7 +114,7 @@ class Chart {
     c.fillStyle = css("--soft");
     c.strokeStyle = css("--grid");
     c.lineWidth = 1;
-    const xs = ticks(...x, clamp((right - left) / 80, 2, 10)), ys = ticks(...y, this.height / 32);
+    const xs = ticks(...x, clamp((right - left) / 70, 2, 10)), ys = ticks(...y, this.height / 32);
     c.beginPath();
     for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
     for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }

@@ -40,7 +40,7 @@ async function build(host) {
   const charts = data.charts.map((one) => new Chart(clock, columns(one, clock)));
   const phases = data.phases.map(({ title, x, y }) => {
     const [one, other] = [x, y].map(([chart, line]) => ({ unit: data.charts[chart].unit, ...charts[chart].lines[line] }));
-    return new Chart(clock, { title: `velocity [${other.unit}], ${title}`, xLabel: `displacement [${one.unit}]`,
+    return new Chart(clock, { title: `${title}: velocity [${other.unit}] over displacement [${one.unit}]`, xLabel: "",
       height: 220, kind: "phase", lines: [{ name: "", colour: other.colour, x: one.y, y: other.y }] });
   });
   const maps = data.contact ? data.contact.faces.map((face) => new ContactMap(clock, data.contact, face,
@@ -60,7 +60,7 @@ async function build(host) {
       ...player ? section("Modes", modesTable(data, player, timing)) : [])),
   el("div.two", {}, ...section("Run", table([], data.facts)),
     ...section("System", table([], data.system))),
-  ...section("Study", ...data.study.length ? [el("div.grid", {},
+  ...section("Study", ...data.study.length ? [el("div.cards", {},
     ...data.study.map(({ name, rows }) => el("div", {}, ...name ? [el("h3", {}, `[${name}]`)] : [],
       table([], rows))))] : []),
   el("footer", {}, data.versions.map((pair) => pair.join(" ")).join(" · ")));
