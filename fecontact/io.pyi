@@ -4,6 +4,7 @@ from .output.files.export import export_csv, export_fields, export_mat, export_n
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .output.files.wear import read_wear, write_wear
+from .output.report.branch_report import report_branches
 from .output.report.run_report import report
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import read_uff
@@ -24,6 +25,7 @@ __all__ = [
     "read_uff",
     "read_wear",
     "report",
+    "report_branches",
     "to_xarray",
     "write_basis",
     "write_branch",

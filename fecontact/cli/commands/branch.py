@@ -53,7 +53,8 @@ def branch(
         if wanted.poincare_scan and not result.interrupted:
             beneath = runs_beneath(system, wanted, described.initial())
         with waiting("Writing"):
-            files = write_branch_results(result, wanted, folder, described.name, beneath)
+            files = write_branch_results(result, wanted, folder, described.name, beneath,
+                                         described.to_toml())
         for name, found in result.found.items():
             echo(f"\n{name}: {found.status.value}")
             if found.message:

@@ -4,15 +4,23 @@ import base64
 import hashlib
 import re
 import warnings
+from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
 from pathlib import Path
+from typing import Literal
 
 from fecontact.core.errors import ModelWarning
 from fecontact.core.files.atomic_write import write_text
 
+Kind = Literal["run", "branches", "sweep"]
 # In the order in which they need each other; together one script.
-SCRIPTS = ("payload.js", "chart.js", "player.js", "widgets.js", "run.js")
+_COMMON = ("payload.js", "chart.js", "widgets.js")
+SCRIPTS: Mapping[Kind, tuple[str, ...]] = {
+    "run": (*_COMMON, "map.js", "player.js", "run.js", "start.js"),
+    "branches": (*_COMMON, "player.js", "branches.js", "start.js"),
+    "sweep": (*_COMMON, "sweep.js", "start.js"),
+}
 _COMMENTS = re.compile(r"^\s*//.*$", re.MULTILINE)
 _LITERALS = re.compile(r"""("(?:\\.|[^"\\])*"|`(?:\\.|[^`\\])*`)""")
 # Beside these letters no blank matters, unless a + or a - meets another.
@@ -41,9 +49,9 @@ content="default-src 'none'; script-src 'sha256-{seal}'; style-src 'sha256-{styl
 """
 
 
-def script() -> str:
+def script(kind: Kind) -> str:
     """The script of a page, without comments and needless letters."""
-    text = _COMMENTS.sub("", "\n".join(_asset(name) for name in SCRIPTS))
+    text = _COMMENTS.sub("", "\n".join(_asset(name) for name in SCRIPTS[kind]))
     return "".join(_INDENTS.sub("\n", part) if part[0] in "\"`" else _shortened(part)
                    for part in _LITERALS.split(text) if part)
 
@@ -55,20 +63,20 @@ def _shortened(code: str) -> str:
     return code
 
 
-def page(title: str, block: str) -> str:
+def page(title: str, block: str, kind: Kind = "run") -> str:
     """A page with a block of data.
 
     All text of a study lies in the block, which has no letters that HTML knows, and is written by
     the script as text; the policy of the page runs no other script and loads nothing.
     """
-    code, style = script(), _asset("report.css")
+    code, style = script(kind), _asset("report.css")
     return _PAGE.format(title=escape(title), style=style, block=block, script=code,
                         seal=_seal(code), style_seal=_seal(style))
 
 
-def write_page(path: Path, title: str, block: str) -> Path:
+def write_page(path: Path, title: str, block: str, kind: Kind = "run") -> Path:
     """Write a page, whole or not at all; a ModelWarning tells of a file that is large."""
-    text = page(title, block)
+    text = page(title, block, kind)
     if len(text) > LARGE:
         warnings.warn(f"{path} has {len(text) / 1e6:.0f} MB, which browsers open slowly; store "
                       f"fewer outputs of the run, or report a part of it.", ModelWarning,

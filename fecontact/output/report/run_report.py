@@ -73,9 +73,7 @@ def report(
     """
     require_kind("report", Trajectory, run=run)
     require_kind("report", Sequence, points=points)
-    path = as_path(path, "a report")
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path} must end in .html: a report is a page.")
+    path = require_page(as_path(path, "a report"))
     if isinstance(points, str):
         raise InputError(f"report: points = {points!r} must be several points, such as ['B', 0].")
     if scale is not None:
@@ -124,8 +122,7 @@ def run_block(
             "coordinates": payload.add(found.modal_coordinates, motions.coordinate_steps()),
             "ground": ground_table(motion, payload),
             "scale": motion.scale, "box": list(motion.box),
-            "maps": {what: _shades(name) for what, name in
-                     {**COLOUR_MAPS, "component": "coolwarm"}.items()},
+            "maps": colour_maps(),
         }
     return payload.block(header)
 
@@ -177,9 +174,17 @@ def _facts(run: Trajectory, found: Trajectory) -> list[tuple[str, str]]:
     return run_facts(replace(found, statistics=run.statistics))
 
 
-def _shades(name: str) -> list[list[int]]:
-    """Colours of a map, as red, green and blue from 0 to 255."""
+def colour_maps() -> dict[str, list[list[int]]]:
+    """Colours of displacement, von Mises stress and signed components, from 0 to 255."""
     from matplotlib import colormaps
 
-    colours = colormaps[name](np.linspace(0.0, 1.0, _SHADES), bytes=True)
-    return [[int(part) for part in colour[:3]] for colour in colours]
+    at = np.linspace(0.0, 1.0, _SHADES)
+    return {what: np.asarray(colormaps[name](at, bytes=True))[:, :3].astype(int).tolist()
+            for what, name in {**COLOUR_MAPS, "component": "coolwarm"}.items()}
+
+
+def require_page(path: Path) -> Path:
+    """The path of a page; InputError for another suffix."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path} must end in .html: a report is a page.")
+    return path

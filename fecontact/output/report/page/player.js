@@ -14,7 +14,7 @@ in vec3 seen; in float shade; out vec4 colour;
 uniform sampler2D map; uniform vec2 range; uniform vec4 plain; uniform float solid;
 void main() {
   float at = clamp((shade - range.x) / (range.y - range.x), 0.0, 1.0);
-  colour = plain.a > 0.0 ? plain : vec4(texture(map, vec2(at * 0.984375 + 0.0078125, 0.5)).rgb, 1.0);
+  colour = plain.a > 0.0 ? plain : vec4(texture(map, vec2(at, 0.5)).rgb, 1.0);
   if (solid > 0.0) {
     vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
     colour.rgb *= 0.55 + 0.45 * abs(normal.z);
@@ -107,10 +107,7 @@ class Player {
 
   steer() {
     const held = new Map(), area = this.above;
-    const at = (event) => {
-      const box = area.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
-    };
+    const at = (event) => [event.offsetX, event.offsetY];
     const spread = () => {
       const [a, b] = held.values();
       return hypot(a[0] - b[0], a[1] - b[1]);

@@ -60,23 +60,11 @@ async function build(host) {
       ...player ? section("Modes", modesTable(data, player, timing)) : [])),
   el("div.two", {}, ...section("Run", table([], data.facts)),
     ...section("System", table([], data.system))),
-  ...section("Study", ...data.study.length ? [el("div.cards", {},
-    ...data.study.map(({ name, rows }) => el("div", {}, ...name ? [el("h3", {}, `[${name}]`)] : [],
-      table([], rows))))] : []),
-  el("footer", {}, data.versions.map((pair) => pair.join(" ")).join(" · ")));
+  ...cards("Study", data.study), foot(data));
   const refresh = () => { player?.resize(); resize(); };
   clock.watchers.push(() => { if (player && player.mode < 0) player.draw(); },
     () => { for (const one of all) one.point(); });
   refresh();
   clock.set(clock.time);
-  let width = innerWidth;
-  window.onresize = () => { if (innerWidth !== width) { width = innerWidth; refresh(); } };
-  matchMedia("(prefers-color-scheme: dark)").onchange = () => location.reload();
-  root.dataset.ready = 1;
+  ready(refresh);
 }
-
-build(document.body).catch((error) => {
-  document.body.append(el("p.missing", {}, typeof DecompressionStream === "undefined"
-    ? "This browser is too old for this report; take one of 2023 or later."
-    : `This report cannot be read: ${error.message}`));
-});

@@ -11,14 +11,19 @@ function quantity(value, unit, digits = 3) {
 
 class Clock {
   constructor(times) {
-    const end = max(abs(times[0]), abs(times.at(-1)));
+    this.watchers = [];
+    this.load(times);
+  }
+
+  load(times) {
+    const first = times[0], last = times.at(-1), end = max(abs(first), abs(last));
     [this.unit, this.symbol] = units.s.filter(([factor]) => end >= factor).at(-1) ?? units.s[0];
     this.times = times;
     this.axis = times.map((time) => time / this.unit);
     this.label = `time [${this.symbol}]`;
-    this.range = [times[0], times.at(-1)];
-    this.watchers = [];
-    this.put(times[0]);
+    this.whole = last - first || 1;
+    this.range = [first, last];
+    this.put(first);
   }
 
   put(time) {
@@ -69,8 +74,8 @@ function slider(ariaLabel, min, max, value, oninput) {
   return el("input", { type: "range", step: "any", min, max, value, ariaLabel, oninput });
 }
 
-function controls(data, clock, player, resize) {
-  const whole = clock.times.at(-1) - clock.times[0] || 1;
+// `lap` is how many seconds the whole takes at the middle of the slider.
+function controls(data, clock, player, resize, lap = 12) {
   const play = el("button.play", { textContent: "▶", ariaLabel: "play" });
   const now = el("output"), pace = el("output");
   const timing = { on: false, toggle() {
@@ -78,19 +83,17 @@ function controls(data, clock, player, resize) {
     play.textContent = timing.on ? "❚❚" : "▶";
     play.ariaLabel = timing.on ? "pause" : "play";
   } };
-  let speed, last = 0;
+  let last = 0;
   const span = () => clock.range[1] - clock.range[0];
   const scrub = slider("time", 0, 1000, 0, () => clock.set(clock.range[0] + scrub.value / 1000 * span()));
   scrub.className = "scrub";
   clock.watchers.push(() => {
     now.textContent = `${(clock.time / clock.unit).toFixed(2)} ${clock.symbol}`;
     scrub.value = 1000 * (clock.time - clock.range[0]) / span();
+    pace.textContent = `${quantity(speed(), "s", 2)} per s`;
   });
-  const speeds = slider("speed", -3, 2, 0, () => {
-    speed = whole / 12 * 10 ** speeds.value;
-    pace.textContent = `${quantity(speed, "s", 2)} per s`;
-  });
-  speeds.oninput();
+  const speeds = slider("speed", -3, 2, 0, () => clock.set(clock.time));
+  const speed = () => clock.whole / lap * 10 ** speeds.value;
   play.onclick = timing.toggle;
   window.onkeydown = (event) => {
     if (/INPUT|SELECT|BUTTON/.test(event.target.tagName)) return;
@@ -98,7 +101,7 @@ function controls(data, clock, player, resize) {
     if (event.key === " ") { event.preventDefault(); timing.toggle(); }
     if (step) clock.set(clock.times[clamp(clock.index + step, 0, clock.times.length - 1)]);
   };
-  const closer = (textContent, factor, title) => el("button", { textContent, title, ariaLabel: title,
+  const closer = (textContent, factor, title) => el("button", { textContent, title,
     onclick() { clock.show(factor); resize(); clock.set(clock.time); } });
   timing.bar = el("div.controls", {}, play, scrub, now,
     closer("+", 0.5, "shorter time"), closer("−", 2, "longer time"));
@@ -111,7 +114,7 @@ function controls(data, clock, player, resize) {
       player.phase += 5 * passed;
       player.draw();
     } else if (timing.on) {
-      const next = clock.time + passed * speed;
+      const next = clock.time + passed * speed();
       clock.set(next > clock.range[1] ? clock.range[0] : next);
     }
     if (timing.on && player) root.dataset.frame = player.cost.toFixed(2);
@@ -136,4 +139,20 @@ function addPlayer(data, player, more) {
     onchange() { player.arrows = arrows.checked; player.draw(); } });
   more.append(field("deformation", magnify), factor, field("colour", colour),
     ...data.contact ? [field("forces", arrows)] : []);
+}
+
+function cards(title, sections) {
+  return section(title, ...sections.length ? [el("div.cards", {}, ...sections.map(({ name, rows }) =>
+    el("div", {}, ...name ? [el("h3", {}, `[${name}]`)] : [], table([], rows))))] : []);
+}
+
+function foot(data) {
+  return el("footer", {}, data.versions.map((pair) => pair.join(" ")).join(" · "));
+}
+
+function ready(refresh) {
+  let width = innerWidth;
+  window.onresize = () => { if (innerWidth !== width) { width = innerWidth; refresh(); } };
+  matchMedia("(prefers-color-scheme: dark)").onchange = () => location.reload();
+  root.dataset.ready = 1;
 }
