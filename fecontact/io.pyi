@@ -8,6 +8,7 @@ from .output.report.branch_report import report_branches
 from .output.report.run_report import report
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import read_uff
+from .sweeps.report import report_sweep
 from .sweeps.table import read_table
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "read_wear",
     "report",
     "report_branches",
+    "report_sweep",
     "to_xarray",
     "write_basis",
     "write_branch",

@@ -303,7 +303,7 @@ def test_a_solid_is_drawn_and_turns(browser, path, tmp_path):
             "dimension": 3, "points": shown.add(corners, 1e-6), "triangles": shown.add(triangles),
             "edges": shown.add(edges), "shapes": shown.add(corners[:, :, None], 1e-6),
             "stress": shown.add(np.ones((8, 2, 1)) * [[[3.0], [2.0]]], 1e-6),
-            "components": ["zz", "yz"], "modes": [["mode 0", "1", "", ""]], "parts": [],
+            "components": ["zz", "yz"], "paints": ["von Mises stress", "none"], "modes": [["mode 0", "1", "", ""]], "parts": [],
             "largest": {"displacement": 2.0, "stress": 5.0, "peak": 5.0}}}
     target = tmp_path / "cube.html"
     target.write_text(page("cube", shown.block(header)))

@@ -5,7 +5,7 @@ coordinate m the step ``2 e / (M max|s_m|)``, so that each adds at most e to the
 whatever cancels in it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -36,11 +36,12 @@ class Motions:
     basis: ModalBasis
     coordinates: Array
 
-    @property
+    @cached_property
     def shapes(self) -> ModeShapes:
-        """Mode shapes over the bodies."""
-        assert self.basis.mode_shapes is not None
-        return self.basis.mode_shapes
+        """Mode shapes over the bodies; rigid ones without the round-off of their stresses."""
+        found = self.basis.mode_shapes
+        assert found is not None
+        return replace(found, stress=found.stress * (self.basis.angular_frequencies > 0.0))
 
     @cached_property
     def _peaks(self) -> tuple[Array, Array]:
@@ -112,7 +113,7 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
     cells = field.cells
     triangles = cells if cells.shape[1] == 3 else np.concatenate(
         [cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    used = [k for k in range(len(_COMPONENTS)) if field.stress[:, k].any()] or [0]
+    used = [k for k in range(len(_COMPONENTS)) if field.stress[:, k].any()]
     stress = field.stress[:, used]
     parts = [{"name": name, "label": node} for name, node in body_labels(basis)]
     ratios = [f"{50.0 * rate / w:.3g} %" if w > 0.0 else ""
@@ -130,6 +131,8 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
         "stress": payload.add(stress, motions.shape_steps(
             stress, motions.largest_stress / _VON_MISES)),
         "components": [_COMPONENTS[k] for k in used],
+        "paints": [*(["von Mises stress"] if used else []), "displacement",
+                   *(f"stress {_COMPONENTS[k]}" for k in used), "none"],
         "parts": parts,
         "modes": [[name, f"{hz:.6g}", ratio, kind] for name, hz, ratio, kind in zip(
             mode_names(basis), basis.frequencies_hz, ratios, kinds, strict=True)],

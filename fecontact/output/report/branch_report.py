@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.core.units import UNITS, round_125, suitable_unit
+from fecontact.core.units import UNITS, count, round_125, suitable_unit
 from fecontact.output.files.case import library_versions
 from fecontact.output.plots.bifurcation_diagram import LETTERS, stable_pieces
 from fecontact.output.plots.style import distinct_colours
@@ -31,7 +31,7 @@ _VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
 
 def report_branches(
     branches: Branch | Mapping[str, Branch], field: ContactField, path: str | Path, *,
-    y: str = "observed_maximum", observe: tuple[str | int, str] = ("B", "x"),
+    y: str = "observed_maximum", observe: tuple[str | int, Literal["x", "y"]] = ("B", "x"),
     title: str | None = None, study: str | None = None,
 ) -> Path:
     """Write branches as one HTML file with a diagram; a click on a point shows its orbit.
@@ -81,7 +81,9 @@ def report_branches(
     kept = _kept(named)
     motions = [_orbit(named[name].points[index], field) for name, index in kept]
     point, component = observe
-    unit_of_y = "m" if y.startswith("observed") else ""
+    # Only what is observed has a unit that is known here.
+    largest = max(float(np.abs(np.asarray(one.column(y))).max()) for one in named.values())
+    factor, symbol = suitable_unit(largest, "m") if y.startswith("observed") else (1.0, "")
     header: dict[str, Any] = {
         "format": 1, "title": title, "units": UNITS,
         "status": "; ".join(f"{name}: {branch.status.value}" for name, branch in named.items()),
@@ -89,18 +91,18 @@ def report_branches(
         "notes": [f"{name}: {branch.message}" for name, branch in named.items() if branch.message],
         "xLabel": parameter_label(next(iter(named.values())).parameter_name),
         "yLabel": y.replace("_", " ").replace("observed", f"displacement {component} of {point},")
-                  + (f" [{unit_of_y}]" if unit_of_y else ""),
+                  + f" [{symbol}]" * bool(symbol),
         "columns": ["point", "parameter", "period", "frequency", "stability"],
-        "branches": _branch_tables(named, y, kept, payload),
+        "branches": _branch_tables(named, y, factor, kept, payload),
         "samples": _SAMPLES,
         "observed": f"displacement {component} of {point}",
         "study": study_tables(study),
         "versions": list(map(list, library_versions().items())),
         "contact": None, "ground": None,
     }
-    row = field.displacement_row(point, component)[: field.system().basis.modes]  # type: ignore[arg-type]
-    header["orbits"], q = _orbit_tables(motions, row, payload)
     basis = field.system().basis
+    row = field.displacement_row(point, component)[: basis.modes]
+    header["orbits"], q = _orbit_tables(motions, row, payload)
     if basis.mode_shapes is not None:
         seen = Motions(basis, q)
         extent = float(np.linalg.norm(np.ptp(basis.mode_shapes.nodes, axis=0)))
@@ -160,12 +162,13 @@ def _orbit_tables(
 
 
 def _branch_tables(
-    named: Mapping[str, Branch], y: str, kept: list[tuple[str, int]], payload: Payload
+    named: Mapping[str, Branch], y: str, factor: float, kept: list[tuple[str, int]],
+    payload: Payload,
 ) -> list[dict[str, Any]]:
     places = {place: number for number, place in enumerate(kept)}
     found = []
     for (name, branch), colour in zip(named.items(), distinct_colours(len(named)), strict=True):
-        heights = np.asarray(branch.column(y), dtype=float).reshape(len(branch), -1)
+        heights = np.asarray(branch.column(y), dtype=float).reshape(len(branch), -1) / factor
         indices = [index for other, index in kept if other == name]
         size = max(float(np.ptp(branch.parameter)), 1e-6 * float(np.abs(branch.parameter).max()))
         found.append({
@@ -189,4 +192,4 @@ def _texts(point: BranchPoint) -> list[str]:
     return [kind + (f", {point.criticality}" if point.criticality else ""),
             f"{point.parameter:.7g}", "" if period is None else f"{float(period):.6g} s",
             "" if period is None else f"{1.0 / float(period):.6g} Hz",
-            f"unstable in {unstable} directions" if unstable else "stable"]
+            count(unstable, "unstable direction") if unstable else "stable"]

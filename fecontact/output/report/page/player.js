@@ -48,7 +48,7 @@ function vonMises(s, at, [a, b, d, e, f, g]) {
 
 class Player {
   constructor(data, clock) {
-    Object.assign(this, { data, clock, mode: -1, paint: "von Mises stress", arrows: true, swing: 1 });
+    Object.assign(this, { data, clock, mode: -1, paint: data.bodies.paints[0], arrows: true, swing: 1 });
     const { bodies } = data;
     this.d = bodies.dimension;
     this.count = bodies.points.rows;
@@ -64,11 +64,6 @@ class Player {
     this.node.player = this;
     this.begin();
     this.steer();
-  }
-
-  get paints() {
-    return ["von Mises stress", "displacement",
-      ...this.data.bodies.components.map((name) => `stress ${name}`), "none"];
   }
 
   begin() {

@@ -125,7 +125,7 @@ function controls(data, clock, player, resize, lap = 12) {
 }
 
 function addPlayer(data, player, more) {
-  const factor = el("output"), { paints } = player, given = Math.log(data.scale);
+  const factor = el("output"), { paints } = data.bodies, given = Math.log(data.scale);
   const colour = el("select", { ariaLabel: "colour", onchange() { player.paint = colour.value; player.draw(); } },
     ...paints.map((name) => el("option", {}, name)));
   const magnify = slider("deformation", min(0, given), max(2.3, given + 2.3), given, () => {
