@@ -173,8 +173,9 @@ def test_a_page_asks_nothing_of_a_network_and_is_the_same_each_time(tmp_path):
     assert first == report(run(), tmp_path / "b.html", title="a").read_bytes()
 
 
-def test_the_script_is_small():
-    assert len(page.script().encode()) <= 30_000
+@pytest.mark.parametrize("kind", page.SCRIPTS)
+def test_the_script_is_small(kind):
+    assert len(page.script(kind).encode()) <= 30_000
 
 
 def test_texts_of_a_study_stay_texts(tmp_path):

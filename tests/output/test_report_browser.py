@@ -1,33 +1,23 @@
 """The page of a run in a browser: it moves, listens, is silent, and shows what the run holds.
 
-Needs Chromium and Playwright: ``apt-get install chromium``, ``pip install playwright``.
+Needs Chromium and Playwright; see ``browsing.py``.
 """
 
-import io
-import shutil
-from importlib.resources import files
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from browsing import NO_WEBGL, SOFTWARE_WEBGL, Opened, launched, sync_api
 from joined_bodies import stack_run
 from matplotlib import colormaps
-from matplotlib.image import imread
 from report_reading import Shown
 from synthetic import run
 from test_report import EVIL, true_fields
 
-from fecontact.io import report
+from fecontact.io import report, report_sweep
 from fecontact.output.report.page import page
 from fecontact.output.report.payload import Payload
-
-sync_api = pytest.importorskip("playwright.sync_api")
-CHROMIUM = next(filter(None, map(shutil.which, (
-    "chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
-
-SOFTWARE_WEBGL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-NO_WEBGL = ["--no-sandbox", "--disable-gpu", "--disable-software-rasterizer"]
+from fecontact.sweeps import SweepTable
 
 
 @pytest.fixture(scope="module")
@@ -38,48 +28,9 @@ def playwright():
 
 @pytest.fixture(scope="module")
 def browser(playwright):
-    opened = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_WEBGL)
+    opened = launched(playwright, *SOFTWARE_WEBGL)
     yield opened
     opened.close()
-
-
-class Opened:
-    """A page that is ready, and all that it asked for and complained of."""
-
-    def __init__(self, browser, path, **context):
-        self.asked, self.complaints, self.dialogs = [], [], []
-        self._context = browser.new_context(viewport={"width": 1300, "height": 900}, **context)
-        self.page = self._context.new_page()
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("dialog", lambda dialog: (self.dialogs.append(dialog.message),
-                                               dialog.dismiss()))
-        self.page.goto(path.as_uri())
-        self.page.wait_for_selector("html[data-ready]", state="attached", timeout=30_000)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self._context.close()
-
-    @property
-    def time(self):
-        return float(self.page.evaluate("document.documentElement.dataset.time"))
-
-    def scrub(self, part):
-        self.page.evaluate("part => { const one = document.querySelector('.scrub');"
-                           "one.value = 1000 * part; one.oninput(); }", part)
-
-    def picture(self, selector=".stage"):
-        """Pixels (height, width, 3) from 0 to 255 of the first element that is selected."""
-        image = imread(io.BytesIO(self.page.locator(selector).first.screenshot()))
-        return np.rint(255.0 * image[..., :3])
-
-    def of_player(self, expression):
-        return self.page.evaluate(f"(player => {expression})(document.querySelector('.stage')"
-                                  ".player)")
 
 
 @pytest.fixture(scope="module")
@@ -275,7 +226,7 @@ def test_text_can_be_read_in_light_and_dark_and_fits_a_phone(browser, path, sche
 
 
 def test_without_webgl_there_is_a_message_and_the_rest(playwright, path, trajectory):
-    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=NO_WEBGL)
+    browser = launched(playwright, *NO_WEBGL)
     try:
         with Opened(browser, path) as opened:
             assert "no WebGL 2" in opened.page.locator(".missing").inner_text()
@@ -303,7 +254,8 @@ def test_a_solid_is_drawn_and_turns(browser, path, tmp_path):
             "dimension": 3, "points": shown.add(corners, 1e-6), "triangles": shown.add(triangles),
             "edges": shown.add(edges), "shapes": shown.add(corners[:, :, None], 1e-6),
             "stress": shown.add(np.ones((8, 2, 1)) * [[[3.0], [2.0]]], 1e-6),
-            "components": ["zz", "yz"], "paints": ["von Mises stress", "none"], "modes": [["mode 0", "1", "", ""]], "parts": [],
+            "components": ["zz", "yz"], "paints": ["von Mises stress", "none"],
+            "modes": [["mode 0", "1", "", ""]], "parts": [],
             "largest": {"displacement": 2.0, "stress": 5.0, "peak": 5.0}}}
     target = tmp_path / "cube.html"
     target.write_text(page("cube", shown.block(header)))
@@ -331,7 +283,32 @@ def test_a_solid_is_drawn_and_turns(browser, path, tmp_path):
         assert not opened.complaints
 
 
-def test_scripts_of_the_page_are_those_of_the_package(path):
-    assets = files("fecontact.output.report") / "page"
-    assert "class Player" in (assets / "player.js").read_text(encoding="utf-8")
-    assert "class Player" in path.read_text(encoding="utf-8")
+def test_a_cell_of_a_sweep_shows_its_case(browser, tmp_path):
+    speeds, loads = [1e-3, 2e-3, 4e-3, 5e-3], [5.0, 10.0, 15.0]
+    pairs = [(speed, load) for speed in speeds for load in loads]
+    values = np.arange(12.0)
+    values[4] = np.nan
+    table = SweepTable({"ground.speed": tuple(speed for speed, _ in pairs),
+                        "load.normal": tuple(load for _, load in pairs)},
+                       {"stick_fraction": values}, [str(k) for k in range(12)], [""] * 12,
+                       shape=(4, 3))
+    path = report_sweep(table, tmp_path / "sweep.html")
+    with Opened(browser, path) as opened:
+        box = opened.page.locator(".plot").bounding_box()
+        # Cells stand for as much of the axes as lies between them.
+        left, right, top, bottom = 52.0, box["width"] - 10.0, 6.0, box["height"] - 22.0
+        half_x, half_y = 0.5 * 4e-3 / 3.0, 0.5 * 10.0 / 2.0
+        picture = opened.picture(".plot")
+        colours = 255.0 * colormaps["viridis"](np.linspace(0.0, 1.0, 64))[:, :3]
+        for case, (speed, load) in enumerate(pairs):
+            x = left + (right - left) * (speed - 1e-3 + half_x) / (4e-3 + 2.0 * half_x)
+            y = bottom - (bottom - top) * (load - 5.0 + half_y) / (10.0 + 2.0 * half_y)
+            opened.page.mouse.click(box["x"] + x + 4, box["y"] + y - 3)
+            assert opened.page.evaluate("+document.documentElement.dataset.case") == case
+            if case not in (0, 4):
+                wanted = colours[round(63 * values[case] / 11.0)]
+                assert np.abs(picture[int(y) - 12, int(x) - 12] - wanted).max() < 3.0
+        text = opened.page.locator("section", has_text="Case").nth(1).inner_text()
+        assert "0.005" in text
+        assert not opened.complaints
+        assert opened.asked == [path.as_uri()]
