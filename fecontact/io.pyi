@@ -5,6 +5,7 @@ from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .output.files.wear import read_wear, write_wear
 from .output.report.branch_report import report_branches
+from .output.report.notebook import ReportFrame, report_frame
 from .output.report.run_report import report
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import read_uff
@@ -13,6 +14,7 @@ from .sweeps.table import read_table
 
 __all__ = [
     "AssembledMatrix",
+    "ReportFrame",
     "export_csv",
     "export_fields",
     "export_mat",
@@ -27,6 +29,7 @@ __all__ = [
     "read_wear",
     "report",
     "report_branches",
+    "report_frame",
     "report_sweep",
     "to_xarray",
     "write_basis",

@@ -3,6 +3,7 @@
 Needs Chromium and Playwright; see ``browsing.py``.
 """
 
+import io
 from itertools import pairwise
 
 import numpy as np
@@ -10,11 +11,12 @@ import pytest
 from browsing import NO_WEBGL, SOFTWARE_WEBGL, Opened, launched, sync_api
 from joined_bodies import stack_run
 from matplotlib import colormaps
+from matplotlib.image import imread
 from report_reading import Shown
 from synthetic import run
 from test_report import EVIL, true_fields
 
-from fecontact.io import report, report_sweep
+from fecontact.io import report, report_frame, report_sweep
 from fecontact.output.report.page import page
 from fecontact.output.report.payload import Payload
 from fecontact.sweeps import SweepTable
@@ -312,3 +314,28 @@ def test_a_cell_of_a_sweep_shows_its_case(browser, tmp_path):
         assert "0.005" in text
         assert not opened.complaints
         assert opened.asked == [path.as_uri()]
+
+
+def test_a_notebook_shows_it_in_a_frame_of_its_own(browser, trajectory, tmp_path):
+    frame = report_frame(trajectory, height=700, title=EVIL, scale=100.0)
+    cell = tmp_path / "cell.html"
+    cell.write_text(f"<!doctype html><title>cell</title><body>{frame._repr_html_()}</body>",
+                    encoding="utf-8")
+    context = browser.new_context(viewport={"width": 1300, "height": 900})
+    opened, asked, complaints = context.new_page(), [], []
+    opened.on("request", lambda request: asked.append(request.url))
+    opened.on("console", lambda message: complaints.append(message.text))
+    opened.on("pageerror", lambda error: complaints.append(str(error)))
+    opened.goto(cell.as_uri())
+    inner = opened.frame_locator("iframe")
+    inner.locator("canvas").first.wait_for(timeout=30_000)
+    assert inner.locator("h1").inner_text() == EVIL
+    assert inner.locator("figure").count() >= 5
+    assert opened.locator("iframe").bounding_box()["height"] == pytest.approx(700, abs=2)
+    opened.wait_for_timeout(300)
+    picture = imread(io.BytesIO(inner.locator(".stage").screenshot()))
+    assert len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 50
+    assert opened.title() == "cell"
+    assert [url for url in asked if url != "about:srcdoc"] == [cell.as_uri()]
+    assert not complaints
+    context.close()

@@ -72,12 +72,7 @@ def report(
         For a file above 20 MB.
     """
     require_kind("report", Trajectory, run=run)
-    require_kind("report", Sequence, points=points)
     path = require_page(as_path(path, "a report"))
-    if isinstance(points, str):
-        raise InputError(f"report: points = {points!r} must be several points, such as ['B', 0].")
-    if scale is not None:
-        require_scale("report", scale)
     title = path.stem if title is None else title
     return write_page(path, title, run_block(run, title, study, points, scale, versions))
 
@@ -87,6 +82,11 @@ def run_block(
     scale: float | None = None, versions: Mapping[str, str] | None = None,
 ) -> str:
     """The data of the report of a run; see :func:`report`."""
+    require_kind("report", Sequence, points=points)
+    if isinstance(points, str):
+        raise InputError(f"report: points = {points!r} must be several points, such as ['B', 0].")
+    if scale is not None:
+        require_scale("report", scale)
     payload = Payload()
     found, told = _finite(run), [*notes(run), *run.limits_exceeded]
     if len(found.time) < len(run.time):

@@ -2,7 +2,10 @@
 
 const { abs, floor, hypot, max, min, round } = Math;
 const root = document.documentElement;
-const css = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+// Looked up once: a page that changes between light and dark is loaded anew.
+const palette = {};
+const css = (name) => palette[name] ??= getComputedStyle(root).getPropertyValue(name).trim();
+const dark = matchMedia("(prefers-color-scheme: dark)");
 const clamp = (x, low, high) => min(max(x, low), high);
 
 // An element by "tag.class", with properties and children, of which strings are text.
@@ -16,7 +19,7 @@ function el(name, props = {}, ...children) {
 // Colours of prints are too dark before a dark page.
 function themed(colour) {
   if (!colour) return css("--ink");
-  if (!matchMedia("(prefers-color-scheme: dark)").matches) return colour;
+  if (!dark.matches) return colour;
   const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
   return `rgb(${parts.map((part) => round(part + 0.35 * (255 - part)))})`;
 }

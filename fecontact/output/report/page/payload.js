@@ -25,7 +25,7 @@ function readArray({ at, planes, shape, step }, bytes) {
     const unit = step[step.length > 1 ? column : 0];
     for (let row = 0, sum = 0; row < rows; row++, k++) {
       let zigzag = 0;
-      for (let plane = 0; plane < planes; plane++) zigzag += bytes[k + plane * size] * 256 ** plane;
+      for (let plane = planes; plane--;) zigzag = 256 * zigzag + bytes[k + plane * size];
       sum += zigzag % 2 ? -(zigzag + 1) / 2 : zigzag / 2;
       values[row * columns + column] = sum * unit;
     }

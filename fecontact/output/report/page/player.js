@@ -28,22 +28,22 @@ function shader(gl, kind, text) {
   return made;
 }
 
-// Values, rows (r, k) times coordinates q (k), added to nothing.
-function times(rows, count, q, out) {
-  const { values } = rows, m = q.length;
-  for (let r = 0, at = 0; r < count; r++, at += m) {
+// Rows (r, k) times coordinates q (k).
+function times({ values }, count, q, out) {
+  for (let r = 0, at = 0; r < count; r++) {
     let sum = 0;
-    for (let k = 0; k < m; k++) sum += values[at + k] * q[k];
+    for (let k = 0; k < q.length; k++) sum += values[at++] * q[k];
     out[r] = sum;
   }
   return out;
 }
 
-function vonMises(s, at, [a, b, d, e, f, g]) {
-  const xx = s[at + a] || 0, yy = s[at + b] || 0, zz = s[at + d] || 0;
-  const xy = s[at + e] || 0, yz = s[at + f] || 0, zx = s[at + g] || 0;
-  return Math.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
-    + 3 * (xy ** 2 + yz ** 2 + zx ** 2));
+// Components xx, yy, zz, xy, yz, zx lie at the places o; those that are zero everywhere have none.
+function vonMises(s, at, o) {
+  const part = (k) => o[k] < 0 ? 0 : s[at + o[k]];
+  const xx = part(0), yy = part(1), zz = part(2), xy = part(3), yz = part(4), zx = part(5);
+  return Math.sqrt(0.5 * ((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx))
+    + 3 * (xy * xy + yz * yz + zx * zx));
 }
 
 class Player {
@@ -208,11 +208,10 @@ class Player {
       if (ground?.wavy) drift = (1 - scale) * ground.drift.reduce((sum, row, k) => sum + row * q[k], 0);
     }
     times(bodies.shapes, count * d, q, this.moved);
+    const { places, moved } = this, points = bodies.points.values;
     for (let p = 0; p < count; p++) {
-      for (let k = 0; k < d; k++) {
-        this.places[3 * p + k] = bodies.points.values[p * d + k] + scale * this.moved[p * d + k];
-      }
-      this.places[3 * p] += drift;
+      for (let k = 0; k < d; k++) places[3 * p + k] = points[p * d + k] + scale * moved[p * d + k];
+      places[3 * p] += drift;
     }
     this.drawn = { scale, drift };
     this.colour();
@@ -231,11 +230,7 @@ class Player {
     const kinds = bodies.components.length, alone = this.mode >= 0;
     if (paint.includes("stress")) times(bodies.stress, count * kinds, this.q, stress);
     const part = bodies.components.indexOf(paint.slice(7));
-    // Components that are zero everywhere are not stored.
-    const order = ["xx", "yy", "zz", "xy", "yz", "zx"].map((name) => {
-      const k = bodies.components.indexOf(name);
-      return k < 0 ? NaN : k;
-    });
+    const order = ["xx", "yy", "zz", "xy", "yz", "zx"].map((name) => bodies.components.indexOf(name));
     for (let p = 0; p < count; p++) {
       if (paint === "displacement") {
         let sum = 0;

@@ -153,6 +153,6 @@ function foot(data) {
 function ready(refresh) {
   let width = innerWidth;
   window.onresize = () => { if (innerWidth !== width) { width = innerWidth; refresh(); } };
-  matchMedia("(prefers-color-scheme: dark)").onchange = () => location.reload();
-  root.dataset.ready = 1;
+  dark.onchange = () => location.reload();
+  root.dataset.ready = round(performance.now());
 }
