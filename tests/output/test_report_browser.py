@@ -166,6 +166,22 @@ def test_it_plays_at_a_readable_pace(browser, path):
         assert opened.time == still
 
 
+def test_a_part_of_the_time_can_be_seen_closer(browser, path, trajectory):
+    with Opened(browser, path) as opened:
+        opened.scrub(0.5)
+        chart = opened.picture(".chart .plot")
+        for _ in range(2):
+            opened.page.get_by_role("button", name="+").click()
+        end = trajectory.time[-1]
+        assert opened.of_player("player.clock.range") == pytest.approx([0.375 * end, 0.625 * end])
+        assert np.abs(opened.picture(".chart .plot") - chart).max() > 30
+        opened.scrub(0.0)
+        assert opened.time == pytest.approx(0.375 * end)
+        for _ in range(3):
+            opened.page.get_by_role("button", name="−").click()
+        assert opened.of_player("player.clock.range") == pytest.approx([0.0, end])
+
+
 def test_a_mode_shakes_in_its_shape(browser, path, trajectory):
     field = trajectory.system.basis.mode_shapes
     with Opened(browser, path) as opened:

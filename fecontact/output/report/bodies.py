@@ -111,8 +111,8 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
     basis, field = motions.basis, motions.shapes
     extent = float(np.linalg.norm(np.ptp(field.nodes, axis=0)))
     cells = field.cells
-    triangles = cells if cells.shape[1] == 3 else np.concatenate(
-        [cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    # Triangles of one cell after the other, so that overlapping bodies are drawn in turn.
+    triangles = cells if cells.shape[1] == 3 else cells[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     used = [k for k in range(len(_COMPONENTS)) if field.stress[:, k].any()]
     stress = field.stress[:, used]
     parts = [{"name": name, "label": node} for name, node in body_labels(basis)]

@@ -222,7 +222,7 @@ class Player {
     const { values, columns } = this.data.bodies.shapes, m = this.q.length;
     let largest = 0;
     for (let at = this.mode; at < values.length; at += m) largest = max(largest, abs(values[at]));
-    return 0.1 * min(this.width, 2 * this.height) / this.size / (largest || 1) * this.swing;
+    return 0.06 * min(this.width, 2 * this.height) / this.size / (largest || 1) * this.swing;
   }
 
   colour() {
