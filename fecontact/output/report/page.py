@@ -86,7 +86,7 @@ def write_page(path: Path, title: str, block: str, kind: Kind = "run") -> Path:
 
 
 def _asset(name: str) -> str:
-    return (files("fecontact.output.report") / "page" / name).read_text(encoding="utf-8")
+    return (files("fecontact.output.report") / "assets" / name).read_text(encoding="utf-8")
 
 
 def _seal(text: str) -> str:
