@@ -5,13 +5,18 @@ from .output.files.export import export_csv, export_fields, export_mat, export_n
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .output.files.wear import read_wear, write_wear
+from .output.report.branch_report import report_branches
+from .output.report.notebook import ReportFrame, report_frame
+from .output.report.run_report import report
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import UffModes, read_uff
+from .sweeps.report import report_sweep
 from .sweeps.table import read_table
 
 __all__ = [
     "AssembledMatrix",
     "Case",
+    "ReportFrame",
     "UffModes",
     "export_csv",
     "export_fields",
@@ -25,6 +30,10 @@ __all__ = [
     "read_table",
     "read_uff",
     "read_wear",
+    "report",
+    "report_branches",
+    "report_frame",
+    "report_sweep",
     "to_xarray",
     "write_basis",
     "write_branch",

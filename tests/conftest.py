@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SLOW = {"test_documentation", "test_examples", "test_benchmarks",
         "test_sweep_killed", "test_ending_signals",
         "test_two_mass_example", "test_shooting_of_beam", "test_branch_command",
-        "test_impact_orbits"}
+        "test_impact_orbits", "test_report_browser"}
 
 # Files whose tests start processes, draw movies, compile or follow motions for long.
 LONG = {
@@ -32,7 +32,7 @@ LONG = {
     "test_convergence", "test_mode_convergence",
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",
     "test_receptance", "test_references", "test_eigen", "test_set_valued_search",
-    "test_two_bodies",
+    "test_two_bodies", "test_report", "test_report_branches", "test_sweep_report",
 }
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from report_reading import Shown
 
 import fecontact as fc
 from fecontact import Study
@@ -78,7 +79,8 @@ def sensitivity(names):
 
 
 BETWEEN = {("sweeps.md", 1): sensitivity}  # before this block of the page
-SETUP = {"laws.md": laws_setup, "sweeps.md": sweeps_setup, "orbits.md": orbits_setup}
+SETUP = {"laws.md": laws_setup, "sweeps.md": sweeps_setup, "orbits.md": orbits_setup,
+         "report.md": sweeps_setup}
 
 
 def check_readme(names, printed, folder):
@@ -227,11 +229,19 @@ def check_bodies(names, printed, folder):
     assert names["free"].energies.imbalance < 1e-6
 
 
+def check_report(names, printed, folder):
+    whole, part = (Shown(folder / name) for name in ("study.html", "part.html"))
+    assert whole.header["title"] == "Block on a belt"
+    assert whole.array("time")[[0, -1]] == pytest.approx([0.0, 1.0])
+    assert part.array("time")[[0, -1]] == pytest.approx([0.5, 0.8])
+
+
 CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,
-          "preload.md": check_preload, "rotation.md": check_rotation, "bodies.md": check_bodies}
+          "preload.md": check_preload, "rotation.md": check_rotation, "bodies.md": check_bodies,
+          "report.md": check_report}
 
 
 def test_every_page_with_code_is_known():

@@ -35,6 +35,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.wear,
     sweep.sweep,
     branch.branch,
+    run.report,
     run.render,
     run.plot,
     run.export,

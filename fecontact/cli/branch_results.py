@@ -26,11 +26,12 @@ _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "per
 
 def write_branch_results(
     result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
-    beneath: "PoincareScan | None" = None,
+    beneath: "PoincareScan | None" = None, study: str | None = None,
 ) -> list[Path]:
-    """Write branches as HDF5 and CSV and plot them; returns the files."""
+    """Write branches as HDF5, CSV and a page, and plot them; returns the files."""
     from fecontact.output.plots.bifurcation_diagram import plot_branches
     from fecontact.output.plots.stability import plot_eigenvalues
+    from fecontact.output.report.branch_report import report_branches
 
     files = [write_branches(folder / f"{name}-branch.h5", result.found)]
     table = folder / f"{name}-branch.csv"
@@ -42,6 +43,9 @@ def write_branch_results(
     plot_branches(
         several, f"observed_{show}", y_label=_label(show, *result.observe),
         names=list(result.found), beneath=beneath, observe=result.observe, path=files[-1])
+    files.append(report_branches(
+        result.found, result.contact_field, folder / f"{name}-branch.html", observe=result.observe,
+        y=f"observed_{show}", title=name, study=study))
     if wanted.kind != "orbits":
         files.append(folder / f"{name}-stability.png")
         plot_eigenvalues(several[0], path=files[-1])

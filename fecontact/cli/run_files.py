@@ -1,8 +1,8 @@
 """Reading of studies and runs and writing of results, shared by several commands."""
 
 import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,12 +107,18 @@ class StoredRun:
         Render settings of its study.
     current : bool
         Whether the study file is unchanged since the run.
+    study : str or None
+        The study that described the run, as TOML text.
+    versions : mapping
+        Versions of the programs that computed it.
     """
 
     path: Path
     trajectory: "Trajectory"
     settings: "RenderSettings"
     current: bool = True
+    study: str | None = None
+    versions: Mapping[str, str] = field(default_factory=dict)
 
 
 def stored_run(file: Path, trust: bool = False) -> StoredRun:
@@ -143,7 +149,7 @@ def stored_run(file: Path, trust: bool = False) -> StoredRun:
         case = read_case(path, trust=trust or known)
         warn_of_limits(case.trajectory.limits_exceeded, "In this run")
         return StoredRun(path, case.trajectory, study.render,
-                         _same_run(study, case.study, trust or known))
+                         _same_run(study, case.study, trust or known), case.study, case.versions)
     case = read_case(file, trust=trust)
     try:
         settings = from_table(RenderSettings, tomllib.loads(case.study or "").get("render", {}),
@@ -152,7 +158,36 @@ def stored_run(file: Path, trust: bool = False) -> StoredRun:
         # The run can be drawn even if this version cannot read its study.
         settings = RenderSettings()
     warn_of_limits(case.trajectory.limits_exceeded, "In this run")
-    return StoredRun(file, case.trajectory, settings)
+    return StoredRun(file, case.trajectory, settings, True, case.study, case.versions)
+
+
+def stored_or_computed_run(
+    file: Path, changes: Iterable[str] | None = None, trust: bool = False
+) -> StoredRun:
+    """Read a run, or compute it, without storing it, where a study has none with its values.
+
+    Raises
+    ------
+    InputError
+        If the file does not exist, or ``changes`` are given for what is not a study.
+    """
+    if file.suffix.lower() != ".toml":
+        if changes:
+            raise InputError(f"--set changes keys of a study, but {file} is a stored run; name the "
+                             f"study instead.")
+        return stored_run(file, trust)
+    study = read_study(file, changes)
+    from fecontact.laws.registry import law_files
+    from fecontact.output.files.case import read_case
+
+    path = study.results / f"{study.name}.vtkhdf"
+    known = trust or law_files(study.tables())
+    if path.is_file():
+        case = read_case(path, trust=known)
+        if _same_run(study, case.study, known):
+            return StoredRun(path, case.trajectory, study.render, True, case.study, case.versions)
+    _ = study.t_end
+    return StoredRun(path, study.run(True), study.render, True, study.to_toml())
 
 
 def _same_run(study: "Study", stored: str | None, trust: bool | set[Path]) -> bool:
@@ -176,6 +211,16 @@ def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") ->
                   size=settings.size, colour=settings.colour, scale=settings.scale,
                   title=settings.title, t_start=settings.t_start, t_end=settings.t_end,
                   progress=True)
+
+
+def write_report(stored: StoredRun, name: str, target: Path) -> Path:
+    """Write the report of a run, with title, points and magnification as its study has them."""
+    from fecontact.output.report.run_report import report
+
+    output = tomllib.loads(stored.study or "").get("output", {})
+    return report(stored.trajectory, target, title=stored.settings.title or name,
+                  study=stored.study, points=tuple(output.get("points", ())),
+                  scale=stored.settings.scale, versions=stored.versions or None)
 
 
 def interfaces_of(study: "Study") -> list["InterfaceCompliance"]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from html import escape
 from itertools import chain, repeat
 
-_UNITS = {
+# Units by their base: factors and symbols, ascending.
+UNITS = {
     "m": ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m")),
     "m/s": ((1e-9, "nm/s"), (1e-6, "µm/s"), (1e-3, "mm/s"), (1.0, "m/s")),
     "rad": ((1e-6, "µrad"), (1e-3, "mrad"), (1.0, "rad")),
@@ -50,8 +51,8 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
     """
     if not 0.0 < abs(size) < math.inf:
         return 1.0, unit
-    fitting = [choice for choice in _UNITS[unit] if abs(size) >= choice[0] * (1.0 - 1e-9)]
-    return fitting[-1] if fitting else _UNITS[unit][0]
+    fitting = [choice for choice in UNITS[unit] if abs(size) >= choice[0] * (1.0 - 1e-9)]
+    return fitting[-1] if fitting else UNITS[unit][0]
 
 
 def round_125(value: float) -> float:

@@ -146,6 +146,15 @@ class BasisReport:
                   f"{shear:.2%}" for name, (pressure, shear), work in zip(
                       self.basis.boundaries, boundaries, whole, strict=True) if work.any())]
 
+    @property
+    def kinds(self) -> list[str]:
+        """Kind of each mode: rigid, vibration, or one that completes the basis."""
+        quality = self.basis.quality
+        vibrations = self.basis.modes if quality is None else quality.vibration_modes
+        other = "reduced" if vibrations == self.basis.rigid_modes else "completing"
+        return ["rigid" if w == 0.0 else "vibration" if mode < vibrations else other
+                for mode, w in enumerate(self.basis.angular_frequencies)]
+
     def __str__(self) -> str:
         basis, mass = self.basis, self.effective_mass
         lines = [f"{'mode':>4s} {'frequency [Hz]':>15s} {'damping':>9s} {'mass x':>8s} "
@@ -153,7 +162,7 @@ class BasisReport:
         diagonal = np.diag(basis.damping)
         first = {part.modes[0]: part.name for part in basis.parts if part.modes[1]}
         number = 0
-        for i, f in enumerate(basis.frequencies_hz):
+        for i, (f, kind) in enumerate(zip(basis.frequencies_hz, self.kinds, strict=True)):
             if i in first:
                 number = 0
                 lines.append(f"body '{first[i]}':")
@@ -161,7 +170,7 @@ class BasisReport:
             ratio = f"{diagonal[i] / (2.0 * w):9.3%}" if w > 0.0 else f"{'-':>9s}"
             shares = " ".join(f"{share:8.2%}" if np.isfinite(share) else f"{'-':>8s}"
                               for share in mass[:, i])
-            lines.append(f"{number:4d} {f:15.6g} {ratio} {shares}  {self._kind(i)}")
+            lines.append(f"{number:4d} {f:15.6g} {ratio} {shares}  {kind}")
             number += 1
         error = self.contact_error
         if np.isfinite(error).all() and error.size and basis.rigid_modes < basis.modes:
@@ -181,14 +190,6 @@ class BasisReport:
                          f"{quantity(basis.rotation.speed, 'rad/s')}")
         lines.append(self.recommendation)
         return "\n".join(lines)
-
-    def _kind(self, mode: int) -> str:
-        if self.basis.angular_frequencies[mode] == 0.0:
-            return "rigid"
-        quality = self.basis.quality
-        if quality is None or mode < quality.vibration_modes:
-            return "vibration"
-        return "reduced" if quality.vibration_modes == self.basis.rigid_modes else "completing"
 
 
 def _missing(kept: Array, whole: Array) -> Array:

@@ -14,8 +14,9 @@ from synthetic import run
 
 from fecontact import InputError, Load, LoadPath, load_history, read_case, write_case
 from fecontact.analysis import history
+from fecontact.analysis.run_facts import contact_shares
 from fecontact.cli import execute
-from fecontact.cli.tables import contact_shares, preload_table, run_table, wear_table
+from fecontact.cli.tables import preload_table, run_table, wear_table
 from fecontact.integrate import WearHistory
 from fecontact.io import export_pvd, to_xarray
 from fecontact.laws import EnergyWear, SlidingRotation, SlidingTranslation

@@ -5,7 +5,6 @@ from contextlib import redirect_stdout
 
 import numpy as np
 import pytest
-from fecontact.system.parameter_labels import parameter_label
 from meshes_for_tests import rectangle
 from scipy.optimize import brentq
 from scipy.special import ellipk
@@ -17,6 +16,7 @@ from fecontact.bifurcation import contact_field, equilibrium_branch
 from fecontact.integrate import PointStart, SetValued
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import ConstantFriction, LinearContact
+from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.reduction import (
     CubicSpring,
     PiecewiseSpring,

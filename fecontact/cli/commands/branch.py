@@ -29,7 +29,8 @@ def branch(
     """Follow steady sliding or periodic orbits over a parameter: folds, Hopf points, doublings.
 
     The section [branch] of the study selects the solutions; without it, steady sliding is
-    followed. Writes all branches (NAME-branch.h5, NAME-branch.csv) and plots: the diagram, and
+    followed. Writes all branches (NAME-branch.h5, NAME-branch.csv), a page whose diagram shows
+    the orbit of a point that is clicked (NAME-branch.html), and plots: the diagram, and
     frequencies and growth rates of the modes in steady sliding. Ctrl-C stops it; the points
     computed so far are written.
     """
@@ -55,7 +56,8 @@ def branch(
         if wanted.poincare_scan and not result.interrupted:
             beneath = runs_beneath(system, wanted, described.initial())
         with waiting("Writing"):
-            files = write_branch_results(result, wanted, folder, described.name, beneath)
+            files = write_branch_results(result, wanted, folder, described.name, beneath,
+                                         described.to_toml())
         for name, found in result.found.items():
             echo(f"\n{name}: {found.status.value}")
             if found.message:

@@ -1,12 +1,44 @@
-"""Commands that work on a run: ``render``, ``plot`` and ``export``."""
+"""Commands that work on a run: ``report``, ``render``, ``plot`` and ``export``."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import echo_written, warn_if_stale
-from fecontact.cli.options import RunFile, Trust
+from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, warn_if_stale
+from fecontact.cli.options import Changes, RunFile, Trust
+
+
+def report(
+    file: RunFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"], help="A .html file; by default beside the run.")] = None,
+    trust: Trust = False,
+) -> int:
+    """Write a run as one HTML page that plays it in any browser, without a network.
+
+    Of a study its stored run is taken if it has the same values; otherwise it is run first, without
+    storing anything but the page.
+    """
+    from fecontact.analysis.run_facts import notes
+    from fecontact.cli.console import waiting
+    from fecontact.cli.run_files import stored_or_computed_run, write_report
+    from fecontact.core.files.atomic_write import output_folder
+
+    stored = stored_or_computed_run(file, set_, trust)
+    target = output or stored.path.with_suffix(".html")
+    with output_folder(target.parent), waiting("Writing"):
+        written = write_report(stored, file.stem, target)
+    for note in notes(stored.trajectory):
+        echo(f"note: {note}")
+    echo_written(written)
+    ended = stored.trajectory.status.name
+    if ended not in ("FINISHED", "EVENT", "INTERRUPTED"):
+        return fail("the run did not reach its end; what was computed is in the report.", 1)
+    return INTERRUPTED if ended == "INTERRUPTED" else 0
 
 
 def render(

@@ -190,7 +190,7 @@ def run(
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_run
-    from fecontact.cli.tables import notes, run_table
+    from fecontact.cli.tables import run_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.files.locks import locked
 
@@ -211,6 +211,8 @@ def run(
             raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
                              f"exist; run the study without --resume.")
         trajectory = described.run(True, checkpoint)
+        from fecontact.analysis.run_facts import notes
+
         with waiting("Writing"):
             files = write_run(described, trajectory, folder)
         ended = trajectory.status.name

@@ -39,7 +39,8 @@ def sweep(
         help="Address of a running Dask scheduler, such as `tcp://node1:8786`.")]
     = None,
 ) -> int:
-    """Run many cases of a study on all cores or a cluster; write a table (index.csv) and plots.
+    """Run many cases of a study on all cores or a cluster; write a table (index.csv), a page
+    (index.html) and plots.
 
     Ctrl-C stops it; finished cases are kept, and --resume continues the sweep.
     """
@@ -67,10 +68,15 @@ def sweep(
         except KeyboardInterrupt:
             print(f"Finished cases are kept in {folder}; go on with --resume.", file=sys.stderr)
             raise
-    return _report(table, described.sweep, folder)
+    from fecontact.sweeps.report import report_sweep
+
+    with waiting("Writing"):
+        page = report_sweep(table, folder / "index.html", title=described.name,
+                            study=described.to_toml())
+    return _report(table, described.sweep, folder, page)
 
 
-def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int:
+def _report(table: "SweepTable", settings: "SweepSettings", folder: Path, page: Path) -> int:
     from fecontact.cli.console import waiting
 
     failed = table.failed
@@ -85,7 +91,7 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path) -> int
     _warn({case: one for case, one in enumerate(table.warnings) if one})
     with waiting("Drawing"):
         pictures = _draw(table, settings, folder)
-    echo_written(folder / "index.csv", *pictures)
+    echo_written(folder / "index.csv", page, *pictures)
     return 1 if len(failed) == len(table) else 0
 
 

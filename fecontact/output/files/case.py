@@ -96,7 +96,7 @@ def write_case(
     folder = Path(path).parent
     root = folder if root is None else Path(root)
     with new_file(path) as file:
-        for name, text in _versions().items():
+        for name, text in library_versions().items():
             file.require_group("versions").attrs[name] = text
         store_basis(file.create_group("basis"), trajectory.system.basis)
         file.create_group("system").attrs["json"] = json.dumps(
@@ -241,7 +241,8 @@ def _of_laws(trajectory: Trajectory) -> dict[str, Any]:
             "contact_energy": trajectory.energies.contact}
 
 
-def _versions() -> dict[str, str]:
+def library_versions() -> dict[str, str]:
+    """Versions of fecontact and the libraries that compute."""
     found = {}
     for name in _PACKAGES:
         try:

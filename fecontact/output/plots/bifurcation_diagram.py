@@ -34,7 +34,8 @@ _SPECIAL = {
     "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
     "double Hopf": ("HH", ">"), "unresolved": ("?", "x"),
 }
-
+# Letters alone, for diagrams of other kinds.
+LETTERS = {kind: letters for kind, (letters, _) in _SPECIAL.items()}
 
 def plot_branches(
     branches: "Branch | Sequence[Branch]", y: Quantity = 0, *,
@@ -98,7 +99,7 @@ def plot_branches(
         colours = dict(zip(dict.fromkeys(groups), apart, strict=False))
         for group, branch in zip(groups, branches, strict=True):
             places, curves = _values(branch, x), _values(branch, y, rows=True)
-            stable = _stable_pieces(branch)
+            stable = stable_pieces(branch)
             dashed |= not stable.all()
             colour = colours[group]
             heights = curves if curves.ndim == 1 else curves[:, 0]
@@ -153,7 +154,7 @@ def _value(point: "BranchPoint", quantity: Quantity) -> float:
     return float(np.ravel(point.values[quantity])[0])
 
 
-def _stable_pieces(branch: "Branch") -> NDArray[np.bool_]:
+def stable_pieces(branch: "Branch") -> NDArray[np.bool_]:
     """Whether each piece (N - 1,) between neighbours is stable, judged by its regular points."""
     stable = [None if point.kind is not None else bool(point.values.get("stable", True))
               for point in branch.points]

@@ -27,6 +27,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# Panels of energies: title, attribute of their sum, attributes of the terms.
+ENERGY_TERMS = (
+    ("stored energy", "stored", ("kinetic", "elastic", "drive_spring", "contact", "bristles")),
+    ("work put in", "work", ("drive_work", "belt_normal_work", "belt_friction_work", "load_work",
+                             "circulatory_work", "bristle_work")),
+    ("energy lost", "lost", ("modal_damping", "dashpots", "contact_damping", "friction")),
+)
+
 _AXES = ("x", "y")
 
 _MOST_MIDDLES = 5  # of contact nodes shown without being asked for
@@ -59,7 +67,7 @@ def plot_history(
     if isinstance(points, str):
         raise InputError(f"plot_history: points = {points!r} must be several points, such as "
                          f"['B', 0]; a file to write is given by path={points!r}.")
-    points = tuple(points) or _usual_points(trajectory)
+    points = tuple(points) or usual_points(trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     colours, faces = distinct_colours(len(points)), contact_faces(trajectory.system.basis)
@@ -177,16 +185,8 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
         add_note(figure, drawn)
         axes = figure.subplots(3, 1, sharex=True)
         time = _time(axes[2:], trajectory)
-        panels = (
-            ("stored energy", energies.stored, ("kinetic", "elastic", "drive_spring", "contact",
-                                                "bristles")),
-            ("work put in", energies.work,
-             ("drive_work", "belt_normal_work", "belt_friction_work", "load_work",
-              "circulatory_work", "bristle_work")),
-            ("energy lost", energies.lost,
-             ("modal_damping", "dashpots", "contact_damping", "friction")),
-        )
-        for axis, (title, total, names) in zip(axes, panels, strict=True):
+        for axis, (title, sum_of, names) in zip(axes, ENERGY_TERMS, strict=True):
+            total = getattr(energies, sum_of)
             terms = {name: getattr(energies, name) for name in names}
             shown = {name: term for name, term in terms.items() if term.any()}
             factor = _labelled(axis, title, "J", total, *shown.values())
@@ -203,7 +203,7 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
     return figure
 
 
-def _usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
+def usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
     """Point B, unless it is fixed, and the middle contact node of each face."""
     basis = trajectory.system.basis
     middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)]

@@ -183,7 +183,7 @@ class Motion:
         if self.given_scale is not None:
             return float(self.given_scale)
         extent = float(np.linalg.norm(np.ptp(self.mode_shapes.nodes, axis=0)))
-        gap = self._gap
+        gap = self.gap
         low, high = self.trajectory.system.ground.height_range if self.has_ground else (0.0, 0.0)
         size = max(self._largest["shape"], 0.5 * (high - low), gap)
         return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
@@ -207,7 +207,7 @@ class Motion:
             return self.box[2]
         basis = self.trajectory.system.basis
         heights = basis.positions[2 : 2 + basis.contact_nodes, 1][basis.ground_nodes]
-        return float(heights.min() - self.scale * self._gap)
+        return float(heights.min() - self.scale * self.gap)
 
     def body(self, frame: int) -> tuple[Array, Array]:
         """Drawn positions (N, 2) of the nodes [m] and their colour values (N,) in SI units."""
@@ -220,7 +220,7 @@ class Motion:
     def contact_places(self, frame: int) -> Array:
         """Drawn positions (n + f, 2) of the contact nodes and of their feet [m]."""
         q = self._q(frame)
-        places, rows = self._contact_rows
+        places, rows = self.contact_rows
         return places + self._scaled((rows @ q[0])[None], q)[0]
 
     def ground(self, frame: int, x: Array) -> Array:
@@ -243,7 +243,7 @@ class Motion:
         return (ground.travel(float(last)) - ground.travel(float(first))) / float(last - first)
 
     @cached_property
-    def _contact_rows(self) -> tuple[Array, Array]:
+    def contact_rows(self) -> tuple[Array, Array]:
         """Places (n + f, 2) of contact nodes and feet, and their displacements (n + f, 2, m)."""
         basis, field = self.trajectory.system.basis, self.mode_shapes
         places = basis.positions[2 : 2 + basis.contact_nodes]
@@ -257,7 +257,7 @@ class Motion:
                 np.concatenate([rows[0], rows[1][self.footed]]))
 
     @cached_property
-    def _gap(self) -> float:
+    def gap(self) -> float:
         """Smallest gap of a contact node above the ground [m]."""
         gap = self.trajectory.system.gap
         if not isinstance(gap, tuple):

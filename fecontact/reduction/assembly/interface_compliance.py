@@ -159,6 +159,9 @@ def interface_compliance(
     faces, first = contact_faces(basis), 0
     found: dict[str, InterfaceCompliance] = {}
     for name, count in basis.groups:
+        if name in basis.springs:
+            first += count
+            continue
         face = next((face for face in faces if face.name == name), None)
         found[name] = _compared(name, face.bodies if face else (), whole, missing,
                                 basis.tributary, slice(first, first + count))

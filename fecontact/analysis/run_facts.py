@@ -1,0 +1,94 @@
+"""The main facts of a run as pairs of name and text, and sentences on its limitations."""
+
+import numpy as np
+
+from fecontact.core.units import quantity
+from fecontact.integrate.events import Events
+from fecontact.integrate.trajectory import ContactState, Status, Trajectory
+from fecontact.reduction.assembly.contact_faces import contact_faces
+
+ROUGH_SLOPE = 0.3  # of the ground, above which friction along x is a rough assumption
+
+
+def run_facts(trajectory: Trajectory) -> list[tuple[str, str]]:
+    """Duration, steps, energy balance, largest displacement and shares of the contact states."""
+    size, place = largest_displacement(trajectory)
+    time, statistics = trajectory.time, trajectory.statistics
+    seconds = statistics.get("seconds", 0.0)
+    return [
+        ("time", f"{quantity(float(time[0]), 's')} ... {quantity(float(time[-1]), 's')}"),
+        (("steps", f"{statistics['steps']} in {seconds:.1f} s") if "steps" in statistics else
+         ("computed", f"in {seconds:.1f} s")),
+        ("energy imbalance", f"{trajectory.energies.imbalance:.1e}"),
+        *(() if trajectory.events is None else (("events", _events(trajectory.events)),)),
+        ("largest displacement", f"{quantity(size, 'm')} at {place}"),
+        *_contact_rows(trajectory),
+    ]
+
+
+def _contact_rows(trajectory: Trajectory) -> list[tuple[str, str]]:
+    """Shares of the contact states, of several bodies for each interface with its nodes."""
+    basis = trajectory.system.basis
+    faces = contact_faces(basis)
+    if not faces[0].name:
+        shares = contact_shares(trajectory)
+        return [(f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()]
+    rows = [("bodies", dict(basis.summary()).get("bodies", "1"))]
+    for face in faces:
+        if face.spring:
+            force = np.abs(trajectory.normal_force[:, face.nodes]).max()
+            rows.append((face.title, f"nonlinear spring, at most {quantity(float(force), 'N')}"))
+            continue
+        shares = contact_shares(trajectory, face.nodes)
+        rows.append((face.title, f"{len(face.abscissa)} nodes, " + ", ".join(
+            f"{100.0 * share:.1f} % {name}" for name, share in shares.items())))
+    return rows
+
+
+def _events(events: Events) -> str:
+    """Numbers of events by kind."""
+    kinds = dict.fromkeys(events.kind)
+    return ", ".join(f"{events.kind.count(kind)} {kind}" for kind in kinds) or "none"
+
+
+def largest_displacement(trajectory: Trajectory) -> tuple[float, str]:
+    """Largest displacement [m] of the bodies at all output times, and where it occurs."""
+    basis, q = trajectory.system.basis, trajectory.modal_coordinates
+    if basis.mode_shapes is not None:
+        shapes, places = basis.mode_shapes.shapes, basis.mode_shapes.nodes
+    else:
+        used = np.abs(basis.T).any(axis=(1, 2))
+        shapes, places = basis.T[used, :2], basis.positions[used]
+    rows = shapes.reshape(-1, basis.modes).T
+    best, node = 0.0, 0
+    for block in np.array_split(q, max(1, q.shape[0] * rows.shape[1] // 2**21)):
+        motion = np.linalg.norm((block @ rows).reshape(len(block), -1, 2), axis=2).max(axis=0)
+        if motion.max() > best:
+            best, node = float(motion.max()), int(motion.argmax())
+    body = [f" of {part.name}" for part in basis.parts
+            if basis.mode_shapes is not None and part.nodes[0] <= node < sum(part.nodes)]
+    return best, f"x = {places[node, 0]:.4g} m, y = {places[node, 1]:.4g} m" + "".join(body)
+
+
+def contact_shares(trajectory: Trajectory, nodes: slice = slice(None)) -> dict[str, float]:
+    """Fractions of time and contact length of some nodes that are open, in stick and in slip."""
+    weight = trajectory.system.basis.tributary[nodes]
+    states = trajectory.contact_state[:, nodes]
+    return {state.name.lower(): float(((states == state) @ (weight / weight.sum())).mean())
+            for state in ContactState}
+
+
+def notes(trajectory: Trajectory) -> list[str]:
+    """Sentences on limitations of the result."""
+    found = []
+    if trajectory.status is not Status.FINISHED:
+        message = trajectory.statistics.get("message")
+        found.append(trajectory.status.value + (f" {message}" if message else ""))
+    ground = trajectory.system.ground
+    slope = ground.steepest_slope
+    if slope > ROUGH_SLOPE:
+        what = ("friction acts along x" if ground.normal == "surface" else
+                "the contact force is vertical and friction acts along x")
+        found.append(f"The ground's slope reaches {slope:.2f}; above {ROUGH_SLOPE} it is a rough "
+                     f"assumption that {what}.")
+    return found

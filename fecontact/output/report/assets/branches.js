@@ -1,0 +1,118 @@
+// The page of branches: a diagram whose points show their orbit.
+
+class Diagram extends Chart {
+  constructor(data, pick) {
+    const lines = data.branches.flatMap((branch) => Array.from({ length: branch.y.columns }, (_, k) => ({
+      ...branch, branch, x: branch.x.values, stable: branch.stable.values,
+      y: branch.y.values.filter((_, at) => at % branch.y.columns === k) })));
+    const longest = max(...lines.map(({ x }) => x.length)) - 1;
+    const set = (chosen) => { this.chosen = chosen; this.point(); pick(chosen.line.branch, chosen.number); };
+    super({ window: () => [0, longest], set }, { title: data.yLabel, xLabel: data.xLabel, lines,
+      legend: data.branches, height: 440, kind: "diagram" });
+  }
+
+  // Unstable parts are dashed.
+  trace(c, { x, y, stable }) {
+    for (const solid of [1, 0]) {
+      c.beginPath();
+      c.setLineDash(solid ? [] : [6, 4]);
+      c.lineWidth = solid ? 2 : 1.2;
+      for (let i = 0; i + 1 < x.length; i++) {
+        if (stable[i] === solid) { c.moveTo(this.px(x[i]), this.py(y[i])); c.lineTo(this.px(x[i + 1]), this.py(y[i + 1])); }
+      }
+      c.stroke();
+    }
+    c.beginPath();
+    c.setLineDash([]);
+  }
+
+  draw() {
+    super.draw();
+    const c = this.context;
+    c.font = `600 12px ${css("--font")}`;
+    c.textAlign = "left";
+    for (const { x, y, special } of this.lines) {
+      for (const [at, letters] of special) {
+        const [px, py] = [this.px(x[at]), this.py(y[at])];
+        c.beginPath();
+        c.arc(px, py, 4.5, 0, 7);
+        c.fillStyle = css("--panel");
+        c.strokeStyle = c.strokeStyle = css("--ink");
+        c.lineWidth = 1.2;
+        c.fill();
+        c.stroke();
+        c.fillStyle = css("--ink");
+        c.fillText(letters, px + 7, py - 9);
+      }
+    }
+  }
+
+  // Of the points whose orbits are stored, the nearest.
+  timeAt(x, y) {
+    let best = Infinity, found;
+    for (const line of this.lines) {
+      line.kept.forEach((index, number) => {
+        const away = hypot(this.px(line.x[index]) - x, this.py(line.y[index]) - y);
+        if (away < best) { best = away; found = { line, index, number }; }
+      });
+    }
+    return found;
+  }
+
+  point() {
+    const c = this.cursor, { chosen } = this;
+    c.clearRect(0, 0, this.width, this.height);
+    if (!chosen) return;
+    c.fillStyle = css("--accent");
+    c.beginPath();
+    c.arc(this.px(chosen.line.x[chosen.index]), this.py(chosen.line.y[chosen.index]), 5, 0, 7);
+    c.fill();
+  }
+}
+
+async function build(host) {
+  const data = await readBlock(document.getElementById("payload").textContent);
+  units = data.units;
+  const { orbits } = data, samples = data.samples;
+  const phases = Float64Array.from({ length: samples }, (_, k) => k / (samples - 1));
+  const clock = new Clock(phases);
+  const part = ({ values, columns }, number) => values.slice(number * samples * columns, (number + 1) * samples * columns);
+  if (data.bodies) data.coordinates = { columns: data.bodies.modes.length, values: [] };
+  const line = (name) => ({ name: "", colour: data.branches[0].colour, [name]: phases });
+  const history = new Chart(clock, { title: data.observed, unit: orbits.units[0], xLabel: "", lines: [line("y")] });
+  const phase = new Chart(clock, { title: `velocity [${orbits.units[1]}] over displacement [${orbits.units[0]}]`,
+    xLabel: "", lines: [{ ...line("x"), y: phases }], height: 220, kind: "phase" });
+  const facts = el("div");
+  const choose = (branch, place) => {
+    const number = branch.first + place;
+    clock.load(phases.map((value) => value * orbits.periods.values[number]));
+    if (player) data.coordinates.values = part(orbits.coordinates, number);
+    history.xLabel = clock.label;
+    history.lines[0].y = phase.lines[0].x = part(orbits.displacement, number);
+    phase.lines[0].y = part(orbits.velocity, number);
+    history.lines[0].colour = phase.lines[0].colour = branch.colour;
+    facts.replaceChildren(table([], [["branch", branch.name], ...data.columns.map((name, k) =>
+      [name, branch.rows[place][k]]).filter(([, text]) => text)]));
+    root.dataset.orbit = number;
+    player?.draw();
+    history.resize();
+    phase.resize();
+    clock.set(0);
+  };
+  const player = data.bodies ? new Player(data, clock) : null;
+  const diagram = new Diagram(data, choose);
+  const resize = () => { history.resize(); phase.resize(); };
+  if (player) data.coordinates.values = part(orbits.coordinates, 0);
+  const timing = controls(data, clock, player, resize, 3);
+  host.append(head(data), el("main", {},
+    el("div.left", {}, ...section("Diagram", diagram.node)),
+    el("div", {}, el("section", {}, ...player ? [player.node] : [], timing.bar, timing.more),
+      ...section("Point", facts), ...section("Motion", history.node, phase.node))),
+  ...cards("Study", data.study), foot(data));
+  const refresh = () => { player?.resize(); diagram.resize(); resize(); };
+  clock.watchers.push(() => { player?.draw(); history.point(); phase.point(); });
+  phase.lines[0].x = part(orbits.displacement, 0);
+  refresh();
+  diagram.clock.set({ line: diagram.lines[0], index: diagram.lines[0].kept[0], number: 0 });
+  ready(refresh);
+}

@@ -1,0 +1,205 @@
+// Charts on two layers: curves, drawn once for each size, and the cursor, drawn for each instant.
+
+const { abs, floor, hypot, max, min, round } = Math;
+const root = document.documentElement;
+// Looked up once: a page that changes between light and dark is loaded anew.
+const palette = {};
+const css = (name) => palette[name] ??= getComputedStyle(root).getPropertyValue(name).trim();
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const clamp = (x, low, high) => min(max(x, low), high);
+
+// An element by "tag.class", with properties and children, of which strings are text.
+function el(name, props = {}, ...children) {
+  const [tag, className = ""] = name.split(".");
+  const node = Object.assign(document.createElement(tag), { className }, props);
+  node.append(...children);
+  return node;
+}
+
+// Colours of prints are too dark before a dark page.
+function themed(colour) {
+  if (!colour) return css("--ink");
+  if (!dark.matches) return colour;
+  const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+  return `rgb(${parts.map((part) => round(part + 0.35 * (255 - part)))})`;
+}
+
+function ticks(low, high, most) {
+  const rough = (high - low) / most, power = 10 ** floor(Math.log10(rough));
+  const step = power * ([1, 2, 5].find((digit) => digit * power >= rough) ?? 10);
+  const found = [];
+  for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+  const digits = max(0, -floor(Math.log10(step) + 1e-9));
+  return found.map((value) => [value, abs(value) < 1e5 && digits < 5
+    ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1") : value.toPrecision(3)]);
+}
+
+// Index of the last time that is not after t.
+function before(times, t) {
+  let low = 0, high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= t) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+function layer(canvas, width, height) {
+  const ratio = devicePixelRatio, context = canvas.getContext("2d");
+  canvas.width = round(width * ratio);
+  canvas.height = round(height * ratio);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return context;
+}
+
+class Chart {
+  // lines: [{name, colour, x?, y}] with arrays; without x over the time of the clock.
+  constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart" }) {
+    Object.assign(this, { clock, lines, xLabel, height });
+    this.base = el("canvas");
+    this.top = el("canvas");
+    this.box = el("div.plot", {}, this.base, this.top);
+    this.node = el(`figure.${kind}`, {}, el("figcaption", {},
+      el("b", {}, unit ? `${title} [${unit}]` : title), ...this.legend(legend)), this.box);
+    const move = (event) => this.clock.set(this.timeAt(event.offsetX, event.offsetY));
+    this.top.onpointerdown = (event) => { this.top.setPointerCapture(event.pointerId); move(event); };
+    this.top.onpointermove = (event) => { if (event.buttons) move(event); };
+  }
+
+  legend(lines) {
+    if (lines.length < 2) return [];
+    return lines.map(({ name, colour, back }) => {
+      const swatch = el("i");
+      swatch.style.background = back || themed(colour);
+      return el("span", {}, swatch, name);
+    });
+  }
+
+  resize() {
+    this.width = this.box.clientWidth || 300;
+    this.box.style.height = `${this.height}px`;
+    this.inner = { left: 52, right: this.width - 10, top: 6, bottom: this.height - 22 };
+    this.context = layer(this.base, this.width, this.height);
+    this.cursor = layer(this.top, this.width, this.height);
+    this.draw();
+    this.point();
+  }
+
+  get overTime() { return !this.lines[0].x; }
+
+  limits() {
+    const [i0, i1] = this.clock.window();
+    const span = (name) => {
+      let low = Infinity, high = -low;
+      for (const line of this.lines) {
+        // What is not a number is smaller and larger than nothing.
+        for (let i = i0; i <= i1; i++) {
+          if (line[name][i] < low) low = line[name][i];
+          if (line[name][i] > high) high = line[name][i];
+        }
+      }
+      const room = 0.06 * (high - low) || 0.1 * abs(high) || 1;
+      return [low - room, high + room];
+    };
+    return { x: this.overTime ? this.clock.shown() : span("x"), y: span("y") };
+  }
+
+  draw() {
+    const { left, right, top, bottom } = this.inner, c = this.context;
+    const { x, y } = this.limits();
+    this.px = (value) => left + (right - left) * (value - x[0]) / (x[1] - x[0]);
+    this.py = (value) => bottom - (bottom - top) * (value - y[0]) / (y[1] - y[0]);
+    this.range = { x, y };
+    c.clearRect(0, 0, this.width, this.height);
+    c.font = `11px ${css("--font")}`;
+    c.fillStyle = css("--soft");
+    c.strokeStyle = css("--grid");
+    c.lineWidth = 1;
+    const xs = ticks(...x, clamp((right - left) / 70, 2, 10)), ys = ticks(...y, this.height / 32);
+    c.beginPath();
+    for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
+    for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
+    c.stroke();
+    c.textBaseline = "middle";
+    c.textAlign = "right";
+    for (const [value, text] of ys) c.fillText(text, left - 6, this.py(value));
+    this.bottomLabels(c, xs);
+    c.save();
+    c.beginPath();
+    c.rect(left, top - 1, right - left, bottom - top + 2);
+    c.clip();
+    for (const line of this.lines) {
+      c.strokeStyle = themed(line.colour);
+      c.lineWidth = line.name === "total" ? 1.8 : 1.2;
+      c.beginPath();
+      if (line.x) this.trace(c, line); else this.envelope(c, line.y);
+      c.stroke();
+    }
+    c.restore();
+  }
+
+  bottomLabels(c, xs) {
+    const y = this.inner.bottom + 13, width = c.measureText(this.xLabel).width;
+    c.textAlign = "right";
+    c.fillText(this.xLabel, this.width - 2, y);
+    c.textAlign = "center";
+    for (const [value, text] of xs) {
+      if (this.px(value) + 16 < this.width - width) c.fillText(text, this.px(value), y);
+    }
+  }
+
+  trace(c, { x, y }) {
+    const [i0, i1] = this.clock.window();
+    for (let i = i0; i <= i1; i++) c.lineTo(this.px(x[i]), this.py(y[i]));
+  }
+
+  // Of many values in a column of pixels: what comes in, the lowest, the highest, what goes out.
+  envelope(c, y) {
+    const [i0, i1] = this.clock.window(), times = this.clock.axis;
+    for (let i = i0; i <= i1;) {
+      const column = floor(this.px(times[i]));
+      let low = y[i], high = low, last = i;
+      while (last < i1 && floor(this.px(times[last + 1])) === column) {
+        last++;
+        if (y[last] < low) low = y[last];
+        if (y[last] > high) high = y[last];
+      }
+      c.lineTo(this.px(times[i]), this.py(y[i]));
+      if (last > i + 2) { c.lineTo(column, this.py(low)); c.lineTo(column + 0.5, this.py(high)); }
+      if (last > i) c.lineTo(this.px(times[last]), this.py(y[last]));
+      i = last + 1;
+    }
+  }
+
+  timeAt(x, y) {
+    if (this.overTime) {
+      const [low, high] = this.range.x, { left, right } = this.inner;
+      return (low + (high - low) * clamp((x - left) / (right - left), 0, 1)) * this.clock.unit;
+    }
+    let best = Infinity, found = 0;
+    const [i0, i1] = this.clock.window();
+    for (const line of this.lines) {
+      for (let i = i0; i <= i1; i++) {
+        const away = hypot(this.px(line.x[i]) - x, this.py(line.y[i]) - y);
+        if (away < best) { best = away; found = i; }
+      }
+    }
+    return this.clock.times[found];
+  }
+
+  point() {
+    const c = this.cursor, { index, axis } = this.clock, { top, bottom } = this.inner;
+    c.clearRect(0, 0, this.width, this.height);
+    if (this.overTime) {
+      c.fillStyle = css("--accent");
+      c.fillRect(this.px(this.clock.time / this.clock.unit) - 0.5, top, 1, bottom - top);
+    }
+    for (const line of this.lines) {
+      if (!line.y) continue;
+      c.fillStyle = themed(line.colour);
+      c.beginPath();
+      c.arc(this.px(line.x ? line.x[index] : axis[index]), this.py(line.y[index]), 3.5, 0, 7);
+      c.fill();
+    }
+  }
+}

@@ -1,0 +1,70 @@
+// The page of a run.
+
+function modesTable(data, player, timing) {
+  const rows = data.bodies.modes.map((texts, k) => {
+    const button = el("button", { textContent: "shake" });
+    button.onclick = () => {
+      const stop = player.mode === k;
+      for (const row of rows) row.at(-1).textContent = "shake";
+      button.textContent = stop ? "shake" : "stop";
+      player.mode = root.dataset.mode = stop ? -1 : k;
+      player.phase = 0;
+      if (timing.on === stop) timing.toggle();
+      player.draw();
+      player.node.scrollIntoView({ block: "nearest", behavior: "smooth" });
+    };
+    return [...texts, button];
+  });
+  return table(["mode", "frequency [Hz]", "damping", "", ""], rows, "modes");
+}
+
+function states(contact) {
+  return el("p.legend", {}, "contact nodes: ", ...contact.states.map((name, k) => {
+    const dot = el("i");
+    dot.style.background = contact.colours[k] || "transparent";
+    return el("span", {}, dot, name);
+  }), ...contact.slides?.length ? [`sliding: ${contact.slides.join(", ")}`] : []);
+}
+
+function columns({ values, lines, title, unit }, clock) {
+  const { values: all, columns: count, rows } = values;
+  return { title, unit, xLabel: clock.label, lines: lines.map((line, k) => ({ ...line,
+    y: Float64Array.from({ length: rows }, (_, i) => all[i * count + k]) })) };
+}
+
+async function build(host) {
+  const data = await readBlock(document.getElementById("payload").textContent);
+  units = data.units;
+  const clock = new Clock(data.time.values);
+  const player = data.bodies ? new Player(data, clock) : null;
+  const charts = data.charts.map((one) => new Chart(clock, columns(one, clock)));
+  const phases = data.phases.map(({ title, x, y }) => {
+    const [one, other] = [x, y].map(([chart, line]) => ({ unit: data.charts[chart].unit, ...charts[chart].lines[line] }));
+    return new Chart(clock, { title: `${title}: velocity [${other.unit}] over displacement [${one.unit}]`, xLabel: "",
+      height: 220, kind: "phase", lines: [{ name: "", colour: other.colour, x: one.y, y: other.y }] });
+  });
+  const maps = data.contact ? data.contact.faces.map((face) => new ContactMap(clock, data.contact, face,
+    data.maps?.von_mises ?? Array.from({ length: 64 }, (_, k) => [255 - 3 * k, 255 - 3 * k, 255]))) : [];
+  const energies = data.energies.map((one) => new Chart(clock, columns(one, clock)));
+  const all = [...charts, ...phases, ...maps, ...energies];
+  const resize = () => { for (const one of all) one.resize(); };
+  const timing = controls(data, clock, player, resize);
+  const nodes = (some) => some.map((one) => one.node);
+  host.append(head(data), el("main", {},
+    el("div.left", {}, el("section", {}, ...player ? [player.node] : [],
+    timing.bar, timing.more, ...player && data.contact ? [states(data.contact)] : []),
+    ...section("Contact", ...nodes(maps))),
+    el("div", {}, ...section("Histories", ...nodes(charts)),
+      ...section("Phase portraits", ...phases.length ? [el("div.grid", {}, ...nodes(phases))] : []),
+      ...section("Energies", ...nodes(energies), ...energies.length ? [el("p.legend", {}, data.balance)] : []),
+      ...player ? section("Modes", modesTable(data, player, timing)) : [])),
+  el("div.two", {}, ...section("Run", table([], data.facts)),
+    ...section("System", table([], data.system))),
+  ...cards("Study", data.study), foot(data));
+  const refresh = () => { player?.resize(); resize(); };
+  clock.watchers.push(() => { if (player && player.mode < 0) player.draw(); },
+    () => { for (const one of all) one.point(); });
+  refresh();
+  clock.set(clock.time);
+  ready(refresh);
+}

@@ -1,0 +1,158 @@
+// What pages are made of: the clock, its controls, tables. All texts are put in as text only.
+
+// Units by their base, [factor, symbol] in ascending order, as the package shows numbers.
+let units;
+
+function quantity(value, unit, digits = 3) {
+  const fitting = units[unit].filter(([factor]) => abs(value) >= factor * (1 - 1e-9));
+  const [factor, symbol] = value ? fitting.at(-1) ?? units[unit][0] : [1, unit];
+  return `${+(value / factor).toPrecision(digits)} ${symbol}`;
+}
+
+class Clock {
+  constructor(times) {
+    this.watchers = [];
+    this.load(times);
+  }
+
+  load(times) {
+    const first = times[0], last = times.at(-1), end = max(abs(first), abs(last));
+    [this.unit, this.symbol] = units.s.filter(([factor]) => end >= factor).at(-1) ?? units.s[0];
+    this.times = times;
+    this.axis = times.map((time) => time / this.unit);
+    this.label = `time [${this.symbol}]`;
+    this.whole = last - first || 1;
+    this.range = [first, last];
+    this.put(first);
+  }
+
+  put(time) {
+    this.time = clamp(time, this.range[0], this.range[1]);
+    this.index = before(this.times, this.time + 1e-12 * abs(this.time));
+  }
+
+  set(time) {
+    this.put(time);
+    for (const watch of this.watchers) watch();
+    root.dataset.time = this.time;
+  }
+
+  shown() { return this.range.map((time) => time / this.unit); }
+
+  window() { return [before(this.times, this.range[0]), before(this.times, this.range[1])]; }
+
+  // A part of the run about the current time; the whole by a factor of infinity.
+  show(factor) {
+    const [first, last] = [this.times[0], this.times.at(-1)];
+    const reach = min(last - first, max((this.range[1] - this.range[0]) * factor,
+      4 * (last - first) / this.times.length));
+    const begin = clamp(this.time - 0.5 * reach, first, last - reach);
+    this.range = [begin, begin + reach];
+  }
+}
+
+const field = (label, node) => el("label", {}, label, node);
+
+function table(headings, rows, className = "plain") {
+  const line = (cells, tag) => el("tr", {}, ...cells.map((text) => el(tag, {}, text)));
+  return el("div.scroll", {}, el(`table.${className}`, {},
+    ...headings.length ? [el("thead", {}, line(headings, "th"))] : [],
+    el("tbody", {}, ...rows.map((row) => line(row, "td")))));
+}
+
+function section(title, ...children) {
+  return children.length ? [el("section", {}, el("h2", {}, title), ...children)] : [];
+}
+
+function head(data) {
+  return el("header", {}, el("h1", {}, data.title),
+    el(data.good ? "p.good" : "p.bad", {}, data.status),
+    ...data.notes.map((note) => el("p.note", {}, note)));
+}
+
+function slider(ariaLabel, min, max, value, oninput) {
+  return el("input", { type: "range", step: "any", min, max, value, ariaLabel, oninput });
+}
+
+// `lap` is how many seconds the whole takes at the middle of the slider.
+function controls(data, clock, player, resize, lap = 12) {
+  const play = el("button.play", { textContent: "▶", ariaLabel: "play" });
+  const now = el("output"), pace = el("output");
+  const timing = { on: false, toggle() {
+    timing.on = !timing.on;
+    play.textContent = timing.on ? "❚❚" : "▶";
+    play.ariaLabel = timing.on ? "pause" : "play";
+  } };
+  let last = 0;
+  const span = () => clock.range[1] - clock.range[0];
+  const scrub = slider("time", 0, 1000, 0, () => clock.set(clock.range[0] + scrub.value / 1000 * span()));
+  scrub.className = "scrub";
+  clock.watchers.push(() => {
+    now.textContent = `${(clock.time / clock.unit).toFixed(2)} ${clock.symbol}`;
+    scrub.value = 1000 * (clock.time - clock.range[0]) / span();
+    pace.textContent = `${quantity(speed(), "s", 2)} per s`;
+  });
+  const speeds = slider("speed", -3, 2, 0, () => clock.set(clock.time));
+  const speed = () => clock.whole / lap * 10 ** speeds.value;
+  play.onclick = timing.toggle;
+  window.onkeydown = (event) => {
+    if (/INPUT|SELECT|BUTTON/.test(event.target.tagName)) return;
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (event.key === " ") { event.preventDefault(); timing.toggle(); }
+    if (step) clock.set(clock.times[clamp(clock.index + step, 0, clock.times.length - 1)]);
+  };
+  const closer = (textContent, factor, title) => el("button", { textContent, title,
+    onclick() { clock.show(factor); resize(); clock.set(clock.time); } });
+  timing.bar = el("div.controls", {}, play, scrub, now,
+    closer("+", 0.5, "shorter time"), closer("−", 2, "longer time"));
+  timing.more = el("div.controls", {}, field("speed", speeds), pace);
+  if (player) addPlayer(data, player, timing.more);
+  const frame = (at) => {
+    const passed = min(0.1, (at - last) / 1000);
+    last = at;
+    if (timing.on && player?.mode >= 0) {
+      player.phase += 5 * passed;
+      player.draw();
+    } else if (timing.on) {
+      const next = clock.time + passed * speed();
+      clock.set(next > clock.range[1] ? clock.range[0] : next);
+    }
+    if (timing.on && player) root.dataset.frame = player.cost.toFixed(2);
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+  return timing;
+}
+
+function addPlayer(data, player, more) {
+  const factor = el("output"), { paints } = data.bodies, given = Math.log(data.scale);
+  const colour = el("select", { ariaLabel: "colour", onchange() { player.paint = colour.value; player.draw(); } },
+    ...paints.map((name) => el("option", {}, name)));
+  const magnify = slider("deformation", min(0, given), max(2.3, given + 2.3), given, () => {
+    player.scale = Math.exp(magnify.value);
+    player.swing = player.scale / data.scale;
+    factor.textContent = `${+player.scale.toPrecision(2)} ×`;
+    player.draw();
+  });
+  magnify.oninput();
+  const arrows = el("input", { type: "checkbox", checked: true,
+    onchange() { player.arrows = arrows.checked; player.draw(); } });
+  more.append(field("deformation", magnify), factor, field("colour", colour),
+    ...data.contact ? [field("forces", arrows)] : []);
+}
+
+function cards(title, sections) {
+  return section(title, ...sections.length ? [el("div.cards", {}, ...sections.map(({ name, rows }) =>
+    el("div", {}, ...name ? [el("h3", {}, `[${name}]`)] : [], table([], rows))))] : []);
+}
+
+function foot(data) {
+  return el("footer", {}, data.versions.map((pair) => pair.join(" ")).join(" · "));
+}
+
+function ready(refresh) {
+  let width = innerWidth;
+  window.onresize = () => { if (innerWidth !== width) { width = innerWidth; refresh(); } };
+  dark.onchange = () => location.reload();
+  root.dataset.ready = round(performance.now());
+}

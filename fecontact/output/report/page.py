@@ -1,0 +1,93 @@
+"""One HTML file that holds its data, styles and script, and asks no network for anything."""
+
+import base64
+import hashlib
+import re
+import warnings
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from fecontact.core.errors import ModelWarning
+from fecontact.core.files.atomic_write import write_text
+
+Kind = Literal["run", "branches", "sweep"]
+# In the order in which they need each other; together one script.
+_COMMON = ("payload.js", "chart.js", "widgets.js")
+SCRIPTS: Mapping[Kind, tuple[str, ...]] = {
+    "run": (*_COMMON, "map.js", "player.js", "run.js", "start.js"),
+    "branches": (*_COMMON, "player.js", "branches.js", "start.js"),
+    "sweep": (*_COMMON, "sweep.js", "start.js"),
+}
+_COMMENTS = re.compile(r"^\s*//.*$", re.MULTILINE)
+_LITERALS = re.compile(r"""("(?:\\.|[^"\\])*"|`(?:\\.|[^`\\])*`)""")
+# Beside these letters no blank matters, unless a + or a - meets another.
+_BLANKS = re.compile(r"\s*([{}()\[\];,:?=*/<>&|!%])\s*|(?<![-+]) *([-+]) *(?![-+ ])")
+_INDENTS = re.compile(r"\n\s*")
+_SHORTER = tuple((re.compile(pattern), instead) for pattern, instead in (
+    (r"\bconst\b", "let"), (r";}", "}"), (r"\((\w+)\)=>", r"\1=>"), (r"(?<![\w.])0\.(?=\d)", ".")))
+LARGE = 20e6  # bytes of a file that mail and browsers take without complaint
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" \
+content="default-src 'none'; script-src 'sha256-{seal}'; style-src 'sha256-{style_seal}'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<noscript><p>This report needs JavaScript.</p></noscript>
+<script type="text/plain" id="payload">{block}</script>
+<script type="module">{script}</script>
+</body>
+</html>
+"""
+
+
+def script(kind: Kind) -> str:
+    """The script of a page, without comments and needless letters."""
+    text = _COMMENTS.sub("", "\n".join(_asset(name) for name in SCRIPTS[kind]))
+    return "".join(_INDENTS.sub("\n", part) if part[0] in "\"`" else _shortened(part)
+                   for part in _LITERALS.split(text) if part)
+
+
+def _shortened(code: str) -> str:
+    code = _BLANKS.sub(r"\1\2", code)
+    for pattern, instead in _SHORTER:
+        code = pattern.sub(instead, code)
+    return code
+
+
+def page(title: str, block: str, kind: Kind = "run") -> str:
+    """A page with a block of data.
+
+    All text of a study lies in the block, which has no letters that HTML knows, and is written by
+    the script as text; the policy of the page runs no other script and loads nothing.
+    """
+    code, style = script(kind), _asset("report.css")
+    return _PAGE.format(title=escape(title), style=style, block=block, script=code,
+                        seal=_seal(code), style_seal=_seal(style))
+
+
+def write_page(path: Path, title: str, block: str, kind: Kind = "run") -> Path:
+    """Write a page, whole or not at all; a ModelWarning tells of a file that is large."""
+    text = page(title, block, kind)
+    if len(text) > LARGE:
+        warnings.warn(f"{path} has {len(text) / 1e6:.0f} MB, which browsers open slowly; store "
+                      f"fewer outputs of the run, or report a part of it.", ModelWarning,
+                      stacklevel=3)
+    write_text(path, text)
+    return path
+
+
+def _asset(name: str) -> str:
+    return (files("fecontact.output.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _seal(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")

@@ -1,0 +1,190 @@
+"""The report of a run: one HTML page to play, read and send."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.analysis.histories import Point
+from fecontact.analysis.run_facts import notes, run_facts
+from fecontact.core.checks import as_path, require_kind, require_scale
+from fecontact.core.errors import InputError
+from fecontact.core.units import UNITS
+from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.output.files.case import library_versions
+from fecontact.output.render.frames_data import Motion
+from fecontact.output.render.scene import COLOUR_MAPS
+from fecontact.output.report.bodies import Motions, bodies_table
+from fecontact.output.report.charts import chart_tables, energy_charts
+from fecontact.output.report.contact import contact_table, ground_table
+from fecontact.output.report.page import write_page
+from fecontact.output.report.payload import Payload
+
+_SHADES = 64  # of a colour map
+_NOT_OF_RUNS = ("branch", "sweep", "wear", "preload", "render", "output")  # sections of a study
+
+
+def report(
+    run: Trajectory, path: str | Path, *, title: str | None = None, study: str | None = None,
+    points: Sequence[Point] = (), scale: float | None = None,
+    versions: Mapping[str, str] | None = None,
+) -> Path:
+    """Write a run as one HTML file that opens in any browser, without a network.
+
+    It plays the deformed bodies with stress, contact states and forces at all output times, shakes
+    their modes, and shows linked histories, phase portraits, contact maps and energies, the study,
+    warnings and versions. Displacements, stresses and forces are shown to within 1e-4 of their
+    largest values. A basis without shapes over the body gives a report without bodies.
+
+    Parameters
+    ----------
+    run : Trajectory
+        The run; ``run.between(t_start, t_end)`` for a part of it.
+    path : str or Path
+        The .html file; it is replaced if it exists.
+    title : str, optional
+        Heading; the name of the file by default.
+    study : str, optional
+        The study that described the run, as TOML text.
+    points : sequence of str, int or (x, y)
+        Points of histories and phase portraits, as for :func:`fecontact.plot.plot_history`.
+    scale : float, optional
+        Magnification of displacements to begin with; one that makes them visible by default.
+    versions : mapping, optional
+        Versions of the programs that computed the run; those installed by default.
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        For another suffix, a point that does not exist, or a file that cannot be written.
+
+    Warns
+    -----
+    ModelWarning
+        For a file above 20 MB.
+    """
+    require_kind("report", Trajectory, run=run)
+    path = require_page(as_path(path, "a report"))
+    title = path.stem if title is None else title
+    return write_page(path, title, run_block(run, title, study, points, scale, versions))
+
+
+def run_block(
+    run: Trajectory, title: str, study: str | None = None, points: Sequence[Point] = (),
+    scale: float | None = None, versions: Mapping[str, str] | None = None,
+) -> str:
+    """The data of the report of a run; see :func:`report`."""
+    require_kind("report", Sequence, points=points)
+    if isinstance(points, str):
+        raise InputError(f"report: points = {points!r} must be several points, such as ['B', 0].")
+    if scale is not None:
+        require_scale("report", scale)
+    payload = Payload()
+    found, told = _finite(run), [*notes(run), *run.limits_exceeded]
+    if len(found.time) < len(run.time):
+        told.append(f"Only the first {len(found.time)} of {len(run.time)} output times have a "
+                    f"motion of finite numbers.")
+    system = found.system
+    drawn = system.basis.mode_shapes is not None
+    if not drawn:
+        told.append("The modal basis holds no shapes over the body, so that no body is drawn.")
+    motion = Motion(found, np.arange(len(found.time)), given_scale=scale) if drawn else None
+    charts, phases = chart_tables(found, points, payload)
+    header: dict[str, Any] = {
+        "format": 1,
+        "title": title,
+        "status": found.status.value,
+        "good": found.status in (Status.FINISHED, Status.EVENT),
+        "notes": told,
+        "facts": [list(row) for row in _facts(run, found)],
+        "system": [list(row) for row in system.summary()],
+        "study": study_tables(study),
+        "versions": list(map(list, (versions or library_versions()).items())),
+        "time": payload.add(found.time, 1e-9 * float(np.ptp(found.time) or 1.0)),
+        "charts": charts, "phases": phases, "energies": energy_charts(found, payload),
+        "balance": f"error of the energy balance: {found.energies.imbalance:.1e} of the largest "
+                   f"term",
+        "units": UNITS,
+        "contact": contact_table(found, motion, payload) if system.basis.contact_nodes else None,
+    }
+    if motion is not None:
+        motions = Motions(system.basis, found.modal_coordinates)
+        header |= {
+            "bodies": bodies_table(motions, payload),
+            "coordinates": payload.add(found.modal_coordinates, motions.coordinate_steps()),
+            "ground": ground_table(motion, payload),
+            "scale": motion.scale, "box": list(motion.box),
+            "maps": colour_maps(),
+        }
+    return payload.block(header)
+
+
+def study_tables(study: str | None) -> list[dict[str, Any]]:
+    """Sections of a study that matter for a run, with their keys and values as text.
+
+    Sections of sections have dotted names; keys without a value are left out.
+    """
+    found: list[dict[str, Any]] = []
+
+    def collect(name: str, table: Mapping[str, Any]) -> None:
+        rows = [[key, text] for key, value in table.items()
+                if not isinstance(value, dict) and (text := _text(value))]
+        if rows:
+            found.append({"name": name, "rows": rows})
+        for key, value in table.items():
+            if isinstance(value, dict):
+                collect(f"{name}.{key}" if name else key, value)
+
+    tables = tomllib.loads(study or "")
+    collect("", {name: table for name, table in tables.items() if name not in _NOT_OF_RUNS})
+    found.sort(key=lambda section: not section["name"])
+    return found
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    if isinstance(value, list):
+        return ", ".join(map(_text, value))
+    return str(value)
+
+
+def _finite(run: Trajectory) -> Trajectory:
+    """The run up to its last state of finite numbers."""
+    bad = np.flatnonzero(~np.isfinite(run.states).all(axis=1))
+    if not len(bad):
+        return run
+    end = int(bad[0])
+    if end < 2:
+        raise InputError("The run has no motion to report: its numbers are not finite.")
+    return run.between(None, float(run.time[end - 1]))
+
+
+def _facts(run: Trajectory, found: Trajectory) -> list[tuple[str, str]]:
+    return run_facts(replace(found, statistics=run.statistics))
+
+
+def colour_maps() -> dict[str, list[list[int]]]:
+    """Colours of displacement, von Mises stress and signed components, from 0 to 255."""
+    from matplotlib import colormaps
+
+    at = np.linspace(0.0, 1.0, _SHADES)
+    return {what: np.asarray(colormaps[name](at, bytes=True))[:, :3].astype(int).tolist()
+            for what, name in {**COLOUR_MAPS, "component": "coolwarm"}.items()}
+
+
+def require_page(path: Path) -> Path:
+    """The path of a page; InputError for another suffix."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path} must end in .html: a report is a page.")
+    return path

@@ -1,0 +1,120 @@
+"""The report of a sweep: a page with a map whose cells show their case."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.checks import as_path, require_kind
+from fecontact.core.errors import InputError
+from fecontact.core.units import UNITS, suitable_unit
+from fecontact.output.files.case import library_versions
+from fecontact.output.report.page import write_page
+from fecontact.output.report.payload import Payload
+from fecontact.output.report.run_report import colour_maps, require_page, study_tables
+from fecontact.sweeps.summaries import unit_of
+from fecontact.sweeps.table import SweepTable, is_numeric
+from fecontact.system.parameter_labels import parameter_label
+
+
+def report_sweep(
+    table: SweepTable, path: str | Path, *, title: str | None = None, study: str | None = None
+) -> Path:
+    """Write a sweep as one HTML file with a map of its cases; a click on a cell shows its case.
+
+    Axes and colour are chosen on the page among all parameters and summaries. A case is shown by
+    its parameters and summaries, with the reason of its failure or its warning.
+
+    Parameters
+    ----------
+    table : SweepTable
+        The sweep.
+    path : str or Path
+        The .html file; it is replaced if it exists.
+    title : str, optional
+        Heading; the name of the file by default.
+    study : str, optional
+        The study, as TOML text.
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        For a sweep without cases, another suffix, or a file that cannot be written.
+    """
+    require_kind("report_sweep", SweepTable, table=table)
+    path = require_page(as_path(path, "a report"))
+    if not len(table):
+        raise InputError("The sweep has no cases to report.")
+    title, payload = path.stem if title is None else title, Payload()
+    columns = [_parameter(name, values) for name, values in table.parameters.items()]
+    varied = [k for k, column in enumerate(columns) if len(set(column["values"])) > 1] or [0]
+    columns += [_summary(name, values) for name, values in table.values.items()]
+    first = min(len(table.parameters), len(columns) - 1)
+    failed, missing = len(table.failed), len(table.missing)
+    names = [column.get("labels") for column in columns]
+    header: dict[str, Any] = {
+        "format": 1, "title": title, "units": UNITS, "cases": len(table),
+        "status": f"{len(table)} cases, {failed} failed, {missing} not computed",
+        "good": not failed and not missing,
+        "notes": [],
+        "facts": [list(row) for row in table.summary()],
+        "columns": columns,
+        "start": [varied[0], varied[1] if len(varied) > 1 else first, first],
+        "told": "; ".join(f"{column['title']}: {', '.join(f'{k} {one}' for k, one in marked)}"
+                          for column, labels in zip(columns, names, strict=True)
+                          if labels and (marked := list(enumerate(labels)))),
+        "headings": ["case", *table.parameters, *table.values, "failed because", "warning"],
+        "rows": [_row(table, case) for case in range(len(table))],
+        "shades": colour_maps()["displacement"],
+        "study": study_tables(study),
+        "versions": list(map(list, library_versions().items())),
+    }
+    return write_page(path, title, payload.block(header), "sweep")
+
+
+def _parameter(name: str, values: Sequence[Any]) -> dict[str, Any]:
+    """A column of a parameter; texts and tables are numbered, geometric series by their powers."""
+    if not is_numeric(values):
+        texts = [str(value) for value in values]
+        labels = list(dict.fromkeys(texts))
+        return {"title": name, "values": [labels.index(text) for text in texts], "labels": labels}
+    found = sorted({float(value) for value in values})
+    if len(found) > 2 and found[0] > 0.0 and np.ptp(np.diff(np.log(found))) < 1e-6:
+        return {"title": f"log10 of {parameter_label(name)}",
+                "values": [math.log10(value) for value in values]}
+    return {"title": parameter_label(name), "values": [float(value) for value in values]}
+
+
+def _summary(name: str, values: Any) -> dict[str, Any]:
+    """A column of a summary in a suitable unit; null where it is missing."""
+    known, unit = values[np.isfinite(values)], unit_of(name)
+    factor, symbol = 1.0, unit
+    if unit in UNITS and len(known):
+        factor, symbol = suitable_unit(float(np.abs(known).max()), unit)
+    shown = name.replace("_", " ")
+    return {"title": f"{shown} [{symbol}]" if symbol else shown,
+            "values": [float(value) / factor if math.isfinite(value) else None
+                       for value in values]}
+
+
+def _row(table: SweepTable, case: int) -> list[str]:
+    """What is told of a case, in the order of the headings."""
+    def text(value: Any) -> str:
+        return f"{value:.7g}" if isinstance(value, float) else str(value)
+
+    summaries = []
+    for name, values in table.values.items():
+        value = float(values[case])
+        unit = unit_of(name)
+        summaries.append(f"{text(value)} {unit}".strip() if math.isfinite(value) else "")
+    reason = table.reasons[case]
+    return [f"{case}", *(text(values[case]) for values in table.parameters.values()), *summaries,
+            "not computed" if reason is None else reason,
+            table.warnings[case] if table.warnings else ""]

@@ -1,0 +1,44 @@
+"""What a report shows, read from its file."""
+
+import re
+
+import numpy as np
+
+from fecontact.output.report.payload import stored_array, unpacked
+
+
+class Shown:
+    """The data of a page: its header, and its arrays by what the header says of them."""
+
+    def __init__(self, path):
+        self.text = path.read_text(encoding="utf-8")
+        block = re.search(r'id="payload">([A-Za-z0-9+/=]+)</script>', self.text).group(1)
+        self.header, self._content = unpacked(block)
+
+    def array(self, *names):
+        found = self.header
+        for name in names:
+            found = found[name]
+        return stored_array(found, self._content)
+
+    @property
+    def displacement(self):
+        """(N, P, d) of the nodes at all times."""
+        return np.einsum("pcm,tm->tpc", self.array("bodies", "shapes"), self.array("coordinates"))
+
+    @property
+    def stress(self):
+        """(N, P) von Mises stress of plane bodies."""
+        names = self.header["bodies"]["components"]
+        parts = dict.fromkeys(("xx", "yy", "zz", "xy"), 0.0) | dict(zip(names, np.moveaxis(
+            np.einsum("pcm,tm->tpc", self.array("bodies", "stress"), self.array("coordinates")),
+            2, 0), strict=True))
+        xx, yy, zz, xy = parts.values()
+        return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2)
+
+    @property
+    def forces(self):
+        """(N, n, 2) on the contact nodes along x and y."""
+        contact = self.header["contact"]
+        return (self.array("contact", "normal")[..., None] * np.array(contact["normals"])
+                + self.array("contact", "along")[..., None] * np.array(contact["tangents"]))
