@@ -11,12 +11,12 @@ from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, suitable_unit
 from fecontact.output.files.case import library_versions
+from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 from fecontact.output.report.run_report import colour_maps, require_page, study_tables
 from fecontact.sweeps.summaries import unit_of
 from fecontact.sweeps.table import SweepTable, is_numeric
-from fecontact.system.parameter_labels import parameter_label
 
 
 def report_sweep(

@@ -15,12 +15,12 @@ from fecontact.core.types import Array
 from fecontact.core.units import UNITS, count, round_125, suitable_unit
 from fecontact.output.files.case import library_versions
 from fecontact.output.plots.bifurcation_diagram import LETTERS, stable_pieces
+from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.plots.style import distinct_colours
 from fecontact.output.report.bodies import Motions, bodies_table
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import SMALLEST, Payload
 from fecontact.output.report.run_report import colour_maps, require_page, study_tables
-from fecontact.system.parameter_labels import parameter_label
 
 _SAMPLES = 129  # of an orbit, both ends included
 _ORBITS = 240  # of all branches together
