@@ -1,0 +1,52 @@
+"""Sphinx extension: equations become MathML when the site is built.
+
+Browsers draw MathML themselves, so that pages need neither scripts nor fonts. The converter is that
+of docutils; what it does not know is a warning, as anything else that goes wrong.
+"""
+
+import re
+from typing import Any
+
+from docutils import nodes
+from docutils.utils.math import MathError
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util import logging
+from sphinx.util.math import get_node_equation_number
+
+LOGGER = logging.getLogger(__name__)
+# The converter knows sizes of opening and closing delimiters only.
+SIZE = re.compile(r"\\([bB]igg?)(?=\s*([][()|]))")
+
+
+def mathml(node: nodes.Node, block: bool) -> str:
+    """MathML of an equation."""
+    text = node.astext().strip()
+    try:
+        return tex2mathml(SIZE.sub(
+            lambda found: rf"\{found[1]}{'r' if found[2] in ')]' else 'l'}", text), as_block=block)
+    except MathError as problem:
+        LOGGER.warning("equation %r: %s", text, problem, location=node)
+        return ""
+
+
+def inline(writer: Any, node: nodes.math) -> None:
+    """Write an equation within a line."""
+    writer.body.append(mathml(node, block=False))
+    raise nodes.SkipNode
+
+
+def displayed(writer: Any, node: nodes.math_block) -> None:
+    """Write an equation of its own, with its number if it has one."""
+    writer.body.append(writer.starttag(node, "div", CLASS="equation"))
+    if node["number"]:
+        number = get_node_equation_number(writer, node)
+        writer.body.append(f'<span class="eqno">({number})</span>')
+    writer.body.append(mathml(node, block=True))
+    writer.body.append("</div>")
+    raise nodes.SkipNode
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Sphinx calls this."""
+    app.add_html_math_renderer("mathml", (inline, None), (displayed, None))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
