@@ -94,11 +94,11 @@ def completed(text: str, space: str) -> str:
 
 
 BARS = re.compile(r"(``.*?``|:math:`.*?`)|(\|)")
+INITIAL = re.compile(r"^(\s*)([A-Z])\. ")
 
 
-def escape_bars(app: Any, what: str, name: str, thing: Any, options: Any,
-                lines: list[str]) -> None:
-    """Bars of absolute values are no substitutions, outside of literals and equations."""
+def escape(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Bars of absolute values are no substitutions, initials of authors no numbers of a list."""
     depth = None  # of the equation that the line is in
     for number, line in enumerate(lines):
         indent = len(line) - len(line.lstrip())
@@ -107,7 +107,8 @@ def escape_bars(app: Any, what: str, name: str, thing: Any, options: Any,
         if line.lstrip().startswith(".. math::"):
             depth = indent
         if depth is None:
-            lines[number] = BARS.sub(lambda found: found[1] or r"\|", line)
+            line = BARS.sub(lambda found: found[1] or r"\|", line)
+            lines[number] = INITIAL.sub(r"\1\\\2. ", line)
 
 
 def find(app: Any, env: Any, node: Any, content: Any) -> Any:
@@ -130,6 +131,6 @@ def find(app: Any, env: Any, node: Any, content: Any) -> Any:
 
 def setup(app: Any) -> dict[str, bool]:
     """Sphinx calls this."""
-    app.connect("autodoc-process-docstring", escape_bars)
+    app.connect("autodoc-process-docstring", escape)
     app.connect("missing-reference", find)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
