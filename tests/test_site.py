@@ -1,6 +1,7 @@
 """The site builds without warnings, links lead somewhere, tutorials run, examples have pages."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -84,16 +85,88 @@ def test_tutorial_runs(name, tmp_path, monkeypatch):
     text = page.read_text(encoding="utf-8")
     shown = tutorials.with_results(text, given, name, tmp_path / "pictures")
     assert shown.count("](pictures/") == sum("png" in one for one in given)
-    if name in SAYS:
-        printed = "".join(one["printed"] + one.get("text", "") for one in given)
-        SAYS[name](printed)
+    SAYS[name]("".join(one["printed"] + one.get("text", "") for one in given))
     pytest.importorskip("jupytext", reason="notebooks need jupytext")
     book = json.loads(tutorials.notebook(text, given))
     code = [cell for cell in book["cells"] if cell["cell_type"] == "code"]
     assert len(code) == len(given) > 0
 
 
-SAYS = {}
+def numbers(pattern, printed):
+    return [float(text) for text in re.findall(pattern, printed)]
+
+
+def says_own_mesh(printed):
+    assert numbers(r"([\d.]+) mm2", printed) == [892.5]
+    assert numbers(r"([\d.]+) N on the face", printed) == [500.0]
+    assert "The run reached its end." in printed
+
+
+def says_squeal(printed):
+    predicted, found = numbers(r"([\d.]+) 1/s, a run grows by", printed) + numbers(
+        r"grows by ([\d.]+) 1/s", printed)
+    assert found == pytest.approx(predicted, rel=0.05)
+
+
+def says_bifurcation_diagram(printed):
+    # As printed by Sextro: 7.09 and 8.09; a run outside of the unstable orbit meets the stable one.
+    assert numbers(r"Hopf at B = ([\d.]+)", printed)[1] == pytest.approx(7.09, abs=0.005)
+    assert numbers(r"doubling at B = ([\d.]+)", printed)[0] == pytest.approx(8.09, abs=0.005)
+    stable, inside, outside = numbers(r"stable orbit ([\d.]+) m\n", printed) + numbers(
+        r"amplitude ([\d.]+) m", printed)
+    assert outside == pytest.approx(stable, rel=1e-3)
+    assert inside < 0.1 * stable
+
+
+def says_set_valued(printed):
+    differences = numbers(r"differs by ([\d.]+)%", printed)
+    assert len(differences) == 4
+    assert differences == sorted(differences, reverse=True)
+    assert differences[-1] < 2.0
+
+
+def says_which_integrator(printed):
+    errors = numbers(r"error ([\d.e-]+),", printed)
+    assert len(errors) == 3
+    assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
+    assert numbers(r"([\d.e-]+) of the range", printed)[0] < 1e-6
+
+
+def says_friction_law(printed):
+    ratios = numbers(r"damping ratio ([+-][\d.]+)", printed)
+    assert len(ratios) == 4
+    # Slow modes of a mass of 1 kg: (b + mu' F) / (2 sqrt(c m)).
+    slopes = numbers(r"slope +(-?[\d.]+) s/m", printed)
+    for ratio, slope in zip(ratios, slopes, strict=True):
+        assert ratio == pytest.approx((4.0 + 20.0 * slope) / (2.0 * 4000.0**0.5), abs=2e-3)
+
+
+def says_basis(printed):
+    for tolerance, missing in zip((30.0, 10.0, 3.0), numbers(
+            r"coordinates, ([\d.]+)% is missing", printed), strict=True):
+        assert missing <= tolerance
+    forces = numbers(r"modes: ([\d.]+) N", printed)
+    assert forces == pytest.approx([forces[-1]] * 3, rel=1e-3)
+
+
+def says_cluster(printed):
+    assert "failed: 0" in printed
+    assert "True" in printed
+
+
+def says_contact_stiffness(printed):
+    # u^2 = 2 R_Z F / c up to u = R_Z, F / c + R_Z / 2 above.
+    assert numbers(r"approach ([\d.]+) um", printed) == pytest.approx([15.0, 4.47, 1.41], abs=0.005)
+
+
+SAYS = {"own-mesh": says_own_mesh, "squeal": says_squeal, "basis": says_basis,
+        "bifurcation-diagram": says_bifurcation_diagram, "friction-law": says_friction_law,
+        "set-valued-or-smoothed": says_set_valued, "which-integrator": says_which_integrator,
+        "cluster": says_cluster, "contact-stiffness": says_contact_stiffness}
+
+
+def test_what_tutorials_say_is_checked():
+    assert sorted(SAYS) == TUTORIALS
 
 
 @pytest.mark.parametrize(("page", "problem"), [

@@ -19,7 +19,7 @@ import tutorials
 from runs import ROOT, Job, digest, run_all
 
 DOCS = ROOT / "docs"
-OUTSIDE = re.compile(r"\]\((?:\.\./)+([^)#]+)")
+OUTSIDE = re.compile(r"\]\(((?:\.\./)+[^)#]+)")
 
 
 def tell(text: str) -> None:
@@ -44,8 +44,9 @@ def stage(source: Path, folders: dict[str, Path]) -> None:
             continue
         text = path.read_text(encoding="utf-8")
         for linked in OUTSIDE.findall(text):
-            if not (DOCS / linked).exists():
-                tutorials.write(source.parent / linked, (ROOT / linked).read_bytes())
+            target = (path.parent / linked).resolve()
+            if not target.is_relative_to(DOCS) and target.is_file():
+                tutorials.write(source.parent / target.relative_to(ROOT), target.read_bytes())
         if path.parent.name == "tutorials" and path.stem != "index":
             folder = folders.get(path.stem)
             given = None if folder is None else tutorials.results(folder)
@@ -104,7 +105,7 @@ def main(folder: Path, runs: bool = True) -> int:
     tell(f"examples and tutorials: {time.perf_counter() - start:.0f} s")
     source, pages = folder / "source" / "docs", folder / "html"
     stage(source, folders)
-    if sphinx(["-W", "--keep-going", "-q", "-b", "html", "-d", str(folder / "doctrees"),
+    if sphinx(["-W", "--keep-going", "-q", "-E", "-a", "-j", "2", "-b", "html", "-d", str(folder / "doctrees"),
                str(source), str(pages)]):
         return 1
     wrong = list(check_links.problems(pages))
