@@ -48,7 +48,7 @@ def stage(source: Path, folders: dict[str, Path]) -> None:
             if not target.is_relative_to(DOCS) and target.is_file():
                 tutorials.write(source.parent / target.relative_to(ROOT), target.read_bytes())
         if path.parent.name == "tutorials" and path.stem != "index":
-            folder = folders.get(path.stem)
+            folder = folders.get(f"tutorial/{path.stem}")
             given = None if folder is None else tutorials.results(folder)
             put(f"tutorials/notebooks/{path.stem}.ipynb",
                 tutorials.notebook(text, given).encode())
@@ -67,10 +67,9 @@ def stage(source: Path, folders: dict[str, Path]) -> None:
         tutorials.write(source.parent / "examples" / path.name, path.read_bytes())
     for names in gallery.GROUPS.values():
         for name in names:
-            put(f"gallery/{name}.md", gallery.page(name, folders.get(name)).encode())
+            put(f"gallery/{name}.md", gallery.page(name, folders.get(f"example/{name}")).encode())
     put("gallery/index.md", gallery.index(folders).encode())
-    gallery.copy_results({name: folder for name, folder in folders.items()
-                          if folder.parent.name == "example"}, source / "_static")
+    gallery.copy_pictures(folders, source / "_static")
     for path in source.rglob("*.md"):
         if path not in wanted:
             path.unlink()
@@ -90,7 +89,7 @@ def all_jobs() -> list[Job]:
 
 def kept_results(jobs: list[Job], kept: Path) -> dict[str, Path]:
     """Results that are there without running anything."""
-    folders = {job.name: kept / job.kind / f"{job.name}-{digest(job)}" for job in jobs}
+    folders = {job.key: kept / job.kind / f"{job.name}-{digest(job)}" for job in jobs}
     return {name: folder for name, folder in folders.items() if folder.exists()}
 
 

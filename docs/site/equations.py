@@ -14,13 +14,15 @@ from sphinx.util import logging
 from sphinx.util.math import get_node_equation_number
 
 LOGGER = logging.getLogger(__name__)
+# An index of an accented letter belongs beside it, not below.
+ACCENT = re.compile(r"(\\(?:dd?ot|bar|tilde|hat)\s*(?:[a-zA-Z]|\{[^{}]*\}))(?=\s*[_^])")
 # The converter knows sizes of opening and closing delimiters only.
 SIZE = re.compile(r"\\([bB]igg?)(?=\s*([][()|]))")
 
 
 def mathml(node: nodes.Node, block: bool) -> str:
     """MathML of an equation."""
-    text = node.astext().strip()
+    text = ACCENT.sub(r"{\1}", node.astext().strip())
     try:
         return tex2mathml(SIZE.sub(
             lambda found: rf"\{found[1]}{'r' if found[2] in ')]' else 'l'}", text), as_block=block)

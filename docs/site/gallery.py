@@ -9,6 +9,7 @@ from pathlib import Path
 from runs import ROOT, Job, python, with_imports
 
 EXAMPLES = ROOT / "examples"
+DOCS = ROOT / "docs"
 GROUPS = {
     "Squeal and stick-slip": (
         "squeal", "disc_and_pads", "beam_stick_slip", "friction_oscillator", "two_mass_friction",
@@ -21,6 +22,10 @@ GROUPS = {
     "Own laws, other programs, many computers": (
         "own_law", "from_other_programs", "sweep_on_dask"),
 }
+# Pictures of the long form, of what the short one shows too little.
+WHOLE = {"beam_stick_slip": "beam_stick_slip.png", "impact_orbits": "impact_orbits.png",
+         "two_mass_friction": "two_masses_over_B.png",
+         "impact_map": "validation/impact-bifurcation.png"}
 USAGE = re.compile(r"^Usage: (.*(?:\n.+)*)", re.MULTILINE)
 
 
@@ -58,10 +63,12 @@ def page(name: str, folder: Path | None) -> str:
     """The page of an example; without results it shows the source alone."""
     title, rest = words(name)
     parts = [f"# {title}", rest]
-    for picture in made(folder, "png"):
-        parts.append(f'<img src="../_static/gallery/{name}/{picture.name}" '
-                     f'alt="{html.escape(picture.stem.replace("_", " ").replace("-", " "))}" '
-                     'loading="lazy">')
+    pictures = made(folder, "png")
+    if name in WHOLE:
+        parts.append(image(name, DOCS / "images" / WHOLE[name]))
+        if pictures:
+            parts.append("With `--quick` the example draws")
+    parts += [image(name, picture) for picture in pictures]
     for movie in made(folder, "mp4"):
         parts.append(f'<video src="../_static/gallery/{name}/{movie.name}" controls loop muted '
                      'style="max-width: 100%"></video>')
@@ -75,13 +82,20 @@ def page(name: str, folder: Path | None) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def image(name: str, picture: Path) -> str:
+    """A picture of an example within its page."""
+    said = html.escape(picture.stem.replace("_", " ").replace("-", " "))
+    return (f'<img src="../_static/gallery/{name}/{picture.name}" alt="{said}" loading="lazy">')
+
+
 def card(name: str, folder: Path | None) -> str:
     """What the gallery shows of an example."""
     title, _ = words(name)
     pictures = made(folder, "png")
-    if pictures:
-        largest = max(pictures, key=lambda path: path.stat().st_size)
-        top = f'<img src="../_static/gallery/{name}/{largest.name}" alt="" loading="lazy">'
+    if pictures or name in WHOLE:
+        shown = (Path(WHOLE[name]) if name in WHOLE
+                 else max(pictures, key=lambda path: path.stat().st_size))
+        top = f'<img src="../_static/gallery/{name}/{shown.name}" alt="" loading="lazy">'
     else:
         text = "" if folder is None else (folder / "printed.txt").read_text(encoding="utf-8")
         if not text:
@@ -98,17 +112,21 @@ def index(folders: dict[str, Path]) -> str:
              "built. Each takes a folder for its pictures; without `--quick` it computes the whole "
              "picture."]
     for group, names in GROUPS.items():
-        cards = "\n".join(card(name, folders.get(name)) for name in names)
+        cards = "\n".join(card(name, folders.get(f"example/{name}")) for name in names)
         parts.append(f'## {group}\n\n<div class="gallery">\n{cards}\n</div>')
-        entries = "\n".join(names)
+        entries = "\n".join(f"{words(name)[0].split(':')[0]} <{name}>" for name in names)
         parts.append(f"```{{toctree}}\n:hidden:\n\n{entries}\n```")
     return "\n\n".join(parts) + "\n"
 
 
-def copy_results(folders: dict[str, Path], static: Path) -> None:
+def copy_pictures(folders: dict[str, Path], static: Path) -> None:
     """Copy pictures and movies to where the pages look for them."""
-    for name, folder in folders.items():
-        target = static / "gallery" / name
-        target.mkdir(parents=True, exist_ok=True)
-        for path in (*made(folder, "png"), *made(folder, "mp4")):
-            shutil.copy2(path, target / path.name)
+    shutil.rmtree(static / "gallery", ignore_errors=True)
+    for names in GROUPS.values():
+        for name in names:
+            folder, target = folders.get(f"example/{name}"), static / "gallery" / name
+            target.mkdir(parents=True)
+            for path in (*made(folder, "png"), *made(folder, "mp4")):
+                shutil.copy2(path, target / path.name)
+            if name in WHOLE:
+                shutil.copy2(DOCS / "images" / WHOLE[name], target / Path(WHOLE[name]).name)

@@ -30,6 +30,11 @@ class Job:
     sources: tuple[Path, ...]
     kind: str
 
+    @property
+    def key(self) -> str:
+        """An example and a tutorial may have one name."""
+        return f"{self.kind}/{self.name}"
+
 
 @cache
 def package_digest() -> str:
@@ -92,11 +97,11 @@ def run(job: Job, cache_folder: Path, tell: Callable[[str], None]) -> Path:
 
 def run_all(jobs: Iterable[Job], cache_folder: Path, tell: Callable[[str], None]
             ) -> dict[str, Path]:
-    """Folders of the results of jobs by name; two processes run at a time."""
+    """Folders of the results of jobs by kind and name; two processes run at a time."""
     jobs = list(jobs)
     with ThreadPoolExecutor(2) as pool:
         folders = pool.map(lambda job: run(job, cache_folder, tell), jobs)
-        return {job.name: folder for job, folder in zip(jobs, folders, strict=True)}
+        return {job.key: folder for job, folder in zip(jobs, folders, strict=True)}
 
 
 def python(*arguments: str) -> tuple[str, ...]:
