@@ -223,7 +223,13 @@ def check_bodies(names, printed, folder):
     assert 4500.0 < float(lines[-1]) < 5000.0
 
 
-CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
+def check_start(names, printed, folder):
+    assert printed.strip() == "The run reached its end."
+    assert names["run"].energies.imbalance < 1e-4
+    assert (folder / "history.png").stat().st_size > 5000
+
+
+CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis, "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,

@@ -104,8 +104,8 @@ def main(folder: Path, runs: bool = True) -> int:
     tell(f"examples and tutorials: {time.perf_counter() - start:.0f} s")
     source, pages = folder / "source" / "docs", folder / "html"
     stage(source, folders)
-    if sphinx(["-W", "--keep-going", "-q", "-E", "-a", "-j", "2", "-b", "html", "-d", str(folder / "doctrees"),
-               str(source), str(pages)]):
+    if sphinx(["-W", "--keep-going", "-q", "-E", "-a", "-j", "2", "-b", "html",
+               "-d", str(folder / "doctrees"), str(source), str(pages)]):
         return 1
     wrong = list(check_links.problems(pages))
     for line in wrong:

@@ -51,9 +51,9 @@ def problems(site: Path) -> Iterator[str]:
             target = path if not parts.path else (path.parent / unquote(parts.path)).resolve()
             if not target.exists():
                 yield f"{name}: {link} is not there"
-            elif parts.fragment and target in pages:
-                if unquote(parts.fragment) not in pages[target].targets:
-                    yield f"{name}: {link} has no such place"
+            elif (parts.fragment and target in pages
+                  and unquote(parts.fragment) not in pages[target].targets):
+                yield f"{name}: {link} has no such place"
     for path in sorted(site.rglob("*.css")):
         text = path.read_text(encoding="utf-8")
         for start in ("url(http", "url('http", 'url("http', "url(//", "@import"):

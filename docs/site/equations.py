@@ -22,7 +22,7 @@ SIZE = re.compile(r"\\([bB]igg?)(?=\s*([][()|]))")
 
 def mathml(node: nodes.Node, block: bool) -> str:
     """MathML of an equation."""
-    text = ACCENT.sub(r"{\1}", node.astext().strip())
+    text = ACCENT.sub(r"\1{}", node.astext().strip())
     try:
         return tex2mathml(SIZE.sub(
             lambda found: rf"\{found[1]}{'r' if found[2] in ')]' else 'l'}", text), as_block=block)

@@ -64,13 +64,16 @@ def summary(space: str, name: str) -> str:
     if directive(thing) == "autodata":
         return ALIASES.get(name, "A constant.")
     first = " ".join((inspect.getdoc(thing) or "").split("\n\n")[0].split())
-    return re.sub(r":\w+:`~?(?:[\w.]+\.)?(\w+)`", r"`\1`", first).replace("``", "`")
+    return re.sub(r":\w+:`~?(?:[\w.]+\.)?(\w+)`", r"`\1`", first).replace("``", "`").replace(
+        "|", r"\|")
 
 
 def table(space: str) -> str:
     """Markdown table of all names of a namespace, with links to their entries."""
-    rows = [f"| {{any}}`{name} <{space}.{name}>` | {summary(space, name).replace('|', chr(92) + '|')} |"
-            for name in names_of(space)]
+    def row(name: str) -> str:
+        return f"| {{any}}`{name} <{space}.{name}>` | {summary(space, name)} |"
+
+    rows = [row(name) for name in names_of(space)]
     return "\n".join(["| name | |", "|---|---|", *rows]) + "\n"
 
 
