@@ -229,7 +229,8 @@ def check_start(names, printed, folder):
     assert (folder / "history.png").stat().st_size > 5000
 
 
-CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis, "laws.md": check_laws,
+CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
+          "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,

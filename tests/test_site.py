@@ -14,7 +14,7 @@ TUTORIALS = sorted(path.stem for path in (SITE.parent / "tutorials").glob("*.md"
 
 
 def need_sphinx():
-    for name in ("sphinx", "myst_parser", "furo", "jupytext"):
+    for name in ("sphinx", "myst_parser", "furo", "jupytext", "ziamath"):
         pytest.importorskip(name, reason=f"the site needs {name}: pip install 'fecontact[docs]'")
 
 

@@ -1,10 +1,12 @@
 """Looks into the built pages: do links lead somewhere, and does nothing come from a network?"""
 
+import re
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+URL = re.compile(r"""url\(["']?([^"')]+)""")
 # Attributes by which a page loads something while it is shown.
 LOADED = {("link", "href"), ("script", "src"), ("img", "src"), ("video", "src"),
           ("source", "src"), ("iframe", "src"), ("object", "data"), ("embed", "src")}
@@ -56,6 +58,8 @@ def problems(site: Path) -> Iterator[str]:
                 yield f"{name}: {link} has no such place"
     for path in sorted(site.rglob("*.css")):
         text = path.read_text(encoding="utf-8")
-        for start in ("url(http", "url('http", 'url("http', "url(//", "@import"):
-            if start in text:
-                yield f"{path.relative_to(site)} loads from elsewhere: {start}"
+        for link in URL.findall(text):
+            if re.match(r"(\w+:)?//", link):
+                yield f"{path.relative_to(site)} loads from elsewhere: {link}"
+            elif not link.startswith("data:") and not (path.parent / link).exists():
+                yield f"{path.relative_to(site)}: {link} is not there"

@@ -1,10 +1,13 @@
 """Sphinx extension: equations become MathML when the site is built.
 
-Browsers draw MathML themselves, so that pages need neither scripts nor fonts. The converter is that
-of docutils; what it does not know is a warning, as anything else that goes wrong.
+Browsers draw MathML themselves, so that pages need no scripts. The converter is that of docutils;
+what it does not know is a warning, as anything else that goes wrong. The font, STIX Two Math under
+the SIL Open Font License, comes with ziamath and is copied into the site: few systems have one.
 """
 
 import re
+from importlib.resources import as_file, files
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -48,7 +51,20 @@ def displayed(writer: Any, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+def copy_font(app: Any) -> None:
+    """Put the font where the stylesheet looks for it, compressed."""
+    from fontTools.ttLib import TTFont
+
+    target = Path(app.srcdir) / "_static" / "STIXTwoMath.woff"
+    if not target.exists():
+        with as_file(files("ziamath") / "fonts" / "STIXTwoMath-Regular.ttf") as path:
+            font = TTFont(path)
+            font.flavor = "woff"
+            font.save(target)
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Sphinx calls this."""
+    app.connect("builder-inited", copy_font)
     app.add_html_math_renderer("mathml", (inline, None), (displayed, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
