@@ -12,9 +12,10 @@ import re
 from functools import cache
 from typing import Any
 
-NAMESPACES = ("fecontact", *(f"fecontact.{name}" for name in (
-    "laws", "fem", "reduction", "integrate", "analysis", "bifurcation", "study", "sweeps", "plot",
-    "io")))
+import fecontact
+
+NAMESPACES = ("fecontact", *(f"fecontact.{name}" for name in fecontact.__all__
+                             if inspect.ismodule(getattr(fecontact, name))))
 HEADING = re.compile(r"^### (.+)$", re.MULTILINE)
 OPTIONS = {"autoclass": "   :members:\n", "autofunction": "", "autodata": "   :no-value:\n",
            "autoexception": ""}
