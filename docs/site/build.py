@@ -63,11 +63,12 @@ def stage(source: Path, folders: dict[str, Path]) -> None:
             else:
                 text = public_names.completed(text, space_of(path.stem))
         put(name, text.encode())
-    for path in (DOCS.parent / "examples").glob("*.py"):
+    for path in gallery.EXAMPLES.glob("*.*"):
         tutorials.write(source.parent / "examples" / path.name, path.read_bytes())
     for names in gallery.GROUPS.values():
         for name in names:
             put(f"gallery/{name}.md", gallery.page(name, folders.get(f"example/{name}")).encode())
+    put("gallery/studies.md", gallery.studies().encode())
     put("gallery/index.md", gallery.index(folders).encode())
     gallery.copy_pictures(folders, source / "_static")
     for path in source.rglob("*.md"):

@@ -116,6 +116,18 @@ def index(folders: dict[str, Path]) -> str:
         parts.append(f'## {group}\n\n<div class="gallery">\n{cards}\n</div>')
         entries = "\n".join(f"{words(name)[0].split(':')[0]} <{name}>" for name in names)
         parts.append(f"```{{toctree}}\n:hidden:\n\n{entries}\n```")
+    parts.append("## Study files\n\n[Whole studies](studies.md) for the command line.\n\n"
+                 "```{toctree}\n:hidden:\n\nstudies\n```")
+    return "\n\n".join(parts) + "\n"
+
+
+def studies() -> str:
+    """A page with the study files; tests and other examples run them."""
+    parts = ["# Study files", "Each is a whole study for the command line; comments say what it "
+             "is and which command suits it. All keys are in the [reference](../study.md)."]
+    parts += [f"## {path.stem.replace('_', ' ').capitalize()}\n\n"
+              f"```{{literalinclude}} ../../examples/{path.name}\n:language: toml\n```"
+              for path in sorted(EXAMPLES.glob("*.toml"))]
     return "\n\n".join(parts) + "\n"
 
 
