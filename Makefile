@@ -8,7 +8,7 @@ ALL    := $(VENV)/.compiled
 SYSTEM := $(VENV)/.system-libraries
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-slow check bench validation clean
+.PHONY: help setup demo test test-fast test-slow check bench docs validation clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
@@ -34,6 +34,9 @@ check: $(READY) ## ruff and mypy
 
 bench: $(READY) $(ALL) $(SYSTEM) ## run the benchmarks
 	@for file in benchmarks/[a-z]*.py; do echo "$$file"; $(BIN)/python "$$file" || exit 1; done
+
+docs: $(READY) $(ALL) $(SYSTEM) ## build the site into build/site/html
+	@$(BIN)/python docs/site/build.py
 
 validation: $(READY) $(ALL) $(SYSTEM) ## compute docs/validation.md and its pictures again
 	@$(BIN)/python docs/validation/build.py

@@ -20,8 +20,8 @@ from fecontact.study import Span
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-PAGES = {path.name: path for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md",
-                                      *sorted(DOCS.glob("*.md")))}
+PAGES = {path.name: path for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md")} | {
+    path.relative_to(DOCS).as_posix(): path for path in sorted(DOCS.rglob("*.md"))}
 TEXTS = {name: path.read_text() for name, path in PAGES.items()}
 BLOCK = re.compile(r"(?:<!-- not run: (?P<reason>[^>]+) -->\n)?```(?P<language>\w*)\n"
                    r"(?P<text>.*?)```", re.DOTALL)
@@ -236,7 +236,14 @@ def check_report(names, printed, folder):
     assert part.array("time")[[0, -1]] == pytest.approx([0.5, 0.8])
 
 
-CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": check_laws,
+def check_start(names, printed, folder):
+    assert printed.strip() == "The run reached its end."
+    assert names["run"].energies.imbalance < 1e-4
+    assert (folder / "history.png").stat().st_size > 5000
+
+
+CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
+          "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,
@@ -245,7 +252,9 @@ CHECKS = {"README.md": check_readme, "analysis.md": check_analysis, "laws.md": c
 
 
 def test_every_page_with_code_is_known():
-    assert {page for page in PAGES if blocks(page, "python")} == set(CHECKS)
+    """Those of tutorials are run by test_site.py."""
+    assert {page for page in PAGES if blocks(page, "python")
+            and not page.startswith("tutorials/")} == set(CHECKS)
 
 
 @pytest.mark.parametrize("page", CHECKS)
@@ -330,7 +339,10 @@ def test_scripts_and_targets_of_the_pages_exist():
 def test_links_of_the_pages_lead_somewhere():
     for page, text in TEXTS.items():
         for target in re.findall(r"\]\(([^)#:]+)\)", text):
-            assert (PAGES[page].parent / target).exists(), (page, target)
+            path = PAGES[page].parent / target
+            if path.parent.name == "gallery":              # made of the examples
+                path = ROOT / "examples" / f"{path.stem}.py"
+            assert path.exists() or path.stem == "index", (page, target)
 
 
 def test_what_is_not_run_has_a_reason():

@@ -86,11 +86,17 @@ class Impacts:
 class Rest(NamedTuple):
     """Rest after chatter: a lasting contact with vanishing velocity.
 
-    touch_down : touch-down of the lasting contact [s]
-    at_rest : time from which the velocity stays small [s]
-    lift_off : end of the contact [s]; NaN if the run ends before
-    impacts : number of touch-downs since the previous rest or the start of the run, including
-        that of the lasting contact
+    Attributes
+    ----------
+    touch_down : float
+        Touch-down of the lasting contact [s].
+    at_rest : float
+        Time from which the velocity stays small [s].
+    lift_off : float
+        End of the contact [s]; NaN if the run ends before.
+    impacts : int
+        Number of touch-downs since the previous rest or the start of the run, including that of
+        the lasting contact.
     """
 
     touch_down: float

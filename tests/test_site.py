@@ -1,0 +1,187 @@
+"""The site builds without warnings, links lead somewhere, tutorials run, examples have pages."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from site_modules import SITE, site_module
+
+TUTORIALS = sorted(path.stem for path in (SITE.parent / "tutorials").glob("*.md")
+                   if path.stem != "index")
+
+
+def need_sphinx():
+    for name in ("sphinx", "myst_parser", "furo", "jupytext", "ziamath"):
+        pytest.importorskip(name, reason=f"the site needs {name}: pip install 'fecontact[docs]'")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site without what examples and tutorials give, which other tests run."""
+    need_sphinx()
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run([sys.executable, str(SITE / "build.py"), str(folder), "--without-runs"],
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "html"
+
+
+def test_site_builds_without_warnings_and_links_lead_somewhere(site):
+    assert (site / "index.html").exists()
+    assert list(site_module("check_links").problems(site)) == []
+
+
+def test_equations_are_mathml(site):
+    text = (site / "theory" / "contact.html").read_text(encoding="utf-8")
+    assert text.count("<math") > 10
+    assert not re.search(r"<script[^>]*(mathjax|katex)", text, re.IGNORECASE)
+
+
+def test_every_public_name_has_an_entry(site):
+    names = site_module("public_names")
+    for space in names.NAMESPACES:
+        page = (site / "reference" / f"{space.rpartition('.')[2]}.html").read_text(encoding="utf-8")
+        for name in names.names_of(space):
+            assert f'id="{space}.{name}"' in page
+
+
+def test_notebooks_are_offered(site):
+    pytest.importorskip("nbformat", reason="needs nbformat")
+    import nbformat
+
+    found = sorted(path.stem for path in (site / "_downloads").rglob("*.ipynb"))
+    assert found == TUTORIALS
+    for path in (site / "_downloads").rglob("*.ipynb"):
+        nbformat.validate(nbformat.read(path, as_version=4))
+
+
+def test_gallery_shows_every_example():
+    gallery = site_module("gallery")
+    shown = [name for names in gallery.GROUPS.values() for name in names]
+    assert sorted(shown) == sorted(path.stem for path in gallery.EXAMPLES.glob("*.py"))
+
+
+def test_page_of_an_example_shows_what_it_gave(tmp_path):
+    gallery, runs = site_module("gallery"), site_module("runs")
+    job = next(job for job in gallery.jobs() if job.name == "stacked_blocks")
+    told = []
+    folder = runs.run(job, tmp_path, told.append)
+    assert "matching meshes" in gallery.page("stacked_blocks", folder)
+    assert len(told) == 1
+    assert runs.run(job, tmp_path, told.append) == folder  # what is kept is not run again
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("name", TUTORIALS)
+def test_tutorial_runs(name, tmp_path, monkeypatch):
+    run_blocks, tutorials = site_module("run_blocks"), site_module("tutorials")
+    page = SITE.parent / "tutorials" / f"{name}.md"
+    monkeypatch.chdir(tmp_path)
+    run_blocks.main(str(page), "results.json")
+    given = tutorials.results(tmp_path)
+    text = page.read_text(encoding="utf-8")
+    shown = tutorials.with_results(text, given, name, tmp_path / "pictures")
+    assert shown.count("](pictures/") == sum("png" in one for one in given)
+    SAYS[name]("".join(one["printed"] + one.get("text", "") for one in given))
+    pytest.importorskip("jupytext", reason="notebooks need jupytext")
+    book = json.loads(tutorials.notebook(text, given))
+    code = [cell for cell in book["cells"] if cell["cell_type"] == "code"]
+    assert len(code) == len(given) > 0
+
+
+def numbers(pattern, printed):
+    return [float(text) for text in re.findall(pattern, printed)]
+
+
+def says_own_mesh(printed):
+    assert numbers(r"([\d.]+) mm2", printed) == [892.5]
+    assert numbers(r"([\d.]+) N on the face", printed) == [500.0]
+    assert "The run reached its end." in printed
+
+
+def says_squeal(printed):
+    predicted, found = numbers(r"([\d.]+) 1/s, a run grows by", printed) + numbers(
+        r"grows by ([\d.]+) 1/s", printed)
+    assert found == pytest.approx(predicted, rel=0.05)
+
+
+def says_bifurcation_diagram(printed):
+    # As printed by Sextro: 7.09 and 8.09; a run outside of the unstable orbit meets the stable one.
+    assert numbers(r"Hopf at B = ([\d.]+)", printed)[1] == pytest.approx(7.09, abs=0.005)
+    assert numbers(r"doubling at B = ([\d.]+)", printed)[0] == pytest.approx(8.09, abs=0.005)
+    stable, inside, outside = numbers(r"stable orbit ([\d.]+) m\n", printed) + numbers(
+        r"amplitude ([\d.]+) m", printed)
+    assert outside == pytest.approx(stable, rel=1e-3)
+    assert inside < 0.1 * stable
+
+
+def says_set_valued(printed):
+    differences = numbers(r"differs by ([\d.]+)%", printed)
+    assert len(differences) == 4
+    assert differences == sorted(differences, reverse=True)
+    assert differences[-1] < 2.0
+
+
+def says_which_integrator(printed):
+    errors = numbers(r"error ([\d.e-]+),", printed)
+    assert len(errors) == 3
+    assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
+    assert numbers(r"([\d.e-]+) of the range", printed)[0] < 1e-6
+
+
+def says_friction_law(printed):
+    ratios = numbers(r"damping ratio ([+-][\d.]+)", printed)
+    assert len(ratios) == 4
+    # Slow modes of a mass of 1 kg: (b + mu' F) / (2 sqrt(c m)).
+    slopes = numbers(r"slope +(-?[\d.]+) s/m", printed)
+    for ratio, slope in zip(ratios, slopes, strict=True):
+        assert ratio == pytest.approx((4.0 + 20.0 * slope) / (2.0 * 4000.0**0.5), abs=2e-3)
+
+
+def says_basis(printed):
+    for tolerance, missing in zip((30.0, 10.0, 3.0), numbers(
+            r"coordinates, ([\d.]+)% is missing", printed), strict=True):
+        assert missing <= tolerance
+    forces = numbers(r"modes: ([\d.]+) N", printed)
+    assert forces == pytest.approx([forces[-1]] * 3, rel=1e-3)
+
+
+def says_cluster(printed):
+    assert "failed: 0" in printed
+    assert "True" in printed
+
+
+def says_contact_stiffness(printed):
+    # u^2 = 2 R_Z F / c up to u = R_Z, F / c + R_Z / 2 above.
+    assert numbers(r"approach ([\d.]+) um", printed) == pytest.approx([15.0, 4.47, 1.41], abs=0.005)
+
+
+SAYS = {"own-mesh": says_own_mesh, "squeal": says_squeal, "basis": says_basis,
+        "bifurcation-diagram": says_bifurcation_diagram, "friction-law": says_friction_law,
+        "set-valued-or-smoothed": says_set_valued, "which-integrator": says_which_integrator,
+        "cluster": says_cluster, "contact-stiffness": says_contact_stiffness}
+
+
+def test_what_tutorials_say_is_checked():
+    assert sorted(SAYS) == TUTORIALS
+
+
+@pytest.mark.parametrize(("page", "problem"), [
+    ('<a href="b.html">', "a.html: b.html is not there"),
+    ('<a href="#x">', "a.html: #x has no such place"),
+    ('<img src="https://example.org/x.png">', "a.html loads https://example.org/x.png"),
+    ('<script src="//example.org/x.js"></script>', "a.html loads //example.org/x.js"),
+    ('<link href="http://example.org/x.css">', "a.html loads http://example.org/x.css"),
+    ('<a href="https://example.org">', None), ('<p id="x"><a href="a.html#x">', None),
+])
+def test_what_is_wrong_with_a_page_is_found(page, problem, tmp_path):
+    Path(tmp_path / "a.html").write_text(page)
+    assert list(site_module("check_links").problems(tmp_path)) == ([problem] if problem else [])
+
+
+def test_stylesheets_from_elsewhere_are_found(tmp_path):
+    (tmp_path / "a.css").write_text("@font-face { src: url(https://example.org/x.woff2) }")
+    assert len(list(site_module("check_links").problems(tmp_path))) == 1
