@@ -17,7 +17,7 @@ from .ground.motion import GroundMotion, HarmonicSpeed, SpeedRamp
 from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .ground.sliding import SlidingRotation, SlidingTranslation
-from .normal.bilateral import BilateralCubic, BilateralPiecewise, BilateralPlay
+from .normal.bilateral import BilateralCubic, BilateralLaw, BilateralPiecewise, BilateralPlay
 from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .normal.measured_surface import MeasuredSurface
 from .normal.power import BackBurdekinContact, PowerContact, RestitutionContact
@@ -34,6 +34,7 @@ __all__ = [
     "ArchardWear",
     "BackBurdekinContact",
     "BilateralCubic",
+    "BilateralLaw",
     "BilateralPiecewise",
     "BilateralPlay",
     "BoucWenFriction",

@@ -2,7 +2,7 @@ from .assembly.assembled_basis import PointPairing, assembled_basis
 from .assembly.bodies_convergence import BodiesConvergence, bodies_convergence
 from .assembly.face_weld import FaceWeld
 from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
-from .assembly.links import Bushing, Hinge, Spring, Weld, linked
+from .assembly.links import Bushing, Hinge, NonlinearSpring, Spring, Weld, linked
 from .assembly.nonlinear_springs import CubicSpring, PiecewiseSpring, PlaySpring
 from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
@@ -26,6 +26,7 @@ __all__ = [
     "ModalRotation",
     "ModeConvergence",
     "ModeShapes",
+    "NonlinearSpring",
     "Normalisation",
     "PiecewiseSpring",
     "PlaySpring",

@@ -42,7 +42,7 @@ def load_history(
     """Load a system quasi-statically along a path, with friction that keeps its history.
 
     At each point the equilibrium of body, drive springs, normal law at rest and friction is solved;
-    :class:`~fecontact.system.quasistatic.history.LoadHistory` says with which friction.
+    :class:`~fecontact.system.LoadHistory` says with which friction.
 
     Parameters
     ----------
