@@ -1,6 +1,7 @@
 from .bodies_section import BodyBasisSettings, BodySections, InterfaceSettings, Placement, Reduced
 from .convergence import study_convergence
 from .geometry_section import MeshFile
+from .links_section import FaceWeldSettings
 from .preload_section import PreloadSettings
 from .sections import (
     BasisSettings,
@@ -18,6 +19,7 @@ __all__ = [
     "BodySections",
     "BodySettings",
     "Distribution",
+    "FaceWeldSettings",
     "InterfaceSettings",
     "MeshFile",
     "OutputSettings",
