@@ -133,8 +133,27 @@ def find(app: Any, env: Any, node: Any, content: Any) -> Any:
     return None
 
 
+def narrow(app: Any, doctree: Any) -> None:
+    """Names and types of parameters mean what is public, or the class's own, not any attribute."""
+    from sphinx.addnodes import pending_xref
+
+    for node in doctree.findall(pending_xref):
+        if node.get("refdomain") == "py" and "refspecific" in node:
+            del node["refspecific"]  # its being there counts, whatever its value
+            if node["reftype"] == "class":
+                node["py:class"] = None
+
+
+def borrowed(app: Any, what: str, name: str, thing: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out members that another library puts into classes, such as setters of figures."""
+    module = getattr(thing, "__module__", None) or ""
+    return True if module.partition(".")[0] == "matplotlib" else None
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Sphinx calls this."""
     app.connect("autodoc-process-docstring", escape)
+    app.connect("autodoc-skip-member", borrowed)
+    app.connect("doctree-read", narrow)
     app.connect("missing-reference", find)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
