@@ -19,7 +19,7 @@ from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.state import Control, Output, Problem, progress_for, room_for
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
-from fecontact.integrate.rodas5p.variational import Vary, variation_for
+from fecontact.integrate.rodas5p.variational import Vary, propagate, variation_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
@@ -124,7 +124,8 @@ def start(
         Vary(above.arrays, below.arrays, width, variation_for(
             columns, m, n, states, width, float(vary_rtol or _LOOSER * rtol),
             1.0 if vary_rtol else _FADED),
-             np.zeros((len(times) if vary else 0, columns, len(state)))),
+             np.zeros((len(times) if vary else 0, columns, len(state))),
+             propagate.address if vary else 0),
         watch_for(system, events, bool(vary)))
 
 

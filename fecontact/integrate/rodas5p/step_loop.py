@@ -38,7 +38,7 @@ from fecontact.integrate.rodas5p.state import (
     Step,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
-from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, propagate
+from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, propagate_at
 from fecontact.laws.signatures import signal_at
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, powers
 
@@ -387,7 +387,7 @@ def advance(held_problem, held_progress, held_room, held_output, held_vary, held
             continue
         if error <= 1.0 and varies:
             set_scale(control, progress, room)
-            error = max(error, propagate(step, problem, progress, room, vary)
+            error = max(error, propagate_at(vary.propagate)(step, problem, progress, room, vary)
                         / vary.variation.tolerance)
         factor = _growth(error)
         if not error <= 1.0:

@@ -18,7 +18,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, borrowed, f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import (
+    block,
+    borrowed,
+    compile_law,
+    f8,
+    function_at,
+    helper,
+    i8,
+    matrix,
+    vector,
+)
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
@@ -182,7 +192,7 @@ class Vary(NamedTuple):
 
     ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
     with width = 0 no parameter varies. ``transitions`` (N, k, size) holds, for each output time,
-    the columns since the one before.
+    the columns since the one before. ``propagate`` is the address of :data:`propagate`.
     """
 
     above: Any
@@ -190,9 +200,13 @@ class Vary(NamedTuple):
     width: float
     variation: Variation
     transitions: Array
+    propagate: int
 
 
-VARY = types.NamedTuple([SYSTEM, SYSTEM, f8, VARIATION, block], Vary)
+VARY = types.NamedTuple([SYSTEM, SYSTEM, f8, VARIATION, block, i8], Vary)
+_PROPAGATE = f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM,
+                VARY)
+propagate_at = function_at(_PROPAGATE)
 
 
 def variation_for(
@@ -252,9 +266,7 @@ def _largest_error(scale, v):
     return largest
 
 
-@kernel(types.f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM,
-                 VARY))
-def propagate(step, held_problem, held_progress, held_room, held_vary):
+def _propagate(step, held_problem, held_progress, held_room, held_vary):
     """Carry the columns over the step whose stages and factors the room holds.
 
     Returns the largest error of a column in units of its size, or of the part ``faded`` of the
@@ -307,6 +319,10 @@ def propagate(step, held_problem, held_progress, held_room, held_vary):
         else:
             columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
     return _largest_error(room.right, v)
+
+
+# By its address: runs without derivatives do not need it compiled.
+propagate = compile_law(_PROPAGATE, "propagate(step, problem, progress, room, vary)", _propagate)
 
 
 @helper
