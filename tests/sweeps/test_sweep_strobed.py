@@ -40,7 +40,7 @@ def test_published_regimes_and_the_numbers_of_ensembles(study, tmp_path):
     table = sweep(study, executor=Serial(), folder=tmp_path / "f")
     # one, two, higher periodic (four in the two-mode model), chaotic
     assert table.values["periods"].tolist() == [1.0, 2.0, 4.0, 0.0]
-    different = [len(np.unique(row.round(8))) for row in table.strobed]
+    different = [1 + int((np.diff(np.sort(row)) > 1e-7).sum()) for row in table.strobed]
     assert different[:3] == [1, 2, 4]
     assert different[3] > 40
     system = study.with_(**{"drive.angular_frequency": 30.84}).system()
