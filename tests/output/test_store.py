@@ -83,6 +83,48 @@ def test_stretched_body_has_its_axial_stress_as_von_mises_stress(tmp_path):
         np.testing.assert_allclose(stress, expected, rtol=1e-6)
 
 
+def test_vtk_reads_velocity_contact_state_and_cell_stress(tmp_path):
+    body = basis(LENGTH, HEIGHT, columns=20, rows=2)
+    trajectory = run(body, times=31)
+    write_case(tmp_path / "case.vtkhdf", trajectory, frames=31)
+    reader, times = open_by_vtk(tmp_path / "case.vtkhdf")
+    x, y = body.mode_shapes.nodes.T
+    bottom = y == 0.0
+    # Patches of a fifth of the face belong to each of the five contact nodes.
+    owner = np.clip((x[bottom] / LENGTH * 5.0 + 1e-9).astype(int), 0, 4)
+    cells = np.repeat(0.5 * (np.unique(x)[:-1] + np.unique(x)[1:])[None], 2, axis=0).ravel()
+    heights = np.repeat([0.25 * HEIGHT, 0.75 * HEIGHT], 20) - 0.5 * HEIGHT
+    k = np.pi / LENGTH
+    assert set(trajectory.contact_state.ravel().tolist()) == {0, 1, 2}
+    for number in (0, 5, 12, 30):
+        reader.UpdateTimeStep(times[number])
+        grid = reader.GetOutputDataObject(0)
+        q, rate = trajectory.modal_coordinates[number], trajectory.modal_velocities[number]
+        bend, stretch = rate[3], rate[4]
+        expected = np.column_stack([
+            rate[0] - rate[2] * (y - 0.5 * HEIGHT) + stretch * (2.0 * x / LENGTH - 1.0)
+            - bend * (y - 0.5 * HEIGHT) * k * np.sin(k * (x - 0.5 * LENGTH)),
+            rate[1] + rate[2] * (x - 0.5 * LENGTH)
+            + bend * (0.5 - np.cos(k * (x - 0.5 * LENGTH))), 0 * x])
+        np.testing.assert_allclose(point_data(grid, "velocity"), expected, rtol=1e-6, atol=1e-10)
+        states = point_data(grid, "contact_state")
+        assert states.dtype == np.int8
+        assert (states[~bottom] == -1).all()
+        assert np.array_equal(states[bottom], trajectory.contact_state[number][owner])
+        stress = vtk_to_numpy(grid.GetCellData().GetArray("stress"))
+        assert stress.shape == (40, 6)  # which ParaView calls XX, YY, ZZ, XY, YZ, XZ
+        # The mean of the two corners' cosines.
+        ends = np.cos(k * (cells - 0.5 * LENGTH)) * np.cos(0.5 * k * LENGTH / 20.0)
+        np.testing.assert_allclose(
+            stress[:, 0], YOUNGS_MODULUS * (2.0 / LENGTH * q[4] - heights * k**2 * ends * q[3]),
+            rtol=1e-5, atol=1.0)
+        assert not stress[:, 1:].any()
+    with h5py.File(tmp_path / "case.vtkhdf") as file:
+        names = file["VTKHDF/CellData/stress"].attrs["component_names"]
+        assert names.tolist() == ["xx", "yy", "zz", "xy", "yz", "xz"]
+        assert file["VTKHDF/PointData/velocity"].attrs["unit"] == "m/s"
+
+
 @pytest.mark.parametrize(("components", "expected"), [
     ((3e6, 0.0, 0.0, 0.0), 3e6), ((0.0, -3e6, 0.0, 0.0), 3e6), ((0.0, 0.0, 3e6, 0.0), 3e6),
     ((0.0, 0.0, 0.0, 2e6), 2e6 * np.sqrt(3.0)), ((5e6, 5e6, 5e6, 0.0), 0.0),

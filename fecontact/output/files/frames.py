@@ -88,6 +88,15 @@ def von_mises(field: ModeShapes, q: Array) -> Array:
     return np.sqrt(square)
 
 
+def cell_stress(field: ModeShapes, q: Array) -> Array:
+    """Stresses (F, M, 4) xx, yy, zz, xy of the cells, means of their corners [Pa]."""
+    count, corners = field.cells.shape
+    modes = field.stress.shape[2]
+    # Corner by corner: all at once would hold the stress of each cell several times.
+    mean = sum(field.stress[field.cells[:, corner]] for corner in range(corners)) / corners
+    return np.asarray(q @ mean.reshape(4 * count, modes).T).reshape(len(q), count, 4)
+
+
 def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
     """Forces (F, n, 2) of the other side on the contact nodes, along x and y [N].
 
@@ -124,6 +133,21 @@ def nodal_contact_force(trajectory: Trajectory, which: Any = slice(None)) -> Arr
     moments = np.zeros((*forces.shape[:2], 1))
     spread = rows.T @ np.concatenate([forces, moments], axis=2).reshape(len(forces), 3 * n).T
     return np.asarray(spread).T.reshape(len(forces), len(field.nodes), 2)
+
+
+def contact_owners(field: ModeShapes, n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Mesh nodes (k,) of the contact faces, and the contact node (k,) that each belongs to.
+
+    It is the one of the n contact nodes in whose motion the mesh node has the largest part. Where
+    two bodies meet, the nodes of both faces have one.
+    """
+    rows = abs(field.restriction.tocsr()[6 : 6 + 3 * n]).tocoo()
+    moves = rows.row % 3 < 2  # not by rotation, which takes part of all its neighbours
+    owner, node, part = rows.row[moves] // 3, rows.col[moves] // 2, rows.data[moves]
+    order = np.lexsort((part, node))
+    order = order[part[order] > 1e-9]
+    last = np.flatnonzero(np.diff(node[order], append=-1))
+    return node[order][last].astype(np.intp), owner[order][last].astype(np.intp)
 
 
 def blocks(indices: NDArray[np.intp], nodes: int) -> list[NDArray[np.intp]]:
