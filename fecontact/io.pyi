@@ -1,6 +1,6 @@
 from .output.files.branches import read_branch, read_branches, write_branch, write_branches
 from .output.files.case import Case
-from .output.files.dataset import to_xarray
+from .output.files.dataset import to_pandas, to_xarray
 from .output.files.export import export_csv, export_fields, export_mat, export_netcdf
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
@@ -34,6 +34,7 @@ __all__ = [
     "report_branches",
     "report_frame",
     "report_sweep",
+    "to_pandas",
     "to_xarray",
     "write_basis",
     "write_branch",

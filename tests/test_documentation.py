@@ -70,6 +70,18 @@ def orbits_setup(folder):
     return names
 
 
+def results_setup(folder):
+    """The files of a run and of a sweep that the page reads."""
+    (folder / "study.toml").write_text(BELT.replace('contact_nodes = 2', 'contact_nodes = 5'))
+    study = Study.read(folder / "study.toml")
+    (folder / "results").mkdir()
+    fc.write_case(folder / "results" / "study.vtkhdf", study.with_(
+        **{"simulation.t_end": 4.0}).run(), frames=3, study=study.to_toml())
+    fc.sweep(study, {"ground.speed": [1e-3, 2e-3], "load.normal": [10.0, 14.0]},
+             summaries=["amplitude_x"], folder=folder / "results" / "study-sweep", workers=1)
+    return {}
+
+
 def sensitivity(names):
     """The table of a sweep for Sobol indices, of which the page speaks by then."""
     names["table"] = fc.sweep(
@@ -80,7 +92,8 @@ def sensitivity(names):
 
 BETWEEN = {("sweeps.md", 1): sensitivity}  # before this block of the page
 SETUP = {"laws.md": laws_setup, "sweeps.md": sweeps_setup, "orbits.md": orbits_setup,
-         "report.md": sweeps_setup}
+         "report.md": sweeps_setup,
+         "results.md": results_setup}
 
 
 def check_readme(names, printed, folder):
@@ -242,13 +255,30 @@ def check_start(names, printed, folder):
     assert (folder / "history.png").stat().st_size > 5000
 
 
+def check_results(names, printed, folder):
+    run, frame, data = names["run"], names["frame"], names["data"]
+    assert (run.time[0], names["late"].time[0]) == (0.0, 2.0)
+    assert names["case"].versions["numpy"] == np.__version__
+    slips = run.contact_state[:, 4] == fc.ContactState.SLIP
+    assert 0 < len(names["sliding"]) == slips.sum() < len(frame)
+    # What friction takes from the block is its force times the slip, at each node.
+    power = (data.friction_force * data.slip_velocity).sum("node")
+    assert float(power.integrate("time")) == pytest.approx(run.energies.friction[-1], rel=0.01)
+    assert printed.splitlines()[0] == "(101, 5) N"
+    assert printed.splitlines()[1].endswith("'xy', 'yz', 'xz'] Pa")
+    best = names["table"].to_xarray().amplitude_x
+    assert best.shape == (2, 2)
+    assert (best > 0.0).all()
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,
           "preload.md": check_preload, "rotation.md": check_rotation, "bodies.md": check_bodies,
-          "report.md": check_report}
+          "report.md": check_report,
+          "results.md": check_results}
 
 
 def test_every_page_with_code_is_known():

@@ -6,16 +6,21 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecontact.core.checks import as_path
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, MissingLibraryError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, html_table, listed, span
 from fecontact.sweeps.store import write_whole
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
 _SHOWN_CASES = 12  # in a notebook
@@ -130,6 +135,63 @@ class SweepTable(Summarised):
             raise InputError("The sweep is not a grid; its cases are columns of the table.")
         return self.column(name).reshape(self.shape)
 
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The table as a :class:`pandas.DataFrame`, one row per case.
+
+        Columns are those of the CSV file: key, parameters, summaries, status, reason and warning;
+        the index is the number of the case.
+
+        Raises
+        ------
+        MissingLibraryError
+            If pandas is not installed.
+        """
+        try:
+            from pandas import DataFrame, RangeIndex
+        except ImportError:
+            raise MissingLibraryError("pandas is not installed; install it with pip install "
+                                      "pandas.") from None
+        status = [_status(reason) for reason in self.reasons]
+        return DataFrame(
+            {"key": list(self.keys), **{name: list(column)
+                                        for name, column in self.parameters.items()},
+             **self.values, "status": status, "reason": [one or "" for one in self.reasons],
+             "warning": list(self.warnings) or [""] * len(self)},
+            index=RangeIndex(len(self), name="case"))
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The summaries of a grid as an :class:`xarray.Dataset` over the varied parameters.
+
+        ``table.to_xarray().amplitude.sel({"ground.speed": 2e-3}, method="nearest")``. Attributes
+        ``units`` are those of the summaries.
+
+        Raises
+        ------
+        InputError
+            If the sweep is not on a grid.
+        MissingLibraryError
+            If xarray is not installed.
+        """
+        try:
+            from xarray import DataArray, Dataset
+        except ImportError:
+            raise MissingLibraryError("xarray is not installed; install it with pip install "
+                                      "'fecontact[xarray]'.") from None
+        from fecontact.sweeps.summaries import unit_of
+
+        labels = {name: list(values) if is_numeric(values) else [_text(one) for one in values]
+                  for name, values in self.parameters.items()}
+        axes = {name: list(dict.fromkeys(values)) for name, values in labels.items()}
+        shape = tuple(map(len, axes.values()))
+        # Tables read from files do not tell whether they were grids.
+        if list(product(*axes.values())) != list(zip(*labels.values(), strict=True)):
+            raise InputError("The sweep is not a grid, so that it has no axes; its cases are rows "
+                             "of to_pandas().")
+        return Dataset({name: DataArray(values.reshape(shape), dims=tuple(axes),
+                                        attrs={"units": unit_of(name)})
+                        for name, values in self.values.items()},
+                       coords=axes)
+
     def write(self, path: str | Path) -> Path:
         """Write the table as CSV: case, key, parameters, summaries, status, reason, warning.
 
@@ -141,8 +203,7 @@ class SweepTable(Summarised):
         writer.writerow([*_BEFORE, *self.parameters, *self.values, *_AFTER])
         columns = [*self.parameters.values(), *(column.tolist() for column in self.values.values())]
         for k, (key, reason) in enumerate(zip(self.keys, self.reasons, strict=True)):
-            status = "missing" if reason is None else "failed" if reason else "finished"
-            writer.writerow([k, key, *(_text(column[k]) for column in columns), status,
+            writer.writerow([k, key, *(_text(column[k]) for column in columns), _status(reason),
                              reason or "", self.warnings[k] if self.warnings else ""])
         write_whole(Path(path), text.getvalue())
         if self.strobed is not None:
@@ -150,6 +211,10 @@ class SweepTable(Summarised):
                             for k, row in enumerate(self.strobed.tolist()))
             write_whole(_strobed_file(Path(path)), lines)
         return Path(path)
+
+
+def _status(reason: str | None) -> str:
+    return "missing" if reason is None else "failed" if reason else "finished"
 
 
 def _strobed_file(path: Path) -> Path:

@@ -1,6 +1,7 @@
 """Runs in other formats, read back by other libraries."""
 
 import csv
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,9 @@ import pytest
 from scipy.io import loadmat
 from synthetic import basis, run
 
-from fecontact import InputError, write_case
+from fecontact import InputError, MissingLibraryError, read_case, write_case
 from fecontact.cli import execute
-from fecontact.io import to_xarray
+from fecontact.io import to_pandas, to_xarray
 from fecontact.output.files import export
 
 
@@ -76,6 +77,33 @@ def test_xarray_has_named_dimensions(trajectory, tmp_path):
                 "units": "N", "long_name": "friction force on the body in -x"}
             late = dataset.sel(time=slice(0.01, None))
             assert late.sizes["time"] == np.count_nonzero(trajectory.time >= 0.01)
+
+
+def test_pandas_has_the_columns_of_the_csv_file(trajectory, tmp_path):
+    import pandas
+
+    frame = to_pandas(trajectory)
+    export.export_csv(trajectory, tmp_path / "run.csv")
+    pandas.testing.assert_frame_equal(
+        frame, pandas.read_csv(tmp_path / "run.csv", index_col="time [s]"), check_dtype=False,
+        check_exact=True)
+    # The highest speed of B: by the frame's own means.
+    assert frame["B velocity x [m/s]"].abs().idxmax() == trajectory.time[
+        np.abs(trajectory.velocity("B")[:, 0]).argmax()]
+
+
+def test_a_case_is_one_call_away_from_xarray_and_pandas(trajectory, tmp_path):
+    case = read_case(write_case(tmp_path / "beam.vtkhdf", trajectory, frames=0))
+    assert case.to_xarray().identical(to_xarray(trajectory))
+    assert case.to_pandas().equals(to_pandas(trajectory))
+
+
+@pytest.mark.parametrize("library", ["pandas", "xarray"])
+def test_missing_libraries_are_named(trajectory, monkeypatch, library):
+    monkeypatch.setitem(sys.modules, library, None)
+    convert = {"pandas": to_pandas, "xarray": to_xarray}[library]
+    with pytest.raises(MissingLibraryError, match=f"{library} is not installed; install it with"):
+        convert(trajectory)
 
 
 def test_files_are_whole_or_not_there(trajectory, tmp_path, monkeypatch):

@@ -166,6 +166,30 @@ def grid_table():
         ["" if k != 13 else "fell over" for k in range(90)], shape=(10, 9))
 
 
+def test_tables_are_one_call_away_from_pandas_and_xarray(tmp_path):
+    table = grid_table()
+    frame = table.to_pandas()
+    # 13th case: the second speed, the fifth load; its mean over loads leaves it out.
+    assert frame.loc[12, ["ground.speed", "load.normal"]].tolist() == pytest.approx(
+        [4.0 - 1.0 / 3.0, 100.0 ** (3 / 8)])
+    assert frame["status"].value_counts().to_dict() == {"finished": 89, "failed": 1}
+    means = frame.groupby("ground.speed")["friction_power"].mean()
+    assert means[1.0] == pytest.approx(np.geomspace(1.0, 100.0, 9).mean(), rel=1e-12)
+    grid = table.to_xarray()
+    assert grid.friction_power.dims == ("ground.speed", "load.normal")
+    assert grid.friction_power.attrs["units"] == "W"
+    near = grid.friction_power.sel({"ground.speed": 2.1, "load.normal": 9.0}, method="nearest")
+    assert float(near) == pytest.approx(2.0 * 10.0, rel=1e-12)
+    again = read_table(table.write(tmp_path / "index.csv"))
+    assert again.to_xarray().equals(grid)
+    assert again.to_pandas().equals(frame)
+    loose = SweepTable({"a.b": (1.0, 2.0, 3.0), "a.c": (1.0, 2.0, 1.0)},
+                       {"amplitude_x": np.arange(3.0)}, ["0", "1", "2"], [""] * 3)
+    with pytest.raises(InputError, match="is not a grid"):
+        loose.to_xarray()
+    assert loose.to_pandas().shape == (3, 7)
+
+
 def test_a_map_shows_each_case_in_its_place():
     figure = plots.plot_sweep(grid_table(), "friction_power")
     axes = figure.axes[0]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
@@ -17,6 +17,7 @@ from fecontact.core.files.stored import DamagedError, array, from_json, member, 
 from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.registry import UntrustedError, law_files, movable, trusting, with_folder
+from fecontact.output.files.dataset import to_pandas, to_xarray
 from fecontact.output.files.frames import frame_indices
 from fecontact.output.files.hdf5 import new_file, open_file, store_basis, stored_basis
 from fecontact.output.files.vtkhdf import write_vtkhdf
@@ -25,6 +26,10 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import GROUND_RATE
 from fecontact.system.powers import POWERS
 from fecontact.system.tables import system_from_tables, system_tables
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
 _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
@@ -58,6 +63,14 @@ class Case:
     trajectory: Trajectory
     study: str | None = None
     versions: dict[str, str] = field(default_factory=dict)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The run as an :class:`xarray.Dataset`; see :func:`fecontact.io.to_xarray`."""
+        return to_xarray(self.trajectory)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The run as a :class:`pandas.DataFrame`; see :func:`fecontact.io.to_pandas`."""
+        return to_pandas(self.trajectory)
 
 
 def write_case(

@@ -13,6 +13,7 @@ from fecontact.output.files.frames import contact_forces
 from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 _NODES = {
@@ -184,6 +185,27 @@ def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
         {name: array(name, variable) for name, variable in variables(trajectory).items()},
         coords={name: array(name, variable) for name, variable in coordinates(trajectory).items()},
         attrs={"title": "fecontact run", "status": trajectory.status.value})
+
+
+def to_pandas(trajectory: Trajectory) -> "pandas.DataFrame":
+    """A run as a :class:`pandas.DataFrame`, one row per output time.
+
+    The index is ``time [s]``; columns are those of :func:`export_csv`, such as
+    ``B displacement x [m]`` and ``node 3 normal force [N]``. Modal coordinates are omitted.
+
+    Raises
+    ------
+    MissingLibraryError
+        If pandas is not installed.
+    """
+    require_kind("to_pandas", Trajectory, trajectory=trajectory)
+    try:
+        from pandas import DataFrame
+    except ImportError:
+        raise MissingLibraryError("pandas is not installed; install it with pip install "
+                                  "pandas.") from None
+
+    return DataFrame(columns(trajectory)).set_index("time [s]")
 
 
 def _titles(trajectory: Trajectory) -> dict[str, str]:
