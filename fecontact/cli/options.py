@@ -6,7 +6,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 StudyFile = Annotated[Path, Parameter(help="Study file; `fecontact init` writes one.")]
-RunFile = Annotated[Path, Parameter(help="A file written by `fecontact run`, or its study.")]
+RunFile = Annotated[Path, Parameter(
+    help="A file written by `fecontact run`, its folder, or its study.")]
 Trust = Annotated[bool, Parameter(
     negative=(), help="Execute user-defined laws in Python files that the run names.")]
 Changes = Annotated[list[str] | None, Parameter(

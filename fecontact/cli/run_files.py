@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -121,36 +122,90 @@ class StoredRun:
     versions: Mapping[str, str] = field(default_factory=dict)
 
 
-def stored_run(file: Path, trust: bool = False) -> StoredRun:
-    """Read a run from its own file, or find it by the file of its study.
-
-    ``trust`` allows code named by the file of the run to be executed. Laws named by the study are
-    always executed.
+def has_run(file: Path, changes: Iterable[str] | None = None) -> Path:
+    """File of a stored run: of a study, in a folder of results, or the file itself.
 
     Raises
     ------
     InputError
-        If the file does not exist, or the study has not been run yet.
+        If there is none, or several to choose from.
+    """
+    if file.suffix.lower() == ".toml":
+        study = read_study(file, changes)
+        found = run_of(study)
+        if found is None:
+            raise InputError(f"{study.results / study.name}.vtkhdf does not exist; run the study "
+                             f"first: fecontact run {file}")
+        return found
+    _no_changes(file, changes)
+    if not file.is_dir():
+        return file
+    runs = sorted(file.glob("*.vtkhdf"))
+    if len(runs) != 1:
+        raise InputError(f"{file} holds {len(runs) or 'no'} runs; name the file of one"
+                         f"{': ' * bool(runs)}{', '.join(str(run) for run in runs[:5])}.")
+    return runs[0]
+
+
+def run_of(study: "Study") -> Path | None:
+    """The stored run of a study, None if there is none.
+
+    It is looked for among the results of the study, then where ``run -o`` may have written it: in
+    the folder of the study, the current one, and two levels of folders in them.
+
+    Raises
+    ------
+    InputError
+        If there are several and none among the results of the study.
+    """
+    name = f"{study.name}.vtkhdf"
+    if (study.results / name).is_file():
+        return study.results / name
+    near = {path.resolve(): path for folder in (study.folder, Path())
+            for depth in range(3)
+            for path in sorted(folder.glob("[!.]*/" * depth + escape(name))) if path.is_file()}
+    if len(near) > 1:
+        raise InputError(f"there are several runs of the study: "
+                         f"{', '.join(str(path) for path in near.values())}; name one of them.")
+    return next(iter(near.values()), None)
+
+
+def _no_changes(file: Path, changes: Iterable[str] | None) -> None:
+    if changes:
+        raise InputError(f"--set changes keys of a study, but {file} is a stored run; name the "
+                         f"study instead.")
+
+
+def stored_run(
+    file: Path, trust: bool = False, changes: Iterable[str] | None = None
+) -> StoredRun:
+    """Read a run from its own file or folder, or find it by the file of its study.
+
+    ``trust`` allows code named by the file of the run to be executed. Laws named by the study are
+    always executed. ``changes`` of the study also change its render settings.
+
+    Raises
+    ------
+    InputError
+        If the file does not exist, the study has not been run yet, or ``changes`` are given for
+        what is not a study.
     """
     with loading():
         from fecontact.core.tables import from_table
         from fecontact.laws.registry import law_files
         from fecontact.output.files.case import read_case
         from fecontact.study.sections import RenderSettings
-        from fecontact.study.study import Study
         from fecontact.system.model_limits import warn_of_limits
 
+    path = has_run(file, changes)
     if file.suffix.lower() == ".toml":
-        study = Study.read(file)
-        path = study.results / f"{study.name}.vtkhdf"
-        if not path.is_file():
-            raise InputError(f"{path} does not exist; run the study first: fecontact run {file}")
+        study = read_study(file, changes)
         known = law_files(study.tables())
         case = read_case(path, trust=trust or known)
         warn_of_limits(case.trajectory.limits_exceeded, "In this run")
         return StoredRun(path, case.trajectory, study.render,
                          _same_run(study, case.study, trust or known), case.study, case.versions)
-    case = read_case(file, trust=trust)
+    case = read_case(path, trust=trust)
     try:
         settings = from_table(RenderSettings, tomllib.loads(case.study or "").get("render", {}),
                               "[render]")
@@ -158,7 +213,7 @@ def stored_run(file: Path, trust: bool = False) -> StoredRun:
         # The run can be drawn even if this version cannot read its study.
         settings = RenderSettings()
     warn_of_limits(case.trajectory.limits_exceeded, "In this run")
-    return StoredRun(file, case.trajectory, settings, True, case.study, case.versions)
+    return StoredRun(path, case.trajectory, settings, True, case.study, case.versions)
 
 
 def stored_or_computed_run(
@@ -172,17 +227,15 @@ def stored_or_computed_run(
         If the file does not exist, or ``changes`` are given for what is not a study.
     """
     if file.suffix.lower() != ".toml":
-        if changes:
-            raise InputError(f"--set changes keys of a study, but {file} is a stored run; name the "
-                             f"study instead.")
-        return stored_run(file, trust)
+        return stored_run(file, trust, changes)
     study = read_study(file, changes)
     from fecontact.laws.registry import law_files
     from fecontact.output.files.case import read_case
 
-    path = study.results / f"{study.name}.vtkhdf"
+    found = run_of(study)
+    path = found or study.results / f"{study.name}.vtkhdf"
     known = trust or law_files(study.tables())
-    if path.is_file():
+    if found is not None:
         case = read_case(path, trust=known)
         if _same_run(study, case.study, known):
             return StoredRun(path, case.trajectory, study.render, True, case.study, case.versions)

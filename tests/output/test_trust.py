@@ -116,7 +116,7 @@ def test_what_needs_the_law_says_so(stored):
     assert not ran(stored)
 
 
-def test_the_command_line_runs_nothing_unasked(stored, capsys):
+def test_the_command_line_runs_nothing_unasked(stored, capsys, monkeypatch):
     out = stored.parent / "out"
     for kind in ("contact_map", "energies", "friction_work", "receptance"):
         code = execute(["plot", str(stored), kind, "-o", str(out / f"{kind}.png")])
@@ -125,6 +125,10 @@ def test_the_command_line_runs_nothing_unasked(stored, capsys):
             kind == "receptance" and code == 1 and said.count("\n") == 1 and "--trust" in said)
     for form in ("pvd", "csv"):
         assert execute(["export", str(stored), "--format", form, "--frames", "2"]) == 0
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+    assert execute(["open", str(stored), "--with", "browser"]) == 0
+    assert opened == [stored.with_suffix(".html").as_uri()]
     assert execute(["render", str(stored), "-o", str(out / "a.mp4")]) == 0 or (
         "apt-get" in capsys.readouterr().err)
     assert not ran(stored)

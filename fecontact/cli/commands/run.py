@@ -45,6 +45,7 @@ def render(
     file: RunFile,
     /,
     *,
+    set_: Changes = None,
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"],
         help="NAME.mp4 for a movie; NAME.png or a folder for numbered pictures.")] = None,
@@ -69,7 +70,7 @@ def render(
     changes: dict[str, Any] = {
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
         "t_start": t_start, "t_end": t_end}
-    stored = stored_run(file, trust)
+    stored = stored_run(file, trust, set_)
     from fecontact.core.tables import located
 
     with located("render:", "RenderSettings"):
@@ -88,6 +89,7 @@ def plot(
         "poincare, friction_work or receptance.")],
     /,
     *,
+    set_: Changes = None,
     point: Annotated[list[str] | None, Parameter(
         negative=(), show_default=False,
         help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
@@ -108,7 +110,7 @@ def plot(
     from fecontact.cli.run_files import stored_run
     from fecontact.core.files.atomic_write import output_folder
 
-    stored = stored_run(file, trust)
+    stored = stored_run(file, trust, set_)
     from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw
 
     choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
@@ -124,6 +126,7 @@ def export(
     file: RunFile,
     /,
     *,
+    set_: Changes = None,
     format_: Annotated[Literal["pvd", "csv", "mat", "netcdf"], Parameter(
         name="--format", help="`pvd` with VTU files, for ParaView before 5.12; `csv` for "
         "spreadsheets; `mat` for MATLAB and Octave; `netcdf` for xarray.")] = "pvd",
@@ -137,7 +140,7 @@ def export(
     from fecontact.cli.run_files import stored_run
     from fecontact.core.files.atomic_write import output_folder
 
-    stored = stored_run(file, trust)
+    stored = stored_run(file, trust, set_)
     from fecontact.output.files.export import export_run
 
     with output_folder((output or stored.path).parent), waiting("Writing"):

@@ -1,0 +1,128 @@
+"""Runs that commands find by their study, and ``fecontact open``."""
+
+import os
+import time
+import webbrowser
+
+import pytest
+from tiny_study import TINY
+
+from fecontact.cli import execute, viewers
+
+
+@pytest.fixture
+def cli(capsys):
+    """Run a command line in this process: exit code, stdout, stderr."""
+
+    def run(*tokens):
+        code = execute([str(token) for token in tokens])
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        return code, said.out, said.err
+
+    return run
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "tiny.toml"
+    path.write_text(TINY)
+    return path
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Addresses that the browser is given; there is no ParaView."""
+    monkeypatch.setattr(viewers, "paraview", lambda: None)
+    found = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: found.append(address) or True)
+    return found
+
+
+def fake_paraview(folder, monkeypatch):
+    """A program of that name on the path, which writes down what it is given."""
+    program = folder / "bin" / "paraview"
+    program.parent.mkdir()
+    program.write_text(f'#!/bin/sh\nprintf "%s|" "$#" "$@" > "{folder}/part"\n'
+                       f'mv "{folder}/part" "{folder}/given"\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}{os.pathsep}{os.environ['PATH']}")
+    return folder / "given"
+
+
+def waited_for(file):
+    end = time.monotonic() + 20.0
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    return file.read_text()
+
+
+def test_what_run_wrote_elsewhere_is_found(cli, study, tmp_path):
+    code, _, err = cli("plot", study, "history")
+    assert (code, "run the study first" in err) == (1, True)
+    assert cli("run", study, "-o", "far/out")[0] == 0
+    assert cli("plot", study, "energies")[0] == 0
+    assert (tmp_path / "far/out/tiny-energies.png").is_file()
+    code, _, err = cli("render", study, "--set", "render.frames=1", "--size", 320, 180)
+    assert (code, err) == (0, "")  # the same values: nothing to note
+    assert (tmp_path / "far/out/tiny.mp4").stat().st_size > 500
+    assert cli("export", "far/out", "--format", "csv")[0] == 0  # a folder of results
+    # Two of them are not guessed at; the folder of results comes first.
+    assert cli("run", study, "-o", "near", "--set", "load.normal=3.0")[0] == 0
+    code, _, err = cli("plot", study, "history")
+    assert code == 1
+    assert "far/out/tiny.vtkhdf" in err
+    assert "near/tiny.vtkhdf" in err
+    assert cli("plot", study, "history", "--set", "output.folder=near")[0] == 0
+    assert (tmp_path / "near/tiny-history.png").is_file()
+
+
+def test_set_is_for_studies_alone(cli, study):
+    assert cli("run", study, "--set", "load.normal=3.0")[0] == 0
+    code, _, err = cli("plot", study, "phase", "--set", "load.normal=3.0")
+    assert (code, err) == (0, "")
+    assert "other values" in cli("plot", study, "phase")[2]
+    for command in (["plot", "results/tiny.vtkhdf", "phase"], ["render", "results/tiny.vtkhdf"],
+                    ["export", "results"], ["open", "results"]):
+        code, _, err = cli(*command, "--set", "load.normal=3.0")
+        assert (code, "name the study instead" in err) == (1, True), command
+
+
+def test_a_run_is_opened_in_paraview_or_as_a_page(cli, study, tmp_path, monkeypatch, opened):
+    assert cli("run", study)[0] == 0
+    code, out, _ = cli("open", study)
+    assert code == 0
+    page = tmp_path / "results" / "tiny.html"
+    assert opened == [page.as_uri()]
+    assert "<html" in page.read_text()
+    assert "is not found" in cli("open", study, "--with", "paraview")[2]
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    given = fake_paraview(tmp_path, monkeypatch)
+    code, out, _ = cli("open", "results/tiny.vtkhdf")
+    assert (code, "is opened in ParaView" in out) == (0, True)
+    assert waited_for(given) == f"1|{tmp_path / 'results' / 'tiny.vtkhdf'}|"
+
+
+def test_a_run_without_frames_is_no_matter_for_paraview(cli, study, tmp_path, opened, monkeypatch):
+    assert cli("run", study, "--set", "output.frames=0")[0] == 0
+    monkeypatch.setattr(viewers, "paraview", lambda: tmp_path / "paraview")
+    assert "holds no fields over the body" in cli("open", "results", "--with", "paraview")[2]
+    assert cli("open", "results")[0] == 0
+    assert opened == [(tmp_path / "results" / "tiny.html").as_uri()]
+
+
+def test_nothing_that_may_hold_scripts_is_opened(cli, study, tmp_path, opened):
+    for name in ("page.html", "picture.svg", "state.pvsm", "macro.py"):
+        (tmp_path / name).write_text("<script>alert(1)</script>")
+        code, _, err = cli("open", name)
+        assert (code, "without running code" in err) == (1, True), name
+    (tmp_path / "cut.vtkhdf").write_text("no HDF5")
+    assert cli("open", "cut.vtkhdf")[0] == 1
+    assert cli("open", "none.vtkhdf")[2].startswith("error: none.vtkhdf does not exist")
+    assert cli("open", "none.toml")[0] == 1
+    assert opened == []
+    (tmp_path / "a.png").write_bytes(b"picture")
+    assert cli("open", "a.png")[0] == 0
+    assert opened == [(tmp_path / "a.png").as_uri()]
