@@ -21,7 +21,7 @@ DOTTED = re.compile(r"(?<![\w/.@-])(?:fecontact|fc)(?:\.[A-Za-z_]\w*)+")
 # Names of files look like those of modules.
 FILES = (".css", ".md")
 # What others make is only looked at here, not imported.
-FOREIGN = ("numpy.", "scipy.", "numba.", "matplotlib.", "xarray.", "concurrent.")
+FOREIGN = ("numpy.", "scipy.", "numba.", "matplotlib.", "pandas.", "xarray.", "concurrent.")
 PAGES = sorted(path for pattern in ("*.md", "*.toml", "*.cff", "Makefile", "docs/**/*.md",
                                     "docs/**/*.py", "examples/*.*", "benchmarks/*.py", ".ci/*",
                                     ".github/**/*.*", "tests/**/*.py", "fecontact/**/*.toml",

@@ -190,7 +190,7 @@ def to_xarray(trajectory: Trajectory) -> "xarray.Dataset":
 def to_pandas(trajectory: Trajectory) -> "pandas.DataFrame":
     """A run as a :class:`pandas.DataFrame`, one row per output time.
 
-    The index is ``time [s]``; columns are those of :func:`export_csv`, such as
+    The index is ``time [s]``; columns are those of :func:`fecontact.io.export_csv`, such as
     ``B displacement x [m]`` and ``node 3 normal force [N]``. Modal coordinates are omitted.
 
     Raises
