@@ -2,6 +2,7 @@
 
 import inspect
 import json
+from collections.abc import Collection
 from dataclasses import MISSING, fields
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -11,15 +12,25 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import check_law
 from fecontact.laws.registry import law_names, own_law
+from fecontact.laws.synonyms import laws_called
 
 
-def laws_table() -> Any:
-    """Table of all laws: kind, name in study files, short description."""
+def laws_table(only: Collection[type] | None = None) -> Any:
+    """Table of all laws, or of some: kind, name in study files, short description."""
     from rich.markup import escape
 
     return table("kind", "law", "", left=3, rows=[
         (_title(kind), name, escape(summary(cls).rstrip(".")))
-        for kind, names in law_names().items() for name, cls in names.items()])
+        for kind, names in law_names().items() for name, cls in names.items()
+        if only is None or cls in only])
+
+
+def laws_meant(name: str) -> list[type]:
+    """Laws that are called otherwise here, such as those with a Stribeck curve; else none."""
+    laws = [cls for names in law_names().values() for cls in names.values()]
+    known = {law for names in law_names().values() for law in names} | {
+        cls.__name__.lower() for cls in laws}
+    return [] if ".py:" in name or name.lower() in known else laws_called(name, laws)
 
 
 def law_help(name: str) -> str:

@@ -18,6 +18,7 @@ from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.profile import Profile
 from fecontact.laws.signals.base import Signal
+from fecontact.laws.synonyms import laws_called
 
 
 @cache
@@ -125,12 +126,18 @@ def law_class(kind: type, name: Any, where: str) -> type:
         raise InputError(f"{where} lacks the key 'law', one of {choices(names)}.")
     name = _DEFAULTS[kind] if name is None else name
     if not isinstance(name, str) or (name not in names and ".py:" not in name):
-        raise InputError(f"{where}: law = {name!r} must be one of {choices(names)}"
-                         f"{nearest(str(name), names)}, or a law of your own, "
-                         f"\"FILE.py:CLASS\".")
+        meant = laws_called(str(name), names.values())
+        hint = nearest(str(name), names) or _meant(str(name), names, meant)
+        raise InputError(f"{where}: law = {name!r} must be one of {choices(names)}{hint}, or a law "
+                         f"of your own, \"FILE.py:CLASS\".")
     if name in names:
         return names[name]
     return own_law(kind, name, f"{where}: law = {name!r}")
+
+
+def _meant(name: str, names: Mapping[str, type], meant: list[type]) -> str:
+    found = [law for law, cls in names.items() if cls in meant]
+    return f" ({name} is {' or '.join(map(repr, found))})" if found else ""
 
 
 def own_law(kind: Any, name: str, where: str) -> type:

@@ -10,6 +10,7 @@ from fecontact.core.docstrings import documented, summary
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import described
 from fecontact.laws.registry import is_kind, law_names
+from fecontact.laws.synonyms import laws_called
 from fecontact.study.geometry_section import SHAPES, MeshFile
 from fecontact.study.links_section import LINKS
 from fecontact.study.study import Study
@@ -19,7 +20,8 @@ _HEAD = """# Study files
 
 Every section and key of a study file, with its type, default and meaning; units stand in brackets.
 This page is made from the code, by `fecontact keys > docs/study.md`; `fecontact keys SECTION`
-prints one section. A key without a default has to be given.
+prints one section, `fecontact keys WORD` the keys that have the word. A key without a default has
+to be given.
 """
 
 
@@ -29,21 +31,52 @@ def study_keys(section: str | None = None) -> str:
     Parameters
     ----------
     section : str, optional
-        A single section, such as ``ground`` or ``ground.profile``; all by default.
+        A single section, such as ``ground`` or ``ground.profile``, or a word: of all sections the
+        keys whose names, meanings or laws have it, like ``roughness``. All keys by default.
 
     Raises
     ------
     InputError
-        If the section does not exist; the message lists those that do.
+        If there is neither such a section nor such a key; the message lists the sections.
     """
     parts = dict(_parts())
     if section is None:
         return "\n".join([_HEAD, *parts.values()]).rstrip() + "\n"
     name = section.strip("[]")
+    if name not in parts and (found := _keys_with(name, parts)):
+        return found
     if name not in parts:
         raise InputError(f"Study files have no section [{name}]{nearest(name, parts)}; there are: "
                          f"{choices(parts)}.")
     return parts[name].rstrip() + "\n"
+
+
+def _keys_with(word: str, parts: Mapping[str, str]) -> str:
+    """Rows of the tables that have a word, each table below its title; laws by other names too."""
+    laws = [cls for names in law_names().values() for cls in names.values()]
+    called = laws_called(word, laws)
+    meant = {f'`law = "{name}"`: {_summary(cls)}' for names in law_names().values()
+             for name, cls in names.items() if cls in called}
+    wanted = word.lower().replace("_", " ").replace("-", " ")
+    found = []
+    for part in parts.values():
+        head, *tables = part.strip().split("\n\n")
+        kept, title = [], ""
+        for block in tables:
+            if not block.startswith("|"):
+                title = block
+                if block in meant:
+                    kept.append(block)
+                continue
+            first, rule, *rows = block.split("\n")
+            rows = [row for row in rows
+                    if wanted in row.lower().replace("_", " ").replace("-", " ")]
+            if rows:
+                kept += [title] * (bool(title) and title not in kept)
+                kept.append("\n".join([first, rule, *rows]))
+        if kept:
+            found.append("\n\n".join([head, *kept]))
+    return "\n\n".join(found) + "\n" if found else ""
 
 
 def _parts() -> Iterator[tuple[str, str]]:

@@ -1,6 +1,7 @@
 """Laws in study files: by name, from the user's own file, for interfaces, with data files."""
 
 import pickle
+import re
 from dataclasses import MISSING, fields
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from fecontact.laws import (
     Signal,
     law_names,
 )
+from fecontact.laws.synonyms import _WORDS
 
 # Values for parameters that have no defaults.
 GIVEN = {
@@ -403,3 +405,22 @@ def test_lists_per_node_are_counted_rightly():
     with pytest.raises(fc.FecontactError, match="3 values for 5 contact nodes"):
         fc.ContactSystem(basis, normal=RoughSurface((1e6,) * 3, 1e-6),
                          friction=ExponentialFriction())
+
+
+def test_laws_are_found_by_what_others_call_them(capsys):
+    for word, found in (("Stribeck", ("exponential", "gaussian", "hyperbolic", "lugre")),
+                        ("coulomb friction", ("constant",)), ("Hunt-Crossley", ("power",)),
+                        ("maxwell-slip", ("iwan",)), ("bearing area", ("measured-surface",)),
+                        ("chirp", ("swept-sine",))):
+        assert execute(["laws", word]) == 0
+        said = capsys.readouterr().out
+        for name in found:
+            assert re.search(rf" {name} ", said), (word, name)
+    assert execute(["laws", "no-such-thing"]) == 1
+    with pytest.raises(fc.InputError, match=r"\(stribeck is .*'exponential' or 'gaussian'"):
+        fc.Study.from_toml('friction = { law = "stribeck" }', "x.toml")
+
+
+def test_every_synonym_stands_for_a_law():
+    laws = {cls.__name__ for names in law_names().values() for cls in names.values()}
+    assert {cls for found in _WORDS.values() for cls in found} <= laws

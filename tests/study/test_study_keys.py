@@ -6,7 +6,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from fecontact import Study
+from fecontact import InputError, Study
 from fecontact.cli import execute
 from fecontact.core.docstrings import documented
 from fecontact.laws import law_names
@@ -70,3 +70,16 @@ def test_keys_on_the_command_line(capsys):
     assert '`law = "speed-ramp"`' in out
     assert execute(["keys", "grund"]) == 1
     assert "no section [grund] (did you mean 'ground'?)" in capsys.readouterr().err
+
+
+def test_keys_are_found_by_a_word():
+    found = study_keys("wavelength")
+    assert "## `[ground]`" in found
+    rows = [line for line in found.splitlines() if line.startswith("| `")]
+    assert rows
+    assert all("wavelength" in row for row in rows)
+    assert len(found) < 0.2 * len(study_keys())
+    stribeck = study_keys("Stribeck")
+    assert stribeck.startswith("## `[friction]`\n\n`law = \"exponential\"`")
+    with pytest.raises(InputError, match="no section"):
+        study_keys("xylophone")

@@ -30,23 +30,29 @@ def doctor() -> int:
 
 def laws(
     name: Annotated[str | None, Parameter(help=(
-        "A law to explain; your own law, FILE.py:CLASS, is also checked."))]
+        "A law to explain, or a word to find some, like Stribeck; your own law, FILE.py:CLASS, is "
+        "also checked."))]
     = None,
     /,
 ) -> None:
     """List the laws of contact, friction, ground and drive, or explain one."""
     from rich import print as show
 
-    from fecontact.cli.law_help import law_help, laws_table
+    from fecontact.cli.law_help import law_help, laws_meant, laws_table
 
+    meant = [] if name is None else laws_meant(name)
     if name is None:
         show(laws_table())
+    elif meant:
+        show(laws_table(meant))
+        print("`fecontact laws LAW` explains one of them.")
     else:
         print(law_help(name))
 
 
 def keys(
-    section: Annotated[str | None, Parameter(help="A section, such as ground.profile.")] = None, /,
+    section: Annotated[str | None, Parameter(
+        help="A section, such as ground.profile, or a word to find keys, like speed.")] = None, /,
 ) -> None:
     """Print the sections and keys of study files: types, defaults, units and meaning."""
     from fecontact.cli.console import loading
