@@ -15,7 +15,7 @@ from fecontact import Status, Study, read_case, read_mesh
 from fecontact.cli import doctor as examination
 from fecontact.cli import execute
 from fecontact.core import system_libraries
-from fecontact.io import read_wear
+from fecontact.io import read_table, read_wear
 from fecontact.laws import ArchardWear, EnergyWear
 
 
@@ -181,6 +181,40 @@ def test_init_writes_every_shape_and_never_overwrites(cli, shape, tmp_path, monk
     assert (tmp_path / "study.toml").read_text() == "mine"
     assert cli("init", "--force")[0] == 0
     assert (tmp_path / "study.toml").read_text() != "mine"
+
+
+def test_init_for_a_mesh_of_ones_own(cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli("init", "beam.toml")[0] == 0
+    assert cli("mesh", "beam.toml", "--set", "geometry.element_size=0.01")[0] == 0
+    os.rename("results/beam.msh", "part.msh")
+    code, out, _ = cli("init", "--shape", "mesh")
+    assert code == 0
+    assert "part.msh" in out
+    code, out, _ = cli("mesh", "study.toml")
+    assert code == 0
+    assert re.search("boundary contact +20 edges", out)
+    short = ["--set", "simulation.t_end=1e-3", "--set", "simulation.outputs=21",
+             "--set", "basis.contact_nodes=5", "--set", "output.frames=2"]
+    assert cli("run", "study.toml", *short)[0] == 0
+    # The load of the template presses the part down.
+    force = read_case("results/study.vtkhdf").trajectory.normal_force.sum(axis=1)
+    assert force[0] == pytest.approx(500.0, rel=1e-6)
+
+
+def test_init_for_a_sweep(cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = cli("init", "--shape", "sweep")
+    assert (code, "fecontact sweep study.toml" in out) == (0, True)
+    wanted = Study.read("study.toml").sweep
+    assert wanted.summaries == ("amplitude_x", "stick_fraction", "friction_power")
+    axes = ["--set", "sweep.axes={'ground.speed'=[4e-3, 10e-3], "
+                     "'friction.static_coefficient'=[0.8]}"]
+    assert cli("sweep", "study.toml", "--workers", "1", *axes)[0] == 0
+    slow, fast = read_table("results/study-sweep/index.csv").column("amplitude_x")
+    # Steady sliding is unstable below 8.4 mm/s at 0.8; there the block sticks and slips.
+    assert slow > 1e-4
+    assert fast < 1e-5
 
 
 MISTAKES = [

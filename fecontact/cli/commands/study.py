@@ -14,9 +14,10 @@ def init(
     file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
-    shape: Annotated[Literal["beam", "pendulum", "block", "pad"], Parameter(
-        help="Beam on wavy ground, pendulum on a stop, block on a moving belt, or a pad on "
-        "a block, which are two bodies.")] = "beam",
+    shape: Annotated[Literal["beam", "pendulum", "block", "pad", "mesh", "sweep"], Parameter(
+        help="Beam on wavy ground, pendulum on a stop, block on a moving belt, a pad on a block, "
+        "which are two bodies, a part from a mesh file of your own, or a sweep over the speed of a "
+        "belt.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
@@ -30,7 +31,9 @@ def init(
     if file.resolve().exists() and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
-    echo(f"{file} is written; next: fecontact run {file}")
+    following = {"mesh": "put your mesh beside it as part.msh, or change its name there; then: "
+                         "fecontact mesh", "sweep": "next: fecontact sweep"}
+    echo(f"{file} is written; {following.get(shape, 'next: fecontact run')} {file}")
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:

@@ -3,9 +3,10 @@
 from importlib.resources import files
 
 TEMPLATES = {"beam": "beam_on_wavy_ground", "pendulum": "pendulum_on_stop",
-             "block": "block_on_belt", "pad": "pad_on_block"}
+             "block": "block_on_belt", "pad": "pad_on_block",
+             "mesh": "own_mesh", "sweep": "sweep_of_block"}
 
 
 def template(shape: str) -> str:
-    """Text of the template for a shape: beam, pendulum, block, or pad for two bodies."""
+    """Text of a template: a shape, pad for two bodies, mesh for one's own, or a sweep."""
     return files(__name__).joinpath(f"{TEMPLATES[shape]}.toml").read_text(encoding="utf-8")
