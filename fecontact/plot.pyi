@@ -10,7 +10,7 @@ from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.contact_map import plot_contact_map
 from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
-from .output.plots.figure import StyledFigure, new_figure
+from .output.plots.figure import StyledFigure, new_figure, styled
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.run import plot_energies, plot_history, plot_phase
@@ -54,4 +54,5 @@ __all__ = [
     "plot_wear",
     "render_mode",
     "rendering_problem",
+    "styled",
 ]

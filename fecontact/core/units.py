@@ -55,6 +55,11 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
     return fitting[-1] if fitting else UNITS[unit][0]
 
 
+def has_prefixes(unit: str) -> bool:
+    """Whether :func:`suitable_unit` knows a unit."""
+    return unit in UNITS
+
+
 def round_125(value: float) -> float:
     """The largest of 1, 2 or 5 times a power of ten that does not exceed a positive value."""
     power = 10.0 ** math.floor(math.log10(value))

@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError, choices, require_choice
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import parameter_label
+from fecontact.output.plots.parameter_labels import name_axis, parameter_label
 from fecontact.output.plots.style import COLOURS, distinct_colours
 from fecontact.study.study import Study
 from fecontact.sweeps.statistics import SobolIndices
@@ -24,19 +24,20 @@ if TYPE_CHECKING:
 
 
 _FAILED = "#c8c4bc"
-_MOST_LINES = 7
+_LEAST_OF_MAP = 3  # values of each parameter
+_MOST_TICKS, _SHORT = 8, 4  # named cells along an axis of a map, and digits of their values
 _COLOUR_MAP = "viridis"
 
 
 def plot_sweep(
     table: SweepTable, name: str, over: Sequence[str] | None = None, *,
-    path: str | Path | None = None,
+    kind: Literal["map", "curves", "scatter"] | None = None, path: str | Path | None = None,
 ) -> "Figure":
     """Plot a summary of a sweep over the varied parameters.
 
-    A grid of two parameters with many values each gives a map. A grid of one parameter gives a
-    curve, as does one of two if the second has few or non-numeric values (a curve for each). All
-    other sweeps give a scatter plot for each parameter and a histogram.
+    A grid of two parameters with three or more values each gives a map. A grid of one parameter
+    gives a curve, as does one of two if the second has two or non-numeric values (a curve for
+    each). All other sweeps give a scatter plot for each parameter and a histogram.
 
     Parameters
     ----------
@@ -46,16 +47,21 @@ def plot_sweep(
         The summary.
     over : one or two parameters, optional
         One for curves, two for a map at the first value of all other parameters.
+    kind : 'map', 'curves' or 'scatter', optional
+        The plot, where another than the one above is wanted; curves and maps are those of grids of
+        one or two parameters.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
     InputError
-        For a summary or parameter that does not exist, a sweep of one case, another suffix, or a
-        file that cannot be written.
+        For a summary or parameter that does not exist, a kind that the sweep does not allow, a
+        sweep of one case, another suffix, or a file that cannot be written.
     """
     require_kind("plot_sweep", SweepTable, table=table)
+    if kind is not None:
+        require_choice("plot_sweep", "kind", kind, ("map", "curves", "scatter"))
     for column in (name, *(over or ())):
         table.column(column)
     if name not in table.values:
@@ -67,11 +73,17 @@ def plot_sweep(
     names = [key for key, values in table.parameters.items() if len(set(values)) > 1]
     if not names:
         raise InputError("The sweep has only one case; there is nothing to plot.")
-    numeric = [is_numeric(table.parameters[key]) for key in names]
-    if table.shape is not None and len(names) == 2 and all(numeric) and min(
-            len(set(table.parameters[key])) for key in names) > _MOST_LINES:
+    numeric = all(is_numeric(table.parameters[key]) for key in names)
+    fits = {"map": table.shape is not None and len(names) == 2 and numeric,
+            "curves": table.shape is not None and len(names) <= 2, "scatter": True}
+    if kind is not None and not fits[kind]:
+        raise InputError(f"kind = '{kind}' needs a grid of {'two numeric' * (kind == 'map')}"
+                         f"{'one or two' * (kind == 'curves')} parameters; plot this sweep as "
+                         f"{choices(name for name, fit in fits.items() if fit)}, or give over.")
+    many = min(len(set(table.parameters[key])) for key in names) >= _LEAST_OF_MAP
+    if kind == "map" or (kind is None and fits["map"] and many):
         return _map(table, name, names[0], names[1], path)
-    if table.shape is not None and len(names) <= 2:
+    if kind == "curves" or (kind is None and fits["curves"]):
         few = sorted(names, key=lambda key: (is_numeric(table.parameters[key]),
                                              len(set(table.parameters[key]))))
         return _curves(table, name, few[-1], few[0] if len(names) == 2 else None, path)
@@ -104,8 +116,7 @@ def _curves(
                       linewidth=0.9, marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
                       label=None if by is None else f"{_shown(value)}")
         _mark_failed(axes, table, x)
-        axes.set_xlabel(parameter_label(parameter, Study))
-        _spaced(axes, "x", x, labels)
+        _named(axes, parameter, x, labels)
         if by is not None:
             figure.legend(title=parameter_label(by, Study), loc="outside right upper")
     return figure
@@ -146,9 +157,8 @@ def plot_strobed(
                   color="#1a1a1a", markersize=float(np.clip(60.0 / np.sqrt(len(table)), 0.8, 4.0)),
                   markeredgewidth=0, rasterized=True)
         _mark_failed(axes, table, x)
-        axes.set_xlabel(parameter_label(parameter, Study))
         axes.set_ylabel(f"displacement once per period [{unit}]")
-        _spaced(axes, "x", x, labels)
+        _named(axes, parameter, x, labels)
     return figure
 
 
@@ -185,8 +195,13 @@ def _map(
         bar = figure.colorbar(drawn, ax=axes, pad=0.02)
         bar.set_label(_with_unit(name, unit))
         bar.outline.set_visible(False)
-        axes.set_xlabel(parameter_label(first, Study))
-        axes.set_ylabel(parameter_label(second, Study))
+        name_axis(axes, "x", parameter_label(first, Study), x)
+        name_axis(axes, "y", parameter_label(second, Study), y)
+        for axis, points, log in zip((axes.xaxis, axes.yaxis), (x, y), logs, strict=True):
+            # Of few cells each is named, if the numbers are short.
+            if not log and len(points) <= _MOST_TICKS and all(
+                    len(f"{value:g}".strip("-0.")) <= _SHORT for value in points):
+                axis.set_ticks(points)
         if len(known) < values.size:
             axes.set_title("grey: failed or not computed", loc="right", fontsize=9, color="#606060")
     return figure
@@ -207,8 +222,7 @@ def _scatter(
                       markersize=float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0)),
                       alpha=0.7)
             _mark_failed(axes, table, x)
-            axes.set_xlabel(parameter_label(parameter, Study))
-            _spaced(axes, "x", x, labels)
+            _named(axes, parameter, x, labels)
         last = grid[len(parameters)]
         known = table.values[name][np.isfinite(table.values[name])]
         if len(known):
@@ -298,11 +312,15 @@ def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
-def _spaced(axes: "Axes", which: str, x: Array, labels: list[str] | None) -> None:
+def _named(axes: "Axes", parameter: str, x: Array, labels: list[str] | None) -> None:
+    """Label the axis of a parameter, logarithmic for values of equal ratios."""
     if labels is not None:
         axes.set_xticks(range(len(labels)), labels)
-    elif _is_geometric(np.unique(x)):
-        _logarithmic(axes, which)
+        axes.set_xlabel(parameter_label(parameter, Study))
+        return
+    if _is_geometric(np.unique(x)):
+        _logarithmic(axes, "x")
+    name_axis(axes, "x", parameter_label(parameter, Study), x)
 
 
 def _logarithmic(axes: "Axes", which: str) -> None:

@@ -5,6 +5,7 @@ import time
 import webbrowser
 
 import pytest
+from matplotlib.image import imread
 from tiny_study import TINY
 
 from fecontact.cli import execute, viewers
@@ -87,6 +88,15 @@ def test_set_is_for_studies_alone(cli, study):
                     ["export", "results"], ["open", "results"]):
         code, _, err = cli(*command, "--set", "load.normal=3.0")
         assert (code, "name the study instead" in err) == (1, True), command
+
+
+def test_plots_of_the_command_line_take_a_style(cli, study, tmp_path):
+    assert cli("run", study)[0] == 0
+    (tmp_path / "red.mplstyle").write_text("figure.facecolor: ff0000\n")
+    assert cli("plot", study, "phase", "--style", "red.mplstyle", "-o", "red.png")[0] == 0
+    assert imread(tmp_path / "red.png")[0, 0].tolist() == [1.0, 0.0, 0.0, 1.0]
+    code, _, err = cli("plot", study, "phase", "--style", "no-such")
+    assert (code, "is no style of matplotlib" in err) == (1, True)
 
 
 def test_a_run_is_opened_in_paraview_or_as_a_page(cli, study, tmp_path, monkeypatch, opened):

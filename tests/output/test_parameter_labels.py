@@ -3,11 +3,18 @@
 import re
 from typing import get_type_hints
 
+import numpy as np
 import pytest
 
 from fecontact import Study
 from fecontact.core.docstrings import documented
-from fecontact.output.plots.parameter_labels import _classes, _units_of, parameter_label
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import (
+    _classes,
+    _units_of,
+    name_axis,
+    parameter_label,
+)
 
 
 @pytest.mark.parametrize(("name", "label"), [
@@ -25,6 +32,20 @@ from fecontact.output.plots.parameter_labels import _classes, _units_of, paramet
 ])
 def test_labels(name, label):
     assert parameter_label(name) == label
+
+
+def test_ticks_are_in_a_unit_that_suits_the_values():
+    with new_figure(4.0, 3.0) as figure:
+        axes = figure.subplots()
+        axes.plot([0.0, 4e-3], [0.0, 3e4])
+        name_axis(axes, "x", "ground speed [m/s]", np.array([0.0, 4e-3, np.nan]))
+        name_axis(axes, "y", "decay [s/m]", np.array([0.0, 3e4]))
+        figure.draw_without_rendering()
+    assert axes.get_xlabel() == "ground speed [mm/s]"
+    assert axes.get_ylabel() == "decay [s/m]"
+    ticks = {label.get_text(): label.get_position()[0] for label in axes.get_xticklabels()}
+    assert ticks["3"] == pytest.approx(3e-3)  # data stay in SI units
+    assert axes.xaxis.get_major_formatter()(-2e-3) == "\N{MINUS SIGN}2"
 
 
 def _documented_units():

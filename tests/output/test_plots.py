@@ -5,13 +5,24 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from matplotlib import rc_context
-from synthetic import basis, run
+from matplotlib.image import imread
+from synthetic import basis, rectangle, run
 
 import fecontact
 from fecontact import InputError, Trajectory, basis_from_matrices
+from fecontact.fem import BodyFields
 from fecontact.integrate import Energies
 from fecontact.output.plots import run as plots
-from fecontact.plot import plot_contact_map, plot_energies, plot_history, plot_modes, plot_phase
+from fecontact.plot import (
+    STATE_COLOURS,
+    plot_contact_map,
+    plot_energies,
+    plot_history,
+    plot_modes,
+    plot_phase,
+    plot_stress,
+    styled,
+)
 from fecontact.system import kernels as kernels
 from fecontact.system import powers
 
@@ -38,6 +49,72 @@ def test_history_shows_each_point_in_suitable_units():
     np.testing.assert_allclose(line.get_ydata(), 1e6 * trajectory.displacement(0)[:, 1])
     np.testing.assert_allclose(figure.axes[4].lines[0].get_ydata(),
                                trajectory.normal_force.sum(axis=1))
+
+
+def test_history_leaves_out_what_stays_zero():
+    trajectory = run(times=101)
+    still = trajectory.modal_coordinates.copy()
+    still[:, [0, 2, 3, 4]] = 0.0  # up and down alone
+    rate = trajectory.modal_velocities.copy()
+    rate[:, [0, 2, 3, 4]] = 0.0
+    system = trajectory.system.with_(**{"friction.static_coefficient": 0.0,
+                                        "friction.kinetic_coefficient": 0.0})
+    figure = plot_history(replace(trajectory, system=system, modal_coordinates=still,
+                                  modal_velocities=rate), ["C"])
+    assert labels(figure) == ["displacement y [µm]", "velocity y [mm/s]", "total normal force [N]"]
+    assert figure.axes[2].get_xlabel() == "time [ms]"
+    np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), 1e6 * still[:, 1])
+
+
+def test_colours_of_a_stress_end_below_a_sharp_peak():
+    nodes, cells, _ = rectangle(0.2, 0.1, 20, 10)
+    stress = np.zeros((len(nodes), 4))
+    stress[:, 0] = 1e6 * nodes[:, 0] / 0.2
+    fields = BodyFields(nodes, cells, np.zeros_like(nodes), stress)
+    figure = plot_stress(fields, component="xx")
+    drawn = figure.axes[0].collections[0]
+    assert drawn.get_clim() == (-1.0, 1.0)  # MPa
+    assert not figure.legends
+    stress[7, 0] = -5e6
+    figure = plot_stress(fields, component="xx")
+    usual = 1e-6 * np.percentile(np.abs(stress[:, 0]), 99.0)
+    assert figure.axes[0].collections[0].get_clim() == pytest.approx((-usual, usual))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["peak -5 MPa"]
+    np.testing.assert_allclose(figure.axes[0].lines[0].get_xydata()[0], nodes[7])
+    assert figure.axes[0].get_xlabel() == "x [mm]"
+
+
+def test_slip_and_friction_have_colours_of_their_own():
+    from fecontact.output.render.force_chart import _totals
+
+    lines = _totals(run(times=21), slice(None))
+    assert {line.name: line.colour for line in lines}["friction on the body, +x"] not in (
+        STATE_COLOURS.values())
+
+
+def test_plots_take_a_style(tmp_path):
+    trajectory = run(times=21)
+    plain = plot_phase(trajectory)
+    with styled({"font.size": 17.0, "axes.grid": False}):
+        figure = plot_phase(trajectory, path=tmp_path / "large.png")
+        with styled("grayscale"):
+            grey = plot_phase(trajectory)
+    assert figure.axes[0].xaxis.label.get_size() == 10.0  # set apart by the package's style
+    assert figure.axes[0].xaxis.get_ticklabels()[0].get_size() > 1.5 * (
+        plain.axes[0].xaxis.get_ticklabels()[0].get_size())
+    assert not figure.axes[0].xaxis.get_gridlines()[0].get_visible()
+    assert grey.get_facecolor() == (0.75, 0.75, 0.75, 1.0)
+    assert plot_phase(trajectory).get_facecolor() == (1.0, 1.0, 1.0, 1.0)
+    (tmp_path / "own.mplstyle").write_text("figure.facecolor: ff0000\n")
+    with styled(tmp_path / "own.mplstyle"):
+        figure = plot_phase(trajectory, path=tmp_path / "red.png")
+    assert imread(tmp_path / "red.png")[0, 0].tolist() == [1.0, 0.0, 0.0, 1.0]
+    for wrong, message in (("sevborn-v0_8", "did you mean 'seaborn-v0_8"),
+                           (tmp_path / "none.mplstyle", "does not exist"),
+                           ({"font.sise": 3}, "font.sise"), ({"font.size": "big"}, "font.size"),
+                           (7, "style = 7")):
+        with pytest.raises(InputError, match=message), styled(wrong):
+            pass
 
 
 def test_phase_plane_is_velocity_over_displacement_with_the_ground():
@@ -179,12 +256,12 @@ def test_energies_leave_out_what_is_zero():
     work = np.zeros((101, len(powers.POWERS)))
     work[:, powers.FRICTION] = 1e-3 * np.linspace(0.0, 1.0, 101)
     figure = plot_energies(replace(trajectory, work=work))
-    assert labels(figure) == ["stored energy [mJ]", "work put in [J]", "energy lost [mJ]"]
+    assert labels(figure) == ["stored energy [mJ]", "energy lost [mJ]"]  # nothing is put in
     shown = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
-    assert shown == [["kinetic", "elastic", "contact", "total"], ["total"], ["friction", "total"]]
+    assert shown == [["kinetic", "elastic", "contact", "total"], ["friction", "total"]]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(),
                                1e3 * trajectory.energies.kinetic)
-    np.testing.assert_allclose(figure.axes[2].lines[0].get_ydata(), 1e3 * work[:, powers.FRICTION])
+    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), 1e3 * work[:, powers.FRICTION])
 
 
 def test_modes_are_titled_by_their_frequencies():

@@ -207,6 +207,26 @@ def test_a_map_shows_each_case_in_its_place():
     assert corners[:, 0, 1] == pytest.approx(10.0 ** np.linspace(-0.125, 2.125, 10))
 
 
+def test_grids_of_three_by_three_are_maps_and_can_be_curves():
+    speed, load = np.meshgrid([1e-3, 2e-3, 3e-3], [10.0, 20.0, 30.0], indexing="ij")
+    small = SweepTable(
+        {"ground.speed": tuple(speed.ravel()), "load.normal": tuple(load.ravel())},
+        {"friction_power": (speed * load).ravel()}, [f"{k}" for k in range(9)], [""] * 9,
+        shape=(3, 3))
+    axes = plots.plot_sweep(small, "friction_power").axes[0]
+    assert axes.collections[0].get_array().shape == (3, 3)
+    assert axes.get_xlabel() == "ground speed [mm/s]"
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["1", "2", "3"]
+    lines = plots.plot_sweep(small, "friction_power", kind="curves").axes[0].lines
+    assert sum(len(line.get_xdata()) == 3 for line in lines) == 3
+    assert len(plots.plot_sweep(small, "friction_power", kind="scatter").axes) == 3
+    with pytest.raises(InputError, match="kind = 'mep' must be one of"):
+        plots.plot_sweep(small, "friction_power", kind="mep")
+    loose = SweepTable(small.parameters, small.values, small.keys, small.reasons)
+    with pytest.raises(InputError, match="needs a grid of two numeric parameters"):
+        plots.plot_sweep(loose, "friction_power", kind="map")
+
+
 def test_curves_scatter_and_names_on_axes():
     grid = grid_table()
     few = SweepTable(

@@ -101,6 +101,8 @@ def plot(
     highest_hz: Annotated[float | None, Parameter(help="Highest frequency to plot [Hz].")] = None,
     t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
     t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
+    style: Annotated[str | None, Parameter(
+        help="A style of matplotlib, or a file NAME.mplstyle.")] = None,
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
     trust: Trust = False,
@@ -116,7 +118,9 @@ def plot(
     choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
                          highest_hz)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
-    with output_folder(target.parent), waiting("Drawing"):
+    from fecontact.output.plots.figure import styled
+
+    with output_folder(target.parent), waiting("Drawing"), styled(style or {}):
         redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)
         echo_written(target)
     warn_if_stale(file, stored.current)

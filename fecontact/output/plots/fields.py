@@ -1,7 +1,7 @@
 """Plots of stress over a body."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,12 +10,15 @@ from fecontact.core.errors import require_choice
 from fecontact.core.units import suitable_unit
 from fecontact.fem.fields import BodyFields
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import name_axis
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STRESSES = ("xx", "yy", "zz", "xy")
 _DRAWN_DISPLACEMENT = 0.07  # largest one by default, relative to the body's extent
+# Colours reach to this percentile if the peak is so much above it that they would show little.
+_PERCENTILE, _SHARP = 99.0, 0.7
 _WIDTH, _LARGEST, _LEAST = 9.0, 8.0, 2.0  # inches: width, and limits of the height
 
 
@@ -24,6 +27,9 @@ def plot_stress(
     path: str | Path | None = None,
 ) -> "Figure":
     """Plot a stress over the deformed body, and its undeformed outline.
+
+    Where few nodes have much higher stresses than all others, colours end at their 99th percentile,
+    and a mark names the peak.
 
     Parameters
     ----------
@@ -59,7 +65,12 @@ def plot_stress(
     everything = np.vstack([fields.nodes, places])
     width, height = np.ptp(everything, axis=0)
     factor, unit = suitable_unit(float(np.abs(stress).max()), "Pa")
-    largest = float(np.abs(stress).max() / factor) or 1.0
+    peak = int(np.abs(stress).argmax())
+    largest = float(np.abs(stress[peak]) / factor) or 1.0
+    # At clamped corners and below forces stresses grow with each refinement of the mesh.
+    usual = float(np.percentile(np.abs(stress), _PERCENTILE) / factor)
+    cut = 0.0 < usual < _SHARP * largest
+    top = usual if cut else largest
     name = "von Mises stress" if component == "von_mises" else f"stress {component}"
     signed = component != "von_mises"
     cells = fields.cells
@@ -70,14 +81,20 @@ def plot_stress(
         axis = figure.subplots()
         drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress / factor,
                                shading="gouraud", cmap="RdBu_r" if signed else "viridis",
-                               vmin=-largest if signed else 0.0, vmax=largest, rasterized=True)
+                               vmin=-top if signed else 0.0, vmax=top, rasterized=True)
         for nodes, colour in ((fields.nodes, "#8c8c8c"), (places, "#303030")):
             axis.add_collection(LineCollection(list(nodes[fields.outline]), colors=colour,
                                                linewidths=0.8))
         margin = 0.02 * max(width, height)
         low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin
         axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
-                 xlabel="x [m]", ylabel="y [m]",
                  title=f"displacements times {scale:.3g}" if moved else "")
-        figure.colorbar(drawn, ax=axis, label=f"{name} [{unit}]")
+        for which, values in zip(("x", "y"), everything.T, strict=True):
+            name_axis(axis, which, f"{which} [m]", values)
+        ends: Any = ("both" if signed else "max") if cut else "neither"
+        figure.colorbar(drawn, ax=axis, label=f"{name} [{unit}]", extend=ends)
+        if cut:
+            axis.plot(*places[peak], "o", markersize=7.0, markerfacecolor="none", color="#d55e00",
+                      label=f"peak {stress[peak] / factor:.3g} {unit}")
+            figure.legend(loc="outside lower right")
     return figure

@@ -1,40 +1,103 @@
 """Figures in the package's style, for notebooks and files."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-from matplotlib import rc_context
+from matplotlib import RcParams, rc_context, rc_params_from_file
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from fecontact.core.checks import as_path
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, nearest, shown
 from fecontact.core.files.atomic_write import replaced
 from fecontact.output.plots.style import STYLE
 
 _SUFFIXES = (".png", ".pdf", ".svg")
 _PIXELS_PER_INCH = 96  # of a notebook's page
+_style: ContextVar[Mapping[str, Any]] = ContextVar("style", default=MappingProxyType({}))
+
+
+@contextmanager
+def styled(style: str | Path | Mapping[str, Any]) -> Iterator[None]:
+    """Draw all plots that are made within a block in a style of matplotlib.
+
+    ``with styled({"font.size": 14}): plot_phase(run)``. It is put over the package's style: fonts,
+    sizes, grids and backgrounds follow it, the colours of curves and states keep their meaning.
+    Blocks may be nested. Figures keep their style when they are drawn or saved later.
+
+    Parameters
+    ----------
+    style : str, Path or mapping
+        Name of a matplotlib style, a file of one (``NAME.mplstyle``), or its settings.
+
+    Raises
+    ------
+    InputError
+        If there is no such style, file or setting.
+    """
+    token = _style.set({**_style.get(), **_settings(style)})
+    try:
+        yield
+    finally:
+        _style.reset(token)
+
+
+def _settings(style: str | Path | Mapping[str, Any]) -> Mapping[str, Any]:
+    from matplotlib.style import library
+
+    if not isinstance(style, str | Path | Mapping):
+        raise InputError(f"style = {shown(style)} must be the name of a matplotlib style, a file "
+                         f"NAME.mplstyle, or settings.")
+    if isinstance(style, Mapping):
+        try:
+            return dict(RcParams(style))
+        except (KeyError, ValueError) as error:
+            raise InputError(f"style: {_first_line(error)} in {shown(style)}.") from None
+    path = Path(style)
+    if path.suffix == ".mplstyle":
+        if not path.is_file():
+            raise InputError(f"{path} does not exist; give the file of a matplotlib style.")
+        try:
+            return dict(rc_params_from_file(path, use_default_template=False))
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{path} is no matplotlib style: {_first_line(error)}.") from None
+    if str(style) not in library:
+        hint = nearest(str(style), library)
+        raise InputError(f"style = '{style}' is no style of matplotlib{hint}; "
+                         f"print(sorted(matplotlib.style.library)) lists them, or give a file "
+                         f"NAME.mplstyle.")
+    return dict(library[str(style)])
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip("'\"").split("\n")[0].split("\\n")[0].rstrip(".")
 
 
 class StyledFigure(Figure):
-    """A matplotlib Figure that always draws in the package's style.
+    """A matplotlib Figure that always draws in the style it was made in, the package's by default.
 
     Ticks, fonts of PDF files and other parts read the settings of matplotlib when a figure is
     drawn, not when it is made.
     """
 
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._settings = {**STYLE, **_style.get()}
+
     def draw(self, renderer: RendererBase) -> None:
         """See :meth:`matplotlib.figure.Figure.draw`."""
-        with rc_context(STYLE):
+        with rc_context(self._settings):
             super().draw(renderer)
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """See :meth:`matplotlib.figure.Figure.savefig`."""
-        with rc_context(STYLE):
+        with rc_context(self._settings):
             super().savefig(fname, **options)
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
@@ -67,7 +130,7 @@ def new_figure(
         For another suffix, or a file that cannot be written.
     """
     target = None if path is None else _target(path)
-    with rc_context(STYLE):
+    with rc_context({**STYLE, **_style.get()}):
         figure = StyledFigure(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure

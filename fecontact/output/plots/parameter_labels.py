@@ -1,15 +1,50 @@
-"""Labels of parameters with units, from the annotations of their classes."""
+"""Labels of parameters with units, from the annotations of their classes, and of their axes."""
 
 import re
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from functools import cache
-from typing import Any, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_type_hints
 
-from fecontact.core.units import Unit
+import numpy as np
+from matplotlib.ticker import Formatter
+
+from fecontact.core.types import Array
+from fecontact.core.units import Unit, has_prefixes, suitable_unit
 from fecontact.laws.base import NormalLaw
 from fecontact.laws.registry import is_kind, law_names
 from fecontact.system.contact_system import ContactSystem
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class _InUnit(Formatter):
+    """Ticks at values in SI units, labelled in a prefixed unit."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x / self.factor:.10g}".replace("-", "\N{MINUS SIGN}")
+
+
+def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array) -> None:
+    """Label an axis whose data are in SI units, with ticks in a unit that suits the values.
+
+    ``ground speed [m/s]`` with values up to 4e-3 becomes ``ground speed [mm/s]``, with a tick 4
+    there. Labels without a unit, or with one that has no prefixes, stay as they are.
+    """
+    name, _, unit = label.rpartition(" [")
+    unit = unit.removesuffix("]")
+    finite = np.abs(values[np.isfinite(values)])
+    factor = 1.0
+    if name and has_prefixes(unit) and len(finite):
+        factor, symbol = suitable_unit(float(finite.max()), unit)
+        label = f"{name} [{symbol}]"
+    axes.set(**{f"{which}label": label})
+    if factor != 1.0:
+        (axes.xaxis if which == "x" else axes.yaxis).set_major_formatter(_InUnit(factor))
 
 
 def parameter_label(name: str, owner: type = ContactSystem) -> str:

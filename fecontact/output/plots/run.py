@@ -72,35 +72,46 @@ def plot_history(
     trajectory = drawn.trajectory
     colours, faces = distinct_colours(len(points)), contact_faces(trajectory.system.basis)
     single = not faces[0].name
-    with new_figure(10.0, 7.5, path) as figure:
+    motions = [("displacement", "m", [trajectory.displacement(point) for point in points]),
+               ("velocity", "m/s", [trajectory.velocity(point) for point in points])]
+    motions = [(name, unit, _without_round_off(values)) for name, unit, values in motions]
+    moving = [row for row in range(2) if any(
+        value[:, row].any() for _, _, values in motions for value in values)] or [0]
+    rubs = trajectory.friction_force.any()
+    panels = [[f"{name} {_AXES[row]}" for name, _, _ in motions] for row in moving]
+    panels.append(["normal force", "friction force" if rubs else "normal force"])
+    with new_figure(10.0, 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
-        axes = figure.subplots(3, 2, sharex=True)
-        time = _time(axes[2], trajectory)
-        for column, (quantity, unit, values) in enumerate((
-            ("displacement", "m", [trajectory.displacement(point) for point in points]),
-            ("velocity", "m/s", [trajectory.velocity(point) for point in points]),
-        )):
-            values = _without_round_off(values)
-            for row, name in enumerate(_AXES):
-                factor = _labelled(axes[row, column], f"{quantity} {name}", unit,
+        axes = figure.subplot_mosaic(panels, sharex=True)
+        for row in panels[:-1]:
+            for panel in row:
+                axes[panel].tick_params(labelbottom=False)
+        time = _time([axes[panel] for panel in dict.fromkeys(panels[-1])], trajectory)
+        for quantity, unit, values in motions:
+            for row in moving:
+                axis = axes[f"{quantity} {_AXES[row]}"]
+                factor = _labelled(axis, f"{quantity} {_AXES[row]}", unit,
                                    *(value[:, row] for value in values))
                 for number, (point, value) in enumerate(zip(points, values, strict=True)):
-                    axes[row, column].plot(
-                        *thinned(time, value[:, row] / factor), color=colours[number],
-                        linewidth=1.2 if number else 2.0, label=_label(point, trajectory))
-        for axis, name, forces in ((axes[2, 0], "normal force", trajectory.normal_force),
-                                   (axes[2, 1], f"friction force in -{'x' if single else 't'}",
-                                    trajectory.friction_force)):
+                    axis.plot(*thinned(time, value[:, row] / factor), color=colours[number],
+                              linewidth=1.2 if number else 2.0, label=_label(point, trajectory))
+        for panel, name, forces in (
+                ("normal force", "normal force", trajectory.normal_force),
+                ("friction force", f"friction force in -{'x' if single else 't'}",
+                 trajectory.friction_force))[: 1 + rubs]:
             totals = [forces[:, face.nodes].sum(axis=1) for face in faces]
-            factor = _labelled(axis, f"total {name}", "N", *totals)
+            factor = _labelled(axes[panel], f"total {name}", "N", *totals)
             for face, total, colour in zip(faces, totals, ["#303030"] if single else
                                            distinct_colours(len(faces)), strict=True):
-                axis.plot(*thinned(time, total / factor), color=colour, label=face.name)
-            if not single:
-                axis.legend(loc="best")
-        figure.align_ylabels(axes)
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center",
+                axes[panel].plot(*thinned(time, total / factor), color=colour, label=face.name)
+        for side in zip(*panels, strict=True):
+            figure.align_ylabels([axes[panel] for panel in side])
+        figure.legend(*axes[panels[0][0]].get_legend_handles_labels(), loc="outside upper center",
                       ncols=max(1, min(len(points), 6)))
+        if not single:
+            # Above the forces: within the panel it would hide curves.
+            axes["normal force"].legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98),
+                                        ncols=max(1, min(len(faces), 6)))
     return figure
 
 
@@ -162,7 +173,7 @@ def plot_phase(
 def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
     """Plot stored energy, external work and dissipated energy [J] over time.
 
-    Terms that stay zero are left out.
+    Terms that stay zero are left out, and panels without any others.
 
     Parameters
     ----------
@@ -181,11 +192,14 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     energies = trajectory.energies
-    with new_figure(10.0, 8.0, path) as figure:
+    # Without drive, friction and damping nothing is put in or lost.
+    panels = [panel for panel in ENERGY_TERMS
+              if any(getattr(energies, name).any() for name in panel[2])] or ENERGY_TERMS[:1]
+    with new_figure(10.0, 0.5 + 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
-        axes = figure.subplots(3, 1, sharex=True)
-        time = _time(axes[2:], trajectory)
-        for axis, (title, sum_of, names) in zip(axes, ENERGY_TERMS, strict=True):
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        time = _time(axes[-1:], trajectory)
+        for axis, (title, sum_of, names) in zip(axes, panels, strict=True):
             total = getattr(energies, sum_of)
             terms = {name: getattr(energies, name) for name in names}
             shown = {name: term for name, term in terms.items() if term.any()}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import parameter_label
+from fecontact.output.plots.parameter_labels import name_axis, parameter_label
 from fecontact.output.plots.style import DASHES, distinct_colours
 
 if TYPE_CHECKING:
@@ -65,7 +65,10 @@ def plot_eigenvalues(
                            textcoords="offset points", fontsize=9.0)
         upper.set_ylabel("frequency [Hz]")
         lower.set_ylabel("growth rate [1/s]")
-        lower.set_xlabel(x_label or parameter_label(branch.parameter_name))
+        if x_label is None:
+            name_axis(lower, "x", parameter_label(branch.parameter_name), values)
+        else:
+            lower.set_xlabel(x_label)
         if values.min() < values.max():
             lower.set_xlim(values.min(), values.max())
         figure.align_ylabels([upper, lower])
@@ -124,8 +127,14 @@ def plot_stability_map(
             centre = inside[np.argmin(((inside - inside.mean(axis=0)) ** 2).sum(axis=1))]
             axis.text(found.first[centre[1]], found.second[centre[0]], "stable", ha="center",
                       va="center")
-        axis.set_xlabel(x_label or parameter_label(found.names[0]))
-        axis.set_ylabel(y_label or parameter_label(found.names[1]))
+        if x_label is None:
+            name_axis(axis, "x", parameter_label(found.names[0]), found.first)
+        else:
+            axis.set_xlabel(x_label)
+        if y_label is None:
+            name_axis(axis, "y", parameter_label(found.names[1]), found.second)
+        else:
+            axis.set_ylabel(y_label)
         axis.grid(False)
     return figure
 

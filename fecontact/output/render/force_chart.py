@@ -12,7 +12,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.run import thinned
-from fecontact.output.plots.style import DASHES, STATE_COLOURS, distinct_colours
+from fecontact.output.plots.style import COLOURS, DASHES, distinct_colours
 from fecontact.output.render.frames_data import Motion
 from fecontact.reduction.assembly.contact_faces import contact_faces
 
@@ -36,7 +36,7 @@ def _totals(trajectory: Trajectory, part: Any) -> list[_Line]:
         lines = [_Line("normal force", normal[part].sum(axis=1), _DARK)]
         if friction.any():
             lines.append(_Line("friction on the body, +x", friction[part].sum(axis=1),
-                               STATE_COLOURS["slip"]))
+                               COLOURS[3]))
         return lines
     lines = []
     for face, colour in zip(faces, distinct_colours(len(faces)), strict=True):
