@@ -19,7 +19,7 @@ from fecontact.core.units import Summarised, html_table, listed, span
 from fecontact.sweeps.store import write_whole
 
 if TYPE_CHECKING:
-    import pandas
+    import pandas  # type: ignore[import-untyped]
     import xarray
 
 _BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")

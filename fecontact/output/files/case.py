@@ -28,7 +28,7 @@ from fecontact.system.powers import POWERS
 from fecontact.system.tables import system_from_tables, system_tables
 
 if TYPE_CHECKING:
-    import pandas
+    import pandas  # type: ignore[import-untyped]
     import xarray
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")

@@ -13,7 +13,7 @@ from fecontact.output.files.frames import contact_forces
 from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
 
 if TYPE_CHECKING:
-    import pandas
+    import pandas  # type: ignore[import-untyped]
     import xarray
 
 _NODES = {

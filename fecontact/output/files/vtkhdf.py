@@ -100,11 +100,11 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
                                                 trajectory.modal_velocities))
         states = np.full((len(which), nodes), -1, dtype=np.int8)
         states[:, touching] = trajectory.contact_state[which][:, owners]
-        found = {"displacement": displacement(field, q), "velocity": displacement(field, rate),
-                 "von_mises": von_mises(field, q),
-                 "contact_force": nodal_contact_force(trajectory, which),
-                 "contact_state": states,
-                 "stress": cell_stress(field, q)}
+        found: dict[str, NDArray[Any]] = {
+            "displacement": displacement(field, q), "velocity": displacement(field, rate),
+            "von_mises": von_mises(field, q),
+            "contact_force": nodal_contact_force(trajectory, which), "contact_state": states,
+            "stress": cell_stress(field, q)}
         for one in _FIELDS:
             rows = slice(first * sizes[one.of], (first + len(which)) * sizes[one.of])
             data[one.name][rows] = _flat(found[one.name], one)

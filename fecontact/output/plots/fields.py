@@ -89,8 +89,8 @@ def plot_stress(
         low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin
         axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
                  title=f"displacements times {scale:.3g}" if moved else "")
-        for which, values in zip(("x", "y"), everything.T, strict=True):
-            name_axis(axis, which, f"{which} [m]", values)
+        name_axis(axis, "x", "x [m]", everything[:, 0])
+        name_axis(axis, "y", "y [m]", everything[:, 1])
         ends: Any = ("both" if signed else "max") if cut else "neither"
         figure.colorbar(drawn, ax=axis, label=f"{name} [{unit}]", extend=ends)
         if cut:

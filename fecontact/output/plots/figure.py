@@ -20,7 +20,7 @@ from fecontact.output.plots.style import STYLE
 
 _SUFFIXES = (".png", ".pdf", ".svg")
 _PIXELS_PER_INCH = 96  # of a notebook's page
-_style: ContextVar[Mapping[str, Any]] = ContextVar("style", default=MappingProxyType({}))
+_style: ContextVar[Any] = ContextVar("style", default=MappingProxyType({}))
 
 
 @contextmanager
@@ -48,7 +48,7 @@ def styled(style: str | Path | Mapping[str, Any]) -> Iterator[None]:
         _style.reset(token)
 
 
-def _settings(style: str | Path | Mapping[str, Any]) -> Mapping[str, Any]:
+def _settings(style: str | Path | Mapping[str, Any]) -> Any:
     from matplotlib.style import library
 
     if not isinstance(style, str | Path | Mapping):
@@ -56,7 +56,7 @@ def _settings(style: str | Path | Mapping[str, Any]) -> Mapping[str, Any]:
                          f"NAME.mplstyle, or settings.")
     if isinstance(style, Mapping):
         try:
-            return dict(RcParams(style))
+            return RcParams(style)
         except (KeyError, ValueError) as error:
             raise InputError(f"style: {_first_line(error)} in {shown(style)}.") from None
     path = Path(style)
@@ -64,7 +64,7 @@ def _settings(style: str | Path | Mapping[str, Any]) -> Mapping[str, Any]:
         if not path.is_file():
             raise InputError(f"{path} does not exist; give the file of a matplotlib style.")
         try:
-            return dict(rc_params_from_file(path, use_default_template=False))
+            return rc_params_from_file(path, use_default_template=False)
         except (OSError, ValueError, KeyError) as error:
             raise InputError(f"{path} is no matplotlib style: {_first_line(error)}.") from None
     if str(style) not in library:
@@ -72,7 +72,7 @@ def _settings(style: str | Path | Mapping[str, Any]) -> Mapping[str, Any]:
         raise InputError(f"style = '{style}' is no style of matplotlib{hint}; "
                          f"print(sorted(matplotlib.style.library)) lists them, or give a file "
                          f"NAME.mplstyle.")
-    return dict(library[str(style)])
+    return library[str(style)]
 
 
 def _first_line(error: Exception) -> str:
@@ -88,7 +88,7 @@ class StyledFigure(Figure):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        self._settings = {**STYLE, **_style.get()}
+        self._settings: Any = {**STYLE, **_style.get()}
 
     def draw(self, renderer: RendererBase) -> None:
         """See :meth:`matplotlib.figure.Figure.draw`."""

@@ -1,8 +1,9 @@
 """Plots of a run: histories, phase planes, energies."""
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,14 +79,13 @@ def plot_history(
     moving = [row for row in range(2) if any(
         value[:, row].any() for _, _, values in motions for value in values)] or [0]
     rubs = trajectory.friction_force.any()
-    panels = [[f"{name} {_AXES[row]}" for name, _, _ in motions] for row in moving]
+    panels: list[Any] = [[f"{name} {_AXES[row]}" for name, _, _ in motions] for row in moving]
     panels.append(["normal force", "friction force" if rubs else "normal force"])
     with new_figure(10.0, 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
         axes = figure.subplot_mosaic(panels, sharex=True)
-        for row in panels[:-1]:
-            for panel in row:
-                axes[panel].tick_params(labelbottom=False)
+        for panel in chain.from_iterable(panels[:-1]):
+            axes[panel].tick_params(labelbottom=False)
         time = _time([axes[panel] for panel in dict.fromkeys(panels[-1])], trajectory)
         for quantity, unit, values in motions:
             for row in moving:
@@ -198,7 +198,7 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
     with new_figure(10.0, 0.5 + 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        time = _time(axes[-1:], trajectory)
+        time = _time([axes[-1]], trajectory)
         for axis, (title, sum_of, names) in zip(axes, panels, strict=True):
             total = getattr(energies, sum_of)
             terms = {name: getattr(energies, name) for name in names}
