@@ -13,7 +13,7 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.output.plots.diagram_insets import DOTS, draw_beneath, draw_insets, main_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import parameter_label
+from fecontact.output.plots.parameter_labels import name_axis, parameter_label
 from fecontact.output.plots.style import DASHES, distinct_colours
 
 if TYPE_CHECKING:
@@ -110,7 +110,11 @@ def plot_branches(
             for index, point in enumerate(branch.points):
                 if point.kind is not None:
                     known.setdefault(point.kind, []).append((places[index], heights[index]))
-        axis.set_xlabel(x_label or _label(x, branches[0].parameter_name))
+        if x_label is None:
+            name_axis(axis, "x", _label(x, branches[0].parameter_name),
+                      np.array(axis.dataLim.intervalx))
+        else:
+            axis.set_xlabel(x_label)
         axis.set_ylabel(y_label or _label(y, branches[0].parameter_name))
         axis.margins(x=0.02, y=0.06)
         axis.autoscale_view()

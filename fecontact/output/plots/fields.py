@@ -77,7 +77,7 @@ def plot_stress(
     if cells.shape[1] == 4:
         cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     drawn_height = float(np.clip(0.75 * _WIDTH * height / width, _LEAST, _LARGEST))
-    with new_figure(_WIDTH, drawn_height, path) as figure:
+    with new_figure(_WIDTH, drawn_height + 0.35 * cut, path) as figure:
         axis = figure.subplots()
         drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress / factor,
                                shading="gouraud", cmap="RdBu_r" if signed else "viridis",
