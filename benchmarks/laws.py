@@ -9,6 +9,7 @@ Usage: python benchmarks/laws.py [--quick]
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from fecontact.system.kernels import right_hand_side
 
 NODES, MODES = 400, 40
 SURFACE = {"stiffness": 0.3e6, "roughness_height": 5.2e-6, "damping": 6.0}
-GIVEN: dict[str, dict[str, float]] = {
+GIVEN: dict[str, dict[str, Any]] = {
     **dict.fromkeys(("rough-surface", "parabolic-surface", "cosine-surface", "gaussian-surface",
                      "measured-surface"), SURFACE),
     "linear": {"stiffness": 1e7}, "power": {"stiffness": 1e9}, "prescribed-force": {"force": 14.0},
@@ -29,6 +30,9 @@ GIVEN: dict[str, dict[str, float]] = {
     "back-burdekin": {"nominal_area": 1e-4, "coefficient": 1e-9},
     "greenwood-williamson": {"asperities": 1e4, "asperity_radius": 1e-5,
                              "composite_modulus": 1e11, "height_deviation": 1e-6},
+    "bilateral-cubic": {"stiffness": 1e7, "cubic_stiffness": 1e17},
+    "bilateral-play": {"stiffness": 1e7, "clearance": 1e-6},
+    "bilateral-piecewise": {"elongations": (-1e-6, 0.0, 1e-6), "forces": (-20.0, 0.0, 10.0)},
     "two-sided-stop": {"stiffness": 1e7, "clearance": 1e-3},
 }
 
