@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping
+from itertools import pairwise
 
 from fecontact.core.docstrings import summary
 
@@ -55,5 +56,10 @@ def laws_called(word: str, laws: Iterable[type]) -> list[type]:
     given = list(laws)
     by_name = {cls.__name__: cls for cls in given}
     found = [by_name[name] for name in known if name in by_name]
-    return found or [cls for cls in given
-                     if len(short) > 2 and short in re.sub(r"[\W_]+", "", summary(cls).lower())]
+    return found or [cls for cls in given if len(short) > 2 and short in _words(summary(cls))]
+
+
+def _words(text: str) -> set[str]:
+    """The words of a text, alone and two by two."""
+    words = re.findall(r"[^\W_]+", text.lower())
+    return {*words, *("".join(two) for two in pairwise(words))}

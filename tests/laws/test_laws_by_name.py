@@ -418,7 +418,7 @@ def test_laws_are_found_by_what_others_call_them(capsys):
             assert re.search(rf" {name} ", said), (word, name)
     assert execute(["laws", "no-such-thing"]) == 1
     with pytest.raises(fc.InputError, match=r"\(stribeck is .*'exponential' or 'gaussian'"):
-        fc.Study.from_toml('friction = { law = "stribeck" }', "x.toml")
+        fc.Study.from_toml(f'{HEAD}\n[friction]\nlaw = "stribeck"', "x.toml")
 
 
 def test_every_synonym_stands_for_a_law():

@@ -542,7 +542,7 @@ branch tiny.toml ground.speed --bounds 0.1 inf | bounds
 branch tiny.toml ground.speed --bounds a 1 | --bounds
 branch tiny.toml ground.speed --bounds 0.1 0.2 --set branch.point="Q" | 'Q'
 branch tiny.toml ground.speed --bounds 0.1 0.2 -o tiny.toml | tiny.toml
-keys nothing | nothing
+keys no-such-key | no-such-key
 keys ground.nothing | nothing
 laws nothing | nothing
 laws none.py:X | none.py
