@@ -19,7 +19,7 @@ from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import Blocks, blocks_of
 from fecontact.system import jacobian as contact_jacobian
-from fecontact.system import kernels
+from fecontact.system import nodes
 
 Array = NDArray[np.float64]
 Solver = Callable[[float], Array]
@@ -68,7 +68,7 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     space: dict[str, Any] = {
         "carray": carray, "f8": np.float64, "i8": np.int64, "pointer": _pointer,
         "borrowed": borrowed, "set_given": dynamics.set_given, "set_rate": dynamics.set_rate,
-        "System": kernels.SystemArrays, "Blocks": Blocks, "Gradients": dynamics.Gradients,
+        "System": nodes.SystemArrays, "Blocks": Blocks, "Gradients": dynamics.Gradients,
         "fill": contact_jacobian.jacobian}
     exec(source, space)
     options = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}

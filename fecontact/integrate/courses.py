@@ -23,7 +23,14 @@ from fecontact.integrate import bernstein
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.laws.signatures import ground_at, signal_at
+from fecontact.laws.signatures import ground_at
+from fecontact.system.nodes import (
+    ground_motion,
+    in_space,
+    moved_across,
+    moved_along,
+    surface_under,
+)
 
 # Entries of Control.ground: bounds of the ground.
 LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)
@@ -68,19 +75,26 @@ class Course(NamedTuple):
 
 @helper
 def _project(blocks, v, columns, out):
-    """Fill out with velocities along and displacements away from the ground, then along it."""
-    m, rows = blocks.shapes.shape
-    n = rows // 2
+    """Fill out with velocities along and displacements away from the ground, then along it.
+
+    In space displacements along the second tangent follow.
+    """
+    m, n = len(blocks.shapes), len(blocks.spans)
     along, away = blocks.shapes[:, :n], blocks.shapes[:, n:]
     slip, height, place = out[:n], out[n : 2 * n], out[2 * n :]
     for j in range(columns):
         out[j] = 0.0
     for part in range(len(blocks.parts)):
         i, end, left, right = block_at(blocks.parts, part)
-        if columns == 3 * n:
+        if columns > 2 * n:
             for k in range(i, end):
                 for j in range(left, right):
                     place[j] += along[k, j] * v[k]
+        if columns > 3 * n:
+            across, rows = out[3 * n :], blocks.shapes[:, 2 * n :]
+            for k in range(i, end):
+                for j in range(left, right):
+                    across[j] += rows[k, j] * v[k]
         while i + 3 < end:
             for j in range(left, right):
                 slip[j] += (along[i, j] * v[m + i] + along[i + 1, j] * v[m + i + 1]
@@ -97,15 +111,17 @@ def _project(blocks, v, columns, out):
 
 @helper
 def set_courses(s, blocks, bounds, before, after, room):
-    """Fill ``room.courses`` (6, 2 n or 3 n) with the coefficients over a step.
+    """Fill ``room.courses`` (6, 2 n, 3 n or 4 n) with the coefficients over a step.
 
     Velocities of the nodes along the ground, heights with their gap, and where the ground is not
-    flat displacements along it. ``room.nodes`` holds what
+    flat displacements along it, in space along both tangents. ``room.nodes`` holds what
     :func:`fecontact.integrate.rodas5p.dynamics.project` says of the end.
     """
     out, inner = room.courses, room.inner
     n = len(s.gap)
-    columns = 2 * n if bounds[STEEPEST] == 0.0 else 3 * n
+    columns = 2 * n
+    if bounds[STEEPEST] != 0.0:
+        columns = 4 * n if in_space(s) else 3 * n
     tableau.inner_coefficients(before, after, room.dense, inner)
     _project(blocks, before, columns, out[0])
     for k in range(3):
@@ -113,9 +129,12 @@ def set_courses(s, blocks, bounds, before, after, room):
     for j in range(n):
         out[4, j] = room.nodes[1, j]
         out[4, n + j] = room.nodes[0, n + j]
-    if columns == 3 * n:
+    if columns > 2 * n:
         for j in range(n):
             out[4, 2 * n + j] = room.nodes[0, j]
+    if columns > 3 * n:
+        for j in range(n):
+            out[4, 3 * n + j] = room.nodes[0, 2 * n + j]
     for k in range(COEFFICIENTS):
         for j in range(n):
             out[k, n + j] += s.gap[j]
@@ -123,45 +142,55 @@ def set_courses(s, blocks, bounds, before, after, room):
 
 @helper
 def set_ends(t, y, s, blocks, bounds, ends):
-    """Fill ``ends`` (3, 2 n) with displacements and velocities of the nodes, and heights below."""
+    """Fill ``ends`` (3, d n) with displacements and velocities of the nodes, and heights below."""
     n = len(s.gap)
     motion.project(blocks, y, ends[0], ends[1])
-    travel = signal_at(s.ground_motion)(t, s.ground_motion_parameters)[0]
-    _set_heights(travel, s, bounds, ends[0], ends[2, :n])
+    _set_heights(ground_motion(t, s), s, bounds, ends[0], ends[2, :n])
 
 
 @helper
-def _set_heights(travel, s, bounds, places, heights):
+def _height_at(j, along, across, moved, s):
+    """Height of the ground under node j, displaced so far along both tangents."""
+    place = s.abscissa[j] + along - moved_along(j, moved.travel, moved.second_travel, s)
+    if in_space(s):
+        return surface_under(place, s.ordinate[j] + across - moved_across(
+            j, moved.travel, moved.second_travel, s), s)[0]
+    return ground_at(s.profile)(place, s.profile_parameters)[0]
+
+
+@helper
+def _set_heights(moved, s, bounds, places, heights):
     """Fill ``heights`` (n,) with the heights of the ground under the nodes."""
+    n = len(heights)
     for j in range(len(heights)):
         heights[j] = bounds[HIGHEST]
         if bounds[STEEPEST] != 0.0:
             heights[j] = 0.0
             if s.on_ground[j]:
-                heights[j] = ground_at(s.profile)(
-                    s.abscissa[j] + places[j] - s.sliding[j] * travel, s.profile_parameters)[0]
+                across = places[2 * n + j] if in_space(s) else 0.0
+                heights[j] = _height_at(j, places[j], across, moved, s)
 
 
 @helper
 def keep_ends(n, room):
     """Copy the end of the step to the start of the next."""
     for k in range(2):
-        for j in range(2 * n):
+        for j in range(room.ends.shape[1]):
             room.ends[k, j] = room.nodes[k, j]
     for j in range(n):
         room.ends[2, j] = room.ends[2, n + j]
 
 
 @helper
-def restless(speed, h, s, blocks, control, room):
+def restless(moved, h, s, blocks, control, room):
     """Whether :func:`doubtful` may be true.
 
     ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
-    end; ``speed`` is that of the ground at the start.
+    end; ``moved`` is its motion at the start.
     """
     if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
-        return _restless_nodes(speed, h, s, blocks, control, room)
-    return _restless_modes(speed, h, s, blocks, control, room)
+        return _restless_nodes(moved, h, s, blocks, control, room)
+    return _restless_modes(moved, h, s, blocks, control, room)
 
 
 @helper
@@ -175,7 +204,7 @@ def _range(first, last, k1, k2, k3):
 
 
 @helper
-def _restless_nodes(speed, h, s, blocks, control, room):
+def _restless_nodes(moved, h, s, blocks, control, room):
     """As :func:`doubtful`, without slip velocities of nodes clear of the ground."""
     levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
     shapes = blocks.shapes
@@ -183,7 +212,7 @@ def _restless_nodes(speed, h, s, blocks, control, room):
     some = False
     for j in range(n):
         spread = abs(s.sliding[j]) * control.ground[QUICKEST] * h
-        passing = s.sliding[j] * speed
+        passing = moved_along(j, moved.speed, moved.second_speed, s)
         k1, k2, k3, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for span in range(blocks.spans.shape[1]):
             for i in range(blocks.spans[j, span, 0], blocks.spans[j, span, 1]):
@@ -203,6 +232,8 @@ def _restless_nodes(speed, h, s, blocks, control, room):
             mixed = low + shift < 0.0 and high + shift > 0.0
             some |= (mixed or low + shift < felt) and not monotone
             touching |= low + shift < 0.0 or level > 0
+        if in_space(s):
+            continue
         first, last = ends[1, j] - passing, nodes[1, j] - passing
         low, high, monotone = _range(first, last, r1, r2, r3)
         largest = max(-low, high) + spread
@@ -213,7 +244,7 @@ def _restless_nodes(speed, h, s, blocks, control, room):
 
 
 @helper
-def _restless_modes(speed, h, s, blocks, control, room):
+def _restless_modes(moved, h, s, blocks, control, room):
     """The same for many nodes, from the modes only."""
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
@@ -228,7 +259,7 @@ def _restless_modes(speed, h, s, blocks, control, room):
             dense[0, m + i], dense[1, m + i], dense[2, m + i])
     wavy = bounds[STEEPEST] != 0.0
     if wavy:
-        _set_heights(room.given[motion.TRAVEL], s, bounds, nodes[0], ends[2, n:])
+        _set_heights(motion.motion_given(room.given), s, bounds, nodes[0], ends[2, n : 2 * n])
     later = room.given[motion.SPEED]
     some = False
     for j in range(n):
@@ -241,8 +272,10 @@ def _restless_modes(speed, h, s, blocks, control, room):
         f, g = bounds[HIGHEST], bounds[HIGHEST]
         if wavy:
             f, g = ends[2, j], ends[2, n + j]
-            reach += 0.5 * bounds[STEEPEST] * (
-                abs(nodes[0, j] - ends[0, j]) + 2.0 * move + bounds[FASTEST] * h)
+            shift = abs(nodes[0, j] - ends[0, j]) + 2.0 * move
+            if in_space(s):
+                shift += abs(nodes[0, 2 * n + j] - ends[0, 2 * n + j]) + 2.0 * move
+            reach += 0.5 * bounds[STEEPEST] * (shift + bounds[FASTEST] * h)
         touching = nodes[2, n + j] != 0.0
         for level in range(levels.shape[0]):
             shift = s.gap[j] + levels[level, j]
@@ -250,8 +283,10 @@ def _restless_modes(speed, h, s, blocks, control, room):
             low, high = min(first, last) - reach, max(first, last) + reach
             some |= (low < 0.0 and high > 0.0) or low < 2.0 * min(min(first, last), 0.0)
             touching |= low < 0.0 or level > 0
+        if in_space(s):
+            continue
         factor = s.sliding[j]
-        first, last = ends[1, j] - factor * speed, nodes[1, j] - factor * later
+        first, last = ends[1, j] - factor * moved.speed, nodes[1, j] - factor * later
         part = quicken + abs(factor) * bounds[QUICKEST] * h
         low, high = min(first, last) - part, max(first, last) + part
         largest = max(-low, high)
@@ -268,18 +303,22 @@ def _departure(k1, k2, k3):
 
 
 @helper
-def doubtful(speed, h, s, bounds, levels, slip_scale, room):
+def doubtful(moved, h, s, bounds, levels, slip_scale, room):
     """Whether forces within the step may differ from what its ends suggest.
 
     A gap or slip velocity may change sign more often than its end values show, a contact be twice
     as deep in between, or slip begin and end. ``levels`` (k, n) are the penetrations at which
-    normal forces begin; ``speed`` is that of the ground. Row DOUBT of ``room.courses`` marks the
+    normal forces begin; ``moved`` is the motion of the ground. Row DOUBT of ``room.courses`` marks the
     quantities concerned.
     """
     c = room.courses
     n = levels.shape[1]
     for j in range(n):
-        spread, v = abs(s.sliding[j]) * bounds[QUICKEST] * h, s.sliding[j] * speed
+        if in_space(s):
+            # Slip velocities turn there, and the error of a step sees it.
+            c[DOUBT, j], c[DOUBT, n + j] = 0.0, 0.0
+            continue
+        spread, v = abs(s.sliding[j]) * bounds[QUICKEST] * h, s.sliding[j] * moved.speed
         low = min(min(min(c[0, j], c[1, j]), min(c[2, j], c[3, j])), c[4, j]) - v - spread
         high = max(max(max(c[0, j], c[1, j]), max(c[2, j], c[3, j])), c[4, j]) - v + spread
         largest = max(-low, high)
@@ -319,21 +358,28 @@ def ground_part(part, course):
     s, step, row = course.system, course.step, course.row
     now = min(step.t + part * step.h, step.latest)
     if course.what == SLIP:
-        return s.sliding[course.node] * signal_at(s.ground_motion)(
-            now, s.ground_motion_parameters)[1]
+        moved = ground_motion(now, s)
+        return moved_along(course.node, moved.speed, moved.second_speed, s)
     if course.bounds[STEEPEST] == 0.0:
         return course.bounds[HIGHEST]
     if not s.on_ground[course.node]:
         return 0.0
-    travel = signal_at(s.ground_motion)(now, s.ground_motion_parameters)[0]
-    column = 2 * s.gap.shape[0] + course.node
+    n = s.gap.shape[0]
+    along, across = _displaced(part, 2 * n + course.node, course, row), 0.0
+    if in_space(s):
+        across = _displaced(part, 3 * n + course.node, course, row)
+    return _height_at(course.node, along, across, ground_motion(now, s), s)
+
+
+@helper
+def _displaced(part, column, course, row):
+    """Value of a column of the courses at a part of the step."""
     for k in range(COEFFICIENTS):
         row[k] = course.courses[k, column]
     for k in range(COEFFICIENTS - 1, 0, -1):
         for i in range(k):
             row[i] += part * (row[i + 1] - row[i])
-    return ground_at(s.profile)(s.abscissa[course.node] + row[0] - s.sliding[course.node] * travel,
-                                s.profile_parameters)[0]
+    return row[0]
 
 
 @helper
@@ -361,9 +407,12 @@ def _ground_bound(course):
     if bounds[STEEPEST] == 0.0 or not course.system.on_ground[course.node]:
         return 0.0
     # The node's own motion over the ground, and that of the ground.
-    bound, column = 0.0, 2 * course.system.gap.shape[0] + course.node
-    for k in range(COEFFICIENTS - 1):
-        bound = max(bound, 4.0 * abs(course.courses[k + 1, column] - course.courses[k, column]))
+    bound, n = 0.0, course.system.gap.shape[0]
+    for first in range(2, 4 if in_space(course.system) else 3):
+        column, most = first * n + course.node, 0.0
+        for k in range(COEFFICIENTS - 1):
+            most = max(most, 4.0 * abs(course.courses[k + 1, column] - course.courses[k, column]))
+        bound += most
     return bounds[STEEPEST] * (bound + bounds[FASTEST] * h)
 
 

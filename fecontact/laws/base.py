@@ -190,8 +190,11 @@ class FrictionLaw(NodeLaw):
     """A friction law.
 
     Its ``kernel`` is a :func:`fecontact.laws.friction_law` or a
-    :func:`fecontact.laws.memory_friction_law`.
+    :func:`fecontact.laws.memory_friction_law`. In space laws without memory act along the slip
+    direction; those with memory need a ``planar_kernel`` there.
     """
+
+    planar_kernel: ClassVar[CompiledLaw | None] = None
 
     @property
     def memory(self) -> int:

@@ -16,9 +16,16 @@ friction     ``f(v, F, p)``              R, dR/dv, dR/dF: friction force [N] tha
 friction     ``f(v, F, z, p, force,      nothing; fills ``force`` (3 + s,) with R, dR/dv, dR/dF and
 with memory  rates)``                    the s derivatives dR/dz, and ``rates`` (s, 3 + s) with a
                                          row z', dz'/dv, dz'/dF, dz'/dz per internal variable z
+friction in  ``f(law, v1, v2, F, z, p,   nothing; fills ``force`` (2 (4 + s),) with the same for
+space        force, rates)``             both components: R_i, dR_i/dv1, dR_i/dF, s derivatives
+                                         dR_i/dz, dR_i/dv2; and ``rates`` (s, 4 + s) with z',
+                                         dz'/dv1, dz'/dF, dz'/dz, dz'/dv2; ``law`` is the address
+                                         of the function for one direction, if that is used
 ground       ``f(xi, p)``                y, y', y'': height [m], or factor of the friction force,
                                          at the abscissa xi of the ground's own frame [m] and its
                                          derivatives
+surface      ``f(x, y, p)``              z, z_x, z_y, z_xx, z_xy, z_yy: height of the ground [m] at a
+                                         place of its own frame [m], and its derivatives
 signal       ``f(t, p)``                 value and rate of a function of time: travel of the ground
                                          [m], displacement of the drive [m], load [N]
 ===========  ==========================  =========================================================
@@ -28,6 +35,10 @@ those of the contact node. A parameter given as one number applies to every node
 (stiffness, damping) is then the total of the contact face, distributed by tributary length. A
 parameter given as a sequence has one value per node and is not distributed. A parameter with named
 choices applies to every node; ``p`` holds its index in :attr:`fecontact.laws.base.NodeLaw.choices`.
+
+Laws without memory act in space along the slip direction, without a further function
+(:mod:`fecontact.laws.friction.planar`). Internal variables of laws with memory are vectors there,
+both components of each one after the other, so that s is twice their number.
 
 Internal variables of friction with memory are states of the system. Their rates must be continuous
 where R depends on them; at F = 0, where it does not, they decay to zero.
@@ -39,19 +50,31 @@ from typing import Any
 
 from numba import types
 
-from fecontact.core.compiled import CompiledLaw, compile_law, f8, function_at, matrix, vector
+from fecontact.core.compiled import (
+    CompiledLaw,
+    compile_law,
+    f8,
+    function_at,
+    i8,
+    matrix,
+    vector,
+)
 from fecontact.core.errors import InputError
 
 NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
 FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)
 MEMORY = types.void(f8, f8, vector, vector, vector, matrix)
+PLANAR = types.void(i8, f8, f8, f8, vector, vector, vector, matrix)
 GROUND = types.UniTuple(f8, 3)(f8, vector)
+SURFACE = types.UniTuple(f8, 6)(f8, f8, vector)
 SIGNAL = types.UniTuple(f8, 2)(f8, vector)
 
 normal_at = function_at(NORMAL)
 friction_at = function_at(FRICTION)
 memory_at = function_at(MEMORY)
+planar_at = function_at(PLANAR)
 ground_at = function_at(GROUND)
+surface_at = function_at(SURFACE)
 signal_at = function_at(SIGNAL)
 
 NORMAL_FORM = "f(u, v, p) -> F, dF/du, dF/dv"
@@ -99,6 +122,16 @@ def memory_friction_law(function: Callable[..., Any]) -> CompiledLaw:
     Otherwise as :func:`friction_law`.
     """
     return _compiled(MEMORY, MEMORY_FORM, function, 6)
+
+
+def planar_friction_law(function: Callable[..., Any]) -> CompiledLaw:
+    """Compile ``f(law, v1, v2, F, z, p, force, rates)``, friction in two directions."""
+    return compile_law(PLANAR, "f(law, v1, v2, F, z, p, force, rates)", function)
+
+
+def ground_surface(function: Callable[..., Any]) -> CompiledLaw:
+    """Compile ``f(x, y, p) -> z, z_x, z_y, z_xx, z_xy, z_yy``."""
+    return compile_law(SURFACE, "f(x, y, p) -> z, z_x, z_y, z_xx, z_xy, z_yy", function)
 
 
 def signal(function: Callable[..., Any]) -> CompiledLaw:

@@ -10,7 +10,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.kernels import SystemArrays
+from fecontact.system.nodes import SystemArrays
 from fecontact.system.loads import load_rows
 
 LawGroup = tuple[slice, Array, Any]

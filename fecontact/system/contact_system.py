@@ -22,7 +22,7 @@ from fecontact.reduction.assembly.links import Links
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
-from fecontact.system import kernels
+from fecontact.system import kernels, nodes
 from fecontact.system.arrays import system_arrays
 from fecontact.system.friction_memory import bristle_history
 from fecontact.system.gap import Gap, gap_values
@@ -298,7 +298,7 @@ class ContactSystem(Summarised):
              for nodes, _, law in self.law_groups("friction")], axis=-1)
 
     @cached_property
-    def arrays(self) -> kernels.SystemArrays:
+    def arrays(self) -> nodes.SystemArrays:
         """The system as arrays for the compiled kernels."""
         return system_arrays(
             self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,

@@ -5,12 +5,14 @@ from numba import types
 
 from fecontact.core.compiled import block, f8, kernel, matrix, vector
 from fecontact.core.types import Array
-from fecontact.system.kernels import (
+from fecontact.system.kernels import node_forces
+from fecontact.system.nodes import (
     SYSTEM,
     SystemArrays,
+    force_room,
     ground_motion,
+    in_space,
     memory_of,
-    node_forces,
     node_motion,
 )
 from fecontact.system.powers import storing_power
@@ -20,7 +22,8 @@ from fecontact.system.powers import storing_power
 def bristle_history(times, states, s, out):
     """Fill out (2, N, n): what the bristles store, and the power into it at constant force."""
     count = s.memory.max()
-    force, rates = np.empty(3 + count), np.empty((count, 3 + count))
+    length, width = force_room(count, in_space(s))
+    force, rates = np.empty(length), np.empty((count, width))
     for i in range(len(times)):
         y, moved = states[i], ground_motion(times[i], s)
         for j in range(len(s.Tx)):
@@ -39,7 +42,8 @@ def _settle(t, y, s):
     """Bring z of each node to z' = 0 by implicit Euler steps of increasing length."""
     n = len(s.Tx)
     states = s.memory.max()
-    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    length, width = force_room(states, in_space(s))
+    force, rates = np.empty(length), np.empty((states, width))
     moved = ground_motion(t, s)
     for j in range(n):
         count = s.memory[j]

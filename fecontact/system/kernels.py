@@ -12,173 +12,59 @@ where K and C hold the modes' own stiffness and damping and the springs and dash
 the variation of friction along the ground. T has no second part where contact forces stay vertical.
 Rows of nodes between two bodies are those of their relative motion; y_R is zero there. One motion
 moves all other sides, by a factor each: travel_j = c_j travel, V_j = c_j V.
-"""
 
-from typing import NamedTuple
+In space x is the displacement along the first tangent of a node, y that along its normal, and a
+second tangent follows: its quantities are called ``across``. Friction is a vector, the ground a
+surface, and two motions move the other sides, by factors for both tangents. All that has entries
+for the second tangent has them last, so that the first ones are the same in the plane.
+"""
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import (
-    block,
-    borrowed,
-    f8,
-    helper,
-    i8,
-    integers,
-    kernel,
-    matrix,
-    vector,
+from fecontact.core.compiled import block, borrowed, f8, helper, integers, kernel, matrix, vector
+from fecontact.laws.signatures import friction_at, memory_at, normal_at, planar_at, signal_at
+from fecontact.system.nodes import (
+    SYSTEM,
+    force_room,
+    ground_motion,
+    in_space,
+    leaning,
+    memory_of,
+    node_contact,
+    node_motion,
+    pressing_force,
+    scale_under,
 )
-from fecontact.core.types import Array, Integers
-from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 
-
-class SystemArrays(NamedTuple):
-    """A contact system as the kernels see it: arrays, and laws by address.
-
-    ``drive_damping`` (2,) is that of relative dashpots; ``sliding`` (n,) are the factors c_j;
-    ``bristle_stiffness`` (2, n, s) are a and b of the stored ``(a + b |F|) z^2 / 2``; ``on_ground``
-    is 0 for nodes between bodies, ``leans`` where contact forces stay vertical, else 1.
-    """
-
-    stiffness: Array
-    damping: Array
-    modal_damping: Array
-    constant_load: Array
-    drive_shapes: Array
-    drive_stiffness: Array
-    drive_damping: Array
-    load_shapes: Array
-    Tx: Array
-    Ty: Array
-    abscissa: Array
-    gap: Array
-    sliding: Array
-    bristle_stiffness: Array
-    normal_parameters: Array
-    friction_parameters: Array
-    profile_parameters: Array
-    friction_scale_parameters: Array
-    ground_motion_parameters: Array
-    drive_parameters: Array
-    load_parameters: Array
-    normal: Integers
-    friction: Integers
-    memory: Integers
-    on_ground: Integers
-    drive: Integers
-    load: Integers
-    profile: int
-    friction_scale: int
-    ground_motion: int
-    leans: int
-
-
-SYSTEM = types.NamedTuple(
-    [matrix, matrix, matrix, vector, matrix, vector, vector, matrix, matrix, matrix, vector, vector,
-     vector, block, matrix, matrix, vector, vector, vector, matrix, matrix,
-     integers, integers, integers, integers, integers, integers, i8, i8, i8, i8], SystemArrays)
-
-# Columns of the per-node results of `contact_state`.
-STATE_COLUMNS = 6
-NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE = range(
-    STATE_COLUMNS)
-
-
-class GroundMotion(NamedTuple):
-    """How far the ground has travelled, and its speed; or what slides in its place."""
-
-    travel: float
-    speed: float
-
-
-class NodeMotion(NamedTuple):
-    """Displacements of a node along and away from the ground, and their rates."""
-
-    along: float
-    height: float
-    along_rate: float
-    height_rate: float
-
-
-class NodeContact(NamedTuple):
-    """A node against the ground: xi, u, u', slip velocity, and y_R' and y_R'' of the profile."""
-
-    place: float
-    penetration: float
-    rate: float
-    slip: float
-    slope: float
-    curvature: float
+# Columns of the per-node results of `contact_state`; the last two in space only.
+(NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE,
+ FRICTION_ACROSS, SLIP_ACROSS) = range(8)
+STATE_COLUMNS, SPACE_STATE_COLUMNS = 6, 8
 
 
 @helper
-def ground_motion(t, s):
-    """Motion of the ground at time t."""
-    travel, speed = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    return GroundMotion(travel, speed)
-
-
-@helper
-def node_motion(j, y, s):
-    """Motion of node j in the state y."""
-    m = s.Tx.shape[1]
-    x, height, x_rate, height_rate = 0.0, 0.0, 0.0, 0.0
-    for i in range(m):
-        x += s.Tx[j, i] * y[i]
-        height += s.Ty[j, i] * y[i]
-        x_rate += s.Tx[j, i] * y[m + i]
-        height_rate += s.Ty[j, i] * y[m + i]
-    return NodeMotion(x, height, x_rate, height_rate)
-
-
-@helper
-def node_contact(j, motion, moved, s):
-    """Where node j is above the other side, under the prescribed motion ``moved``."""
-    place = s.abscissa[j] + motion.along - s.sliding[j] * moved.travel
-    ground, slope, curvature = 0.0, 0.0, 0.0
-    if s.on_ground[j]:
-        ground, slope, curvature = ground_at(s.profile)(place, s.profile_parameters)
-    slip = motion.along_rate - s.sliding[j] * moved.speed
-    return NodeContact(place, ground - motion.height - s.gap[j],
-                       slope * slip - motion.height_rate, slip, slope, curvature)
-
-
-@helper
-def memory_of(j, y, s):
-    """Internal variables of node j: a view of the state y."""
-    n, m = s.Tx.shape
-    first = 2 * m + j * ((len(y) - 2 * m) // n)
-    return y[first : first + s.memory[j]]
-
-
-@helper
-def pressing_force(j, place, F, s):
-    """The force that friction sees under a normal force: |F| times the ground's variation."""
-    pressing = abs(F)
-    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        pressing *= ground_at(s.friction_scale)(place, s.friction_scale_parameters)[0]
-    return pressing
-
-
-@helper
-def force_against_x(F, R, contact, s):
-    """Force of a node in -x: friction, and the part of the contact force that leans."""
-    return R + F * contact.slope if s.leans else R
+def friction_across(force, rates):
+    """Friction along the second tangent, from the results of a law in two directions."""
+    return force[4 + len(rates)]
 
 
 @helper
 def node_forces(j, motion, moved, z, s, force, rates):
     """F and R of node j, and its :class:`NodeContact`.
 
-    ``force`` (3 + s,) and ``rates`` (s, 3 + s) are filled by laws with memory; see the contract.
+    ``force`` and ``rates`` are filled by friction with memory and, in space, by all friction; see
+    the contract in :mod:`fecontact.laws.signatures`.
     """
     contact = node_contact(j, motion, moved, s)
     F = normal_at(s.normal[j])(contact.penetration, contact.rate, s.normal_parameters[j])[0]
-    pressing = pressing_force(j, contact.place, F, s)
+    pressing = pressing_force(j, contact, F, s)
     R = 0.0
-    if s.memory[j] > 0:
+    if in_space(s):
+        planar_at(s.planar[j])(s.friction[j], contact.slip, contact.slip_across, pressing, z,
+                               s.friction_parameters[j], force, rates)
+        R = force[0]
+    elif s.memory[j] > 0:
         memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
         R = force[0]
     elif F != 0.0:
@@ -190,7 +76,7 @@ def node_forces(j, motion, moved, z, s, force, rates):
 def normal_gradients(j, contact, s, out):
     """F of node j and the force that friction sees under it.
 
-    Fills out[0] and out[2] with their derivatives to x, y, x', y' of the node.
+    Fills out[0] and out[2] with their derivatives to x, y, x', y' of the node, and across.
     """
     slope = contact.slope
     F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
@@ -199,15 +85,25 @@ def normal_gradients(j, contact, s, out):
     out[0, 1] = -F_u
     out[0, 2] = F_v * slope
     out[0, 3] = -F_v
+    columns = out.shape[1]
+    if columns > 4:
+        out[0, 0] += F_v * contact.twist * contact.slip_across
+        out[0, 4] = F_u * contact.slope_across + F_v * (
+            contact.twist * contact.slip + contact.curvature_across * contact.slip_across)
+        out[0, 5] = F_v * contact.slope_across
     sign = 1.0 if F >= 0.0 else -1.0
     pressing = abs(F)
-    for k in range(4):
+    for k in range(columns):
         out[2, k] = sign * out[0, k]
     if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        scale, scale_x, _ = ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)
-        for k in range(4):
+        scale, slope = scale_under(contact, s)
+        for k in range(columns):
             out[2, k] *= scale
-        out[2, 0] += scale_x * pressing
+        if columns > 4:
+            out[2, 0] += s.wave_direction[0] * slope * pressing
+            out[2, 4] += s.wave_direction[1] * slope * pressing
+        else:
+            out[2, 0] += slope * pressing
         pressing *= scale
     return F, pressing
 
@@ -216,11 +112,17 @@ def normal_gradients(j, contact, s, out):
 def node_gradients(j, motion, moved, z, s, force, rates, out):
     """F of node j, its force T in -x, and its :class:`NodeContact`, with derivatives.
 
-    Fills out (3, 4) with those of F, T and the force that friction sees to x, y, x', y'; ``force``
-    begins with R and its derivatives to slip velocity and pressing force for all laws.
+    Fills out (3, 4) with those of F, T and the force that friction sees to x, y, x', y'; in space
+    (4, 6), with the force against the second tangent and derivatives to the motion across.
+    ``force`` begins with R and its derivatives to slip velocity and pressing force for all laws.
     """
     contact = node_contact(j, motion, moved, s)
     F, pressing = normal_gradients(j, contact, s, out)
+    if in_space(s):
+        planar_at(s.planar[j])(s.friction[j], contact.slip, contact.slip_across, pressing, z,
+                               s.friction_parameters[j], force, rates)
+        _gradients_in_space(F, contact, s.leans, force, len(rates), out)
+        return F, leaning(F, force[0], contact.slope, s), contact
     R, R_v, R_F = 0.0, 0.0, 0.0
     if s.memory[j] > 0:
         memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
@@ -235,17 +137,42 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
         for k in range(4):
             out[1, k] += contact.slope * out[0, k]
         out[1, 0] += F * contact.curvature
-    return F, force_against_x(F, R, contact, s), contact
+    return F, leaning(F, R, contact.slope, s), contact
+
+
+@helper
+def _gradients_in_space(F, contact, leans, force, states, out):
+    """Fill the rows of ``out`` (4, 6) of the forces against both tangents."""
+    second = 4 + states
+    for k in range(6):
+        out[1, k] = force[2] * out[2, k]
+        out[3, k] = force[second + 2] * out[2, k]
+    out[1, 2] += force[1]
+    out[1, 5] += force[3 + states]
+    out[3, 2] += force[second + 1]
+    out[3, 5] += force[second + 3 + states]
+    if leans:
+        for k in range(6):
+            out[1, k] += contact.slope * out[0, k]
+            out[3, k] += contact.slope_across * out[0, k]
+        out[1, 0] += F * contact.curvature
+        out[1, 4] += F * contact.twist
+        out[3, 0] += F * contact.twist
+        out[3, 4] += F * contact.curvature_across
 
 
 @kernel(types.void(f8, vector, SYSTEM, matrix))
 def contact_state(t, y, s, out):
-    """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node."""
+    """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node.
+
+    In space (n, 8): with friction force and slip velocity along the second tangent.
+    """
     y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)
     moved = ground_motion(t, s)
     states = s.memory.max()
-    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    length, width = force_room(states, in_space(s))
+    force, rates = np.empty(length), np.empty((states, width))
     for j in range(n):
         F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
                                     rates)
@@ -253,18 +180,32 @@ def contact_state(t, y, s, out):
         out[j, PENETRATION], out[j, PENETRATION_RATE] = contact.penetration, contact.rate
         out[j, SLIP_VELOCITY] = contact.slip
         out[j, GROUND_RATE] = contact.slope * contact.slip
+        if in_space(s):
+            out[j, GROUND_RATE] += contact.slope_across * contact.slip_across
+            out[j, FRICTION_ACROSS] = friction_across(force, rates)
+            out[j, SLIP_ACROSS] = contact.slip_across
 
 
 @helper
-def set_load(t, pull_x, pull_y, s, load):
-    """Fill load (m,) with the modal forces of the loads at time t and of the drive's pulls."""
-    m = len(load)
-    for i in range(m):
-        load[i] = (s.constant_load[i] + pull_x * s.drive_shapes[0, i]
-                   + pull_y * s.drive_shapes[1, i])
+def set_constant_load(s, load):
+    """Fill load (m,) with the modal forces of the constant loads."""
+    for i in range(len(load)):
+        load[i] = s.constant_load[i]
+
+
+@helper
+def add_pull(pull, axis, s, load):
+    """Add the modal forces of a pull of the drive along an axis."""
+    for i in range(len(load)):
+        load[i] += pull * s.drive_shapes[axis, i]
+
+
+@helper
+def add_loads(t, s, load):
+    """Add the modal forces of the loads in time."""
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
-        for i in range(m):
+        for i in range(len(load)):
             load[i] += value * s.load_shapes[k, i]
 
 
@@ -278,7 +219,10 @@ def drive_pull(axis, t, s):
 @helper
 def given_at(t, s, load):
     """Fill load (m,) with modal forces given in time; returns the motion of the ground."""
-    set_load(t, drive_pull(0, t, s), drive_pull(1, t, s), s, load)
+    set_constant_load(s, load)
+    for axis in range(len(s.drive)):
+        add_pull(drive_pull(axis, t, s), axis, s, load)
+    add_loads(t, s, load)
     return ground_motion(t, s)
 
 
@@ -306,7 +250,7 @@ def body_rates(load, y, s, out):
 
 @helper
 def rates_under(load, moved, y, s, force, rates, out):
-    """Fill out (2 m + n s,) with y'; ``force`` (3 + s,) and ``rates`` (s, 3 + s) are room."""
+    """Fill out (2 m + n s,) with y'; ``force`` and ``rates`` are room for laws of friction."""
     n, m = s.Tx.shape
     states = len(rates)
     body_rates(load, y, s, out)
@@ -314,9 +258,13 @@ def rates_under(load, moved, y, s, force, rates, out):
         F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
                                     rates)
         if F != 0.0:
-            T = force_against_x(F, R, contact, s)
+            T = leaning(F, R, contact.slope, s)
             for i in range(m):
                 out[m + i] += s.Ty[j, i] * F - s.Tx[j, i] * T
+            if in_space(s):
+                T = leaning(F, friction_across(force, rates), contact.slope_across, s)
+                for i in range(m):
+                    out[m + i] -= s.T2[j, i] * T
         for k in range(s.memory[j]):
             out[2 * m + j * states + k] = rates[k, 0]
 
@@ -328,12 +276,13 @@ def right_hand_side(t, y, s, out):
     states = s.memory.max()
     load = np.empty(s.Tx.shape[1])
     moved = given_at(t, s, load)
-    rates_under(load, moved, y, s, np.empty(3 + states), np.empty((states, 3 + states)), out)
+    length, width = force_room(states, in_space(s))
+    rates_under(load, moved, y, s, np.empty(length), np.empty((states, width)), out)
 
 
 @kernel(types.void(vector, matrix, SYSTEM, block))
 def contact_history(times, states, s, out):
-    """Fill out (N, n, 6) with `contact_state` at N times."""
+    """Fill out (N, n, 6), in space (N, n, 8), with `contact_state` at N times."""
     for k in range(len(times)):
         contact_state(times[k], states[k], s, out[k])
 

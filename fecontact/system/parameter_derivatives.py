@@ -11,7 +11,24 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
-from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
+from fecontact.laws.friction.planar import direction
+from fecontact.laws.signatures import (
+    friction_at,
+    ground_at,
+    memory_at,
+    normal_at,
+    planar_at,
+    signal_at,
+    surface_at,
+)
+from fecontact.system.nodes import (
+    GroundMotion,
+    in_space,
+    moved_across,
+    moved_along,
+    node_motion,
+    scale_under,
+)
 
 # Fourth-order differences: offsets in steps, and weights in twelfths of a step.
 _PLACES = np.array([1.0, -1.0, 2.0, -2.0])
@@ -29,6 +46,7 @@ class LawsBeside(NamedTuple):
     profile: Array
     friction_scale: Array
     ground_motion: Array
+    second_motion: Array
     drive: Array
     load: Array
     step: float
@@ -68,6 +86,8 @@ def laws_beside(s, r, h):
                 r.friction_scale_parameters.reshape(1, -1), h),
         _beside(s.ground_motion_parameters.reshape(1, -1),
                 r.ground_motion_parameters.reshape(1, -1), h),
+        _beside(s.second_motion_parameters.reshape(1, -1),
+                r.second_motion_parameters.reshape(1, -1), h),
         _beside(s.drive_parameters, r.drive_parameters, h),
         _beside(s.load_parameters, r.load_parameters, h), h)
 
@@ -85,11 +105,11 @@ def _signal_rates(address, t, beside, row, h):
 
 @helper
 def given_rates(t, s, r, laws, load):
-    """Fill load (m,) with derivatives of the modal forces; returns those of travel and speed."""
+    """Fill load (m,) with derivatives of the modal forces; returns those of the ground's motion."""
     m, h = len(load), laws.step
     for i in range(m):
         load[i] = r.constant_load[i]
-    for k in range(2):
+    for k in range(len(s.drive)):
         value, rate = signal_at(s.drive[k])(t, s.drive_parameters[k])
         value_p, rate_p = _signal_rates(s.drive[k], t, laws.drive, k, h)
         pull = s.drive_stiffness[k] * value + s.drive_damping[k] * rate
@@ -102,7 +122,11 @@ def given_rates(t, s, r, laws, load):
         rate = _signal_rates(s.load[k], t, laws.load, k, h)[0]
         for i in range(m):
             load[i] += value * r.load_shapes[k, i] + rate * s.load_shapes[k, i]
-    return _signal_rates(s.ground_motion, t, laws.ground_motion, 0, h)
+    travel, speed = _signal_rates(s.ground_motion, t, laws.ground_motion, 0, h)
+    second_travel, second_speed = 0.0, 0.0
+    if s.second_motion != 0:
+        second_travel, second_speed = _signal_rates(s.second_motion, t, laws.second_motion, 0, h)
+    return GroundMotion(travel, speed, second_travel, second_speed)
 
 
 @helper
@@ -117,22 +141,84 @@ def _ground_rates(address, xi, beside, h):
 
 
 @helper
-def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
-    """Derivatives of F, T, slip velocity and pressing force at node j.
+def _surface_rates(contact, s, laws):
+    """Derivatives of the ground's height under a node and of its slopes."""
+    h = laws.step
+    if not in_space(s):
+        ground, slope = _ground_rates(s.profile, contact.place, laws.profile, h)
+        return ground, slope, 0.0
+    ground, slope, across = 0.0, 0.0, 0.0
+    if s.surface != 0:
+        for k in range(len(laws.profile)):
+            found = surface_at(s.surface)(contact.place, contact.place_across, laws.profile[k, 0])
+            weight = _WEIGHTS[k] / (12.0 * h)
+            ground += weight * found[0]
+            slope += weight * found[1]
+            across += weight * found[2]
+        return ground, slope, across
+    a, b = s.wave_direction[0], s.wave_direction[1]
+    ground, slope = _ground_rates(s.profile, a * contact.place + b * contact.place_across,
+                                  laws.profile, h)
+    return ground, a * slope, b * slope
 
-    ``shifts`` holds those of xi, height, slip velocity and rate of the height by themselves;
+
+@helper
+def set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts):
+    """Fill ``shifts`` with what the parameter alone adds to xi, height, slip and rate of a node.
+
+    In space place and slip velocity along the second tangent follow.
+    """
+    space = in_space(s)
+    if basis_moves:
+        motion = node_motion(j, y, r)
+        shifts[0], shifts[1], shifts[2], shifts[3] = (
+            motion.along, motion.height, motion.along_rate, motion.height_rate)
+        if space:
+            shifts[4], shifts[5] = motion.across, motion.across_rate
+    else:
+        shifts[:] = 0.0
+    shifts[0] += (r.abscissa[j] - moved_along(j, moved_p.travel, moved_p.second_travel, s)
+                  - moved_along(j, moved.travel, moved.second_travel, r))
+    shifts[1] += r.gap[j]
+    shifts[2] -= (moved_along(j, moved_p.speed, moved_p.second_speed, s)
+                  + moved_along(j, moved.speed, moved.second_speed, r))
+    if space:
+        shifts[4] += (r.ordinate[j] - moved_across(j, moved_p.travel, moved_p.second_travel, s)
+                      - moved_across(j, moved.travel, moved.second_travel, r))
+        shifts[5] -= (moved_across(j, moved_p.speed, moved_p.second_speed, s)
+                      + moved_across(j, moved.speed, moved.second_speed, r))
+
+
+class NodeRates(NamedTuple):
+    """Derivatives of F and of the forces against both tangents, of slip and of pressing force."""
+
+    F: float
+    T: float
+    T2: float
+    slip: float
+    slip_across: float
+    pressing: float
+
+
+@helper
+def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
+    """The :class:`NodeRates` of node j.
+
+    ``shifts`` are those of :func:`set_shifts`;
     ``contact``, ``force`` and ``partial`` are results of
-    :func:`fecontact.system.kernels.node_gradients`. Of ``room``, (3 + s,), (s, 3 + s) and (s,),
-    the last is filled with what the friction law's own parameters add to the rates of its
+    :func:`fecontact.system.kernels.node_gradients`. Of ``room``, for the results of friction with
+    memory, the last is filled with what the friction law's own parameters add to the rates of its
     internal variables; the others are overwritten.
     """
     room_force, room_rates, memory = room
-    place, slip, h = contact.place, contact.slip, laws.step
-    ground, slope = 0.0, 0.0
+    slip, h, space = contact.slip, laws.step, in_space(s)
+    second = 4 + len(memory)
+    ground, slope, across = 0.0, 0.0, 0.0
     if s.on_ground[j]:
-        ground, slope = _ground_rates(s.profile, place, laws.profile, h)
-    F_p = -partial[0, 1] * ground - partial[0, 3] * slope * slip
-    for k in range(4):
+        ground, slope, across = _surface_rates(contact, s, laws)
+    F_p = -partial[0, 1] * ground - partial[0, 3] * (
+        slope * slip + across * contact.slip_across)
+    for k in range(len(shifts)):
         F_p += partial[0, k] * shifts[k]
     for k in range(len(laws.normal)):
         F_p += _WEIGHTS[k] / (12.0 * h) * normal_at(s.normal[j])(
@@ -140,28 +226,53 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
     size, pressing_p = abs(F), F_p if F >= 0.0 else -F_p
     pressing = size
     if s.friction_scale != 0 and s.on_ground[j]:
-        scale, scale_x, _ = ground_at(s.friction_scale)(place, s.friction_scale_parameters)
+        scale, scale_x = scale_under(contact, s)
+        place, shift = contact.place, shifts[0]
+        if space:
+            a, b = s.wave_direction[0], s.wave_direction[1]
+            place = a * contact.place + b * contact.place_across
+            shift = a * shifts[0] + b * shifts[4]
         pressing = scale * size
         pressing_p = scale * pressing_p + size * (
-            scale_x * shifts[0]
-            + _ground_rates(s.friction_scale, place, laws.friction_scale, h)[0])
-    R_F = force[2]
+            scale_x * shift + _ground_rates(s.friction_scale, place, laws.friction_scale, h)[0])
+    R_F, R_F2 = force[2], 0.0
+    if space:
+        R_F2 = force[second + 2]
     if s.memory[j] == 0 and F == 0.0 and F_p != 0.0:
         # Friction is zero without a normal force, but may be about to begin.
-        R_F = friction_at(s.friction[j])(slip, 0.0, s.friction_parameters[j])[2]
-    R_p = force[1] * shifts[2] + R_F * pressing_p
+        if space:
+            speed, e1, e2 = direction(slip, contact.slip_across, 0.0, 0.0)
+            R_F = friction_at(s.friction[j])(speed, 0.0, s.friction_parameters[j])[2]
+            R_F, R_F2 = R_F * e1, R_F * e2
+        else:
+            R_F = friction_at(s.friction[j])(slip, 0.0, s.friction_parameters[j])[2]
+    R_p, R_p2, slip_across = force[1] * shifts[2] + R_F * pressing_p, 0.0, 0.0
+    if space:
+        slip_across = shifts[5]
+        R_p += force[3 + len(memory)] * slip_across
+        R_p2 = (force[second + 1] * shifts[2] + force[second + 3 + len(memory)] * slip_across
+                + R_F2 * pressing_p)
     for i in range(s.memory[j]):
         memory[i] = 0.0
     for k in range(len(laws.friction)):
         weight = _WEIGHTS[k] / (12.0 * h)
-        if s.memory[j] > 0:
+        if space:
+            planar_at(s.planar[j])(s.friction[j], slip, contact.slip_across, pressing, z,
+                                   laws.friction[k, j], room_force, room_rates)
+            R_p += weight * room_force[0]
+            R_p2 += weight * room_force[second]
+        elif s.memory[j] > 0:
             memory_at(s.friction[j])(slip, pressing, z, laws.friction[k, j], room_force,
                                      room_rates)
             R_p += weight * room_force[0]
-            for i in range(s.memory[j]):
-                memory[i] += weight * room_rates[i, 0]
         elif F != 0.0:
             R_p += weight * friction_at(s.friction[j])(slip, pressing, laws.friction[k, j])[0]
+        for i in range(s.memory[j]):
+            memory[i] += weight * room_rates[i, 0]
     if s.leans:
+        if space:
+            R_p2 += contact.slope_across * F_p + F * (
+                across + contact.twist * shifts[0] + contact.curvature_across * shifts[4])
+            R_p += F * contact.twist * shifts[4]
         R_p += contact.slope * F_p + F * (slope + contact.curvature * shifts[0])
-    return F_p, R_p, shifts[2], pressing_p
+    return NodeRates(F_p, R_p, R_p2, shifts[2], slip_across, pressing_p)

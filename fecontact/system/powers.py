@@ -1,11 +1,23 @@
 """Powers of a contact system in a state: what is put in, lost and stored, for energy balances."""
 
+import math
+
 import numpy as np
 from numba import types
 
 from fecontact.core.compiled import borrowed, f8, helper, kernel, vector
 from fecontact.laws.signatures import normal_at, signal_at
-from fecontact.system.kernels import SYSTEM, ground_motion, memory_of, node_forces, node_motion
+from fecontact.system.kernels import friction_across, node_forces
+from fecontact.system.nodes import (
+    SYSTEM,
+    force_room,
+    ground_motion,
+    in_space,
+    memory_of,
+    moved_across,
+    moved_along,
+    node_motion,
+)
 
 # Columns of `powers`: five that are put in, by stiffness that is not symmetric too, four that are
 # lost, and what is stored in bristles at constant normal force.
@@ -22,7 +34,7 @@ def given_powers(t, y, s, out):
     """Fill out (p,) with the powers of drive and loads, the others with zero."""
     m = s.Tx.shape[1]
     out[:POWER_COUNT] = 0.0
-    for axis in range(2):
+    for axis in range(len(s.drive)):
         value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
         place, speed = 0.0, 0.0
         for i in range(m):
@@ -68,7 +80,7 @@ def body_powers(t, y, s, out):
 def drive_jump(before, after, y, s):
     """Work that the drive puts in where its motions jump, between two times on both sides [J]."""
     work = 0.0
-    for axis in range(2):
+    for axis in range(len(s.drive)):
         old = signal_at(s.drive[axis])(before, s.drive_parameters[axis])[0]
         new = signal_at(s.drive[axis])(after, s.drive_parameters[axis])[0]
         stretch = 0.5 * (old + new)
@@ -80,7 +92,10 @@ def drive_jump(before, after, y, s):
 
 @helper
 def belt_normal_power(F, slope, slip, speed, s):
-    """Power of the normal force's motion: of the drag up the slopes, or of lifting the node."""
+    """Power of the normal force's motion: of the drag up the slopes, or of lifting the node.
+
+    Along one tangent, by the slope, slip velocity and speed of the other side there.
+    """
     return -F * slope * speed if s.leans else F * slope * slip
 
 
@@ -99,16 +114,26 @@ def add_node_powers(j, motion, moved, z, stick_speed, s, force, rates, out, node
     """Add to out (p,) the powers of node j; fill its entries of ``nodes`` (2 n,)."""
     F, R, contact = node_forces(j, motion, moved, z, s, force, rates)
     elastic = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])[0]
-    speed = s.sliding[j] * moved.speed
+    speed = moved_along(j, moved.speed, moved.second_speed, s)
     out[BELT_NORMAL] += belt_normal_power(F, contact.slope, contact.slip, speed, s)
     out[BELT_FRICTION] -= R * speed
+    taken = R * contact.slip
+    slip = abs(contact.slip)
+    if in_space(s):
+        R2 = friction_across(force, rates)
+        speed = moved_across(j, moved.speed, moved.second_speed, s)
+        out[BELT_NORMAL] += belt_normal_power(F, contact.slope_across, contact.slip_across, speed,
+                                              s)
+        out[BELT_FRICTION] -= R2 * speed
+        taken += R2 * contact.slip_across
+        slip = math.hypot(contact.slip, contact.slip_across)
     out[CONTACT_DAMPING] += (F - elastic) * contact.rate
     storing = storing_power(j, F, z, rates, s)
-    lost = R * contact.slip - storing
+    lost = taken - storing
     out[BRISTLES] += storing
     out[FRICTION] += lost
     nodes[j] = lost
-    nodes[len(s.gap) + j] = lost if abs(contact.slip) < stick_speed else 0.0
+    nodes[len(s.gap) + j] = lost if slip < stick_speed else 0.0
 
 
 @kernel(types.void(f8, vector, SYSTEM, vector, vector, vector))
@@ -121,7 +146,8 @@ def powers(t, y, s, stick_speed, out, nodes):
     n = len(s.Tx)
     moved = ground_motion(t, s)
     states = s.memory.max()
-    force, rates = np.empty(3 + states), np.empty((states, 3 + states))
+    length, width = force_room(states, in_space(s))
+    force, rates = np.empty(length), np.empty((states, width))
     body_powers(t, y, s, out)
     for j in range(n):
         add_node_powers(j, node_motion(j, y, s), moved, memory_of(j, y, s), stick_speed[j], s,

@@ -10,7 +10,7 @@ from fecontact.core.types import Array
 from fecontact.laws.excitation import Load
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
-from fecontact.system import kernels as kernels
+from fecontact.system import kernels, nodes
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.friction_memory import settled
 from fecontact.system.jacobian import jacobian
@@ -130,7 +130,7 @@ def _among_springs(
     return problem.slide(start, system.penetration_scale, system.stored_energy)
 
 
-def at_rest(arrays: kernels.SystemArrays, travel: float) -> kernels.SystemArrays:
+def at_rest(arrays: nodes.SystemArrays, travel: float) -> nodes.SystemArrays:
     """Arrays of a system without friction, on ground at rest that has travelled [m]."""
     return arrays._replace(
         friction=np.full_like(arrays.friction, _frictionless.address),
@@ -161,7 +161,7 @@ def resting(
 class Balance:
     """Out-of-balance modal forces of a resting or steadily sliding body."""
 
-    def __init__(self, arrays: kernels.SystemArrays, time: float, scale: float) -> None:
+    def __init__(self, arrays: nodes.SystemArrays, time: float, scale: float) -> None:
         self.arrays = arrays
         self.load = arrays.constant_load
         self._time = time
@@ -398,7 +398,7 @@ class Balance:
         return min(rounding, _UNBALANCED * applied) if applied > 0.0 else rounding
 
 
-def _at_mean(system: ContactSystem) -> kernels.SystemArrays:
+def _at_mean(system: ContactSystem) -> nodes.SystemArrays:
     """The system's arrays with the mean values of drive and loads as constant loads.
 
     Only constant signals contribute; time-dependent ones are taken to have zero mean.

@@ -18,7 +18,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import SystemArrays
+from fecontact.system.nodes import SystemArrays
 
 Setter = Callable[[ContactSystem, float], ContactSystem]
 

@@ -41,13 +41,8 @@ from fecontact.integrate.nonsmooth.problem import (
     WORKSPACE,
 )
 from fecontact.laws.signatures import friction_at, normal_at, signal_at
-from fecontact.system.kernels import (
-    body_acceleration,
-    given_at,
-    node_contact,
-    node_motion,
-    pressing_force,
-)
+from fecontact.system.kernels import body_acceleration, given_at
+from fecontact.system.nodes import node_contact, node_motion, pressing_force
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,

@@ -44,7 +44,7 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
 )
 from fecontact.laws.signatures import ground_at, normal_at
-from fecontact.system.kernels import ground_motion
+from fecontact.system.nodes import ground_motion
 
 # Rounding of a sum, and of forces that come from a system of equations, relative to their parts.
 _ROUNDING, _FORCE_ROUNDING = 2e-15, 1e-13

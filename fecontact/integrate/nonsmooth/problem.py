@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.compiled import f8, i8, integers, matrix, vector
 from fecontact.core.types import Array, Integers
-from fecontact.system.kernels import SYSTEM
+from fecontact.system.nodes import SYSTEM
 from fecontact.system.powers import POWER_COUNT
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the

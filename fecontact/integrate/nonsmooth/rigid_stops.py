@@ -60,7 +60,7 @@ from fecontact.integrate.nonsmooth.problem import (
     STICK,
     WORKSPACE,
 )
-from fecontact.system.kernels import ground_motion
+from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,

@@ -27,12 +27,8 @@ from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
 from fecontact.integrate.nonsmooth.problem import CREEP
 from fecontact.laws.signatures import friction_at
-from fecontact.system.kernels import (
-    force_against_x,
-    node_contact,
-    node_motion,
-    normal_gradients,
-)
+from fecontact.system.kernels import force_against_x, normal_gradients
+from fecontact.system.nodes import node_contact, node_motion
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6

@@ -57,7 +57,7 @@ from fecontact.integrate.nonsmooth.stage_newton import (
     newton_room_for,
     solve_stage,
 )
-from fecontact.system.kernels import ground_motion
+from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, body_powers, drive_jump
 
 GAMMA = 0.43586652150845899942

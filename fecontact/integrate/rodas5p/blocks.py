@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from fecontact.core.compiled import helper, i8, integers, matrix
 from fecontact.core.types import Array, Integers
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.kernels import SystemArrays
+from fecontact.system.nodes import SystemArrays
 
 
 class Blocks(NamedTuple):
@@ -25,7 +25,8 @@ class Blocks(NamedTuple):
     Attributes
     ----------
     shapes : (m, 2 n) array
-        Rows Tx, then Ty, of all contact nodes side by side, so that sums over nodes vectorise.
+        Rows Tx, then Ty, of all contact nodes side by side, so that sums over nodes vectorise;
+        (m, 3 n) in space, T2 last.
     parts : (p, 4) integer array
         First and last mode, first and last node of each block of the rows.
     tiles : (t, 4) integer array
@@ -77,7 +78,8 @@ def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
     modes = _ranges([part.modes[1] for part in basis.parts], m)
     nodes = _ranges([count for _, count in basis.groups], n)
     moved = np.array([[bool(arrays.Tx[slice(*j), slice(*i)].any()
-                            or arrays.Ty[slice(*j), slice(*i)].any()) for i in modes]
+                            or arrays.Ty[slice(*j), slice(*i)].any()
+                            or arrays.T2[slice(*j), slice(*i)].any()) for i in modes]
                       for j in nodes])
     own = np.array([[any(one[slice(*i), slice(*k)].any()
                          for one in (arrays.stiffness, arrays.damping, arrays.modal_damping))
@@ -90,22 +92,25 @@ def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
     parts = [(*modes[a], *nodes[b]) for b, a in np.argwhere(moved)]
     position, starts, reach = _elimination(modes, coupled)
     most = int(moved.sum(axis=1).max())
+    shapes = np.vstack([arrays.Tx, arrays.Ty, arrays.T2.reshape(-1, m)])
+    tangents = len(shapes) // n
     spans = np.zeros((n, most, 2), dtype=np.int64)
     for b, (first, last) in enumerate(nodes):
         for place, a in enumerate(np.flatnonzero(moved[b])):
             spans[first:last, place] = modes[a]
     return Blocks(
-        shapes=np.vstack([arrays.Tx, arrays.Ty]).T.copy(),
+        shapes=shapes.T.copy(),
         parts=_table(parts, 4),
         tiles=_table([(*part[:2], *columns) for part in parts
-                      for columns in _both(part[2:], n)], 4),
+                      for columns in _each(part[2:], n, tangents)], 4),
         spans=spans,
         own=_table([(*modes[a], *modes[c]) for a, c in np.argwhere(own)], 4),
         coupled=_table([(*modes[a], *modes[c], starts[a], starts[c])
                         for a, c in np.argwhere(coupled)], 6),
         pairs=_table([(*modes[a], *answered, *columns) for b in range(len(nodes))
                       for a in np.flatnonzero(moved[b]) for c in np.flatnonzero(moved[b])
-                      for answered in _both(modes[c], m) for columns in _both(nodes[b], n)], 6),
+                      for answered in _each(modes[c], m, 2)
+                      for columns in _each(nodes[b], n, tangents)], 6),
         position=position, reach=reach)
 
 
@@ -117,11 +122,11 @@ def _ranges(counts: list[int], total: int) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
-def _both(span: tuple[int, int], size: int) -> list[tuple[int, int]]:
-    """A range within two halves of so many; in one where it is all of them."""
+def _each(span: tuple[int, int], size: int, count: int) -> list[tuple[int, int]]:
+    """A range within each of some parts of one size; in one where it is all of them."""
     if span == (0, size):
-        return [(0, 2 * size)]
-    return [span, (size + span[0], size + span[1])]
+        return [(0, count * size)]
+    return [(part * size + span[0], part * size + span[1]) for part in range(count)]
 
 
 def _table(rows: list[tuple[int, ...]], width: int) -> Integers:

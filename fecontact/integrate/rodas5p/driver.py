@@ -84,7 +84,7 @@ def start(
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)
-    largest = np.abs(basis.T[:, :2]).max(axis=(0, 1))
+    largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
     slip_scale, depth, stick_speed = np.empty(n), np.empty(n), np.zeros(n)
     for nodes, _, law in system.law_groups("friction"):
@@ -118,11 +118,12 @@ def start(
                 0.01 * longest)
     return Run(
         Problem(system.arrays, blocks_of(basis, system.arrays), control),
-        progress_for(state, float(times[0]), first, m, n), room_for(m, n, states),
+        progress_for(state, float(times[0]), first, m, n, basis.dimension),
+        room_for(m, n, states, basis.dimension),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(above.arrays, below.arrays, width, variation_for(
-            columns, m, n, states, width, float(vary_rtol or _LOOSER * rtol),
+            columns, m, n, states, basis.dimension, width, float(vary_rtol or _LOOSER * rtol),
             1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate.address if vary else 0),
@@ -150,7 +151,7 @@ def _levels(system: ContactSystem) -> Array:
 
 def _ground_bounds(system: ContactSystem, times: Array) -> Array:
     """What bounds the ground, in the order of :mod:`fecontact.integrate.courses`."""
-    ground, motion = system.ground, system.prescribed_motion.base
+    ground, motions = system.ground, system.prescribed_motion.motions
     start, end = float(times[0]), float(times[-1])
     low, high, slope = 0.0, 0.0, 0.0
     if ground.wavy:
@@ -162,8 +163,8 @@ def _ground_bounds(system: ContactSystem, times: Array) -> Array:
                              f"integrator meets it.") from None
     if not system.basis.ground_nodes.all():
         low, high = min(low, 0.0), max(high, 0.0)
-    return np.array([low, high, slope, motion.largest_speed(start, end),
-                     motion.largest_acceleration(start, end)])
+    return np.array([low, high, slope, sum(one.largest_speed(start, end) for one in motions),
+                     sum(one.largest_acceleration(start, end) for one in motions)])
 
 
 def finish(

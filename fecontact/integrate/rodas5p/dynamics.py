@@ -13,11 +13,12 @@ from fecontact.core.compiled import block, helper, matrix
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import normal_at, signal_at
-from fecontact.system import kernels as kernels
+from fecontact.system import kernels, nodes
 
-# Entries of what is given in time: drive x and y, travel and speed of the ground, and their rates.
-PULL_X, PULL_Y, TRAVEL, SPEED, PULL_X_RATE, PULL_Y_RATE = range(6)
-GIVEN = 6
+# Entries of what is given in time: pulls of the drive along each axis, and their rates, travel and
+# speed of the ground's two motions.
+PULL, PULL_RATE, TRAVEL, SPEED, SECOND_TRAVEL, SECOND_SPEED = 0, 3, 6, 7, 8, 9
+GIVEN = 10
 
 
 class Gradients(NamedTuple):
@@ -25,6 +26,8 @@ class Gradients(NamedTuple):
 
     partial : (n, 3, 4), derivatives of F, T and the pressing force to x, y, x', y'
     force : (n, 3 + s), rates : (n, s, 3 + s), of friction with memory
+
+    In space (n, 4, 6), (n, 2 (4 + s)) and (n, s, 4 + s), of friction in two directions.
     """
 
     partial: Array
@@ -37,27 +40,41 @@ GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
 
 @helper
 def set_given(t, s, given, load):
-    """Fill ``given`` (6,) with what is given at time t, and ``load`` (m,) with its modal force."""
-    for axis in range(2):
+    """Fill ``given`` (10,) with what is given at time t, and ``load`` (m,) with its modal force."""
+    kernels.set_constant_load(s, load)
+    for axis in range(len(s.drive)):
         stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
         if stiffness != 0.0 or damping != 0.0:
             value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
-            given[PULL_X + axis] = stiffness * value + damping * rate
-            given[PULL_X_RATE + axis] = stiffness * rate
-    given[TRAVEL], given[SPEED] = signal_at(s.ground_motion)(t, s.ground_motion_parameters)
-    kernels.set_load(t, given[PULL_X], given[PULL_Y], s, load)
+            given[PULL + axis] = stiffness * value + damping * rate
+            given[PULL_RATE + axis] = stiffness * rate
+            kernels.add_pull(given[PULL + axis], axis, s, load)
+    moved = nodes.ground_motion(t, s)
+    given[TRAVEL], given[SPEED] = moved.travel, moved.speed
+    given[SECOND_TRAVEL], given[SECOND_SPEED] = moved.second_travel, moved.second_speed
+    kernels.add_loads(t, s, load)
 
 
 @helper
-def motion_of(j, w):
-    """Motion of node j, as :func:`project` puts it into w (3, 2 n)."""
-    n = w.shape[1] // 2
-    return kernels.NodeMotion(w[0, j], w[0, n + j], w[1, j], w[1, n + j])
+def motion_given(given):
+    """Motion of the ground in ``given``."""
+    return nodes.GroundMotion(given[TRAVEL], given[SPEED], given[SECOND_TRAVEL],
+                              given[SECOND_SPEED])
+
+
+@helper
+def motion_of(j, w, s):
+    """Motion of node j, as :func:`project` puts it into w (3, d n)."""
+    n = len(s.gap)
+    if nodes.in_space(s):
+        return nodes.NodeMotion(w[0, j], w[0, n + j], w[1, j], w[1, n + j], w[0, 2 * n + j],
+                                w[1, 2 * n + j])
+    return nodes.NodeMotion(w[0, j], w[0, n + j], w[1, j], w[1, n + j], 0.0, 0.0)
 
 
 @helper
 def project(blocks, y, places, speeds):
-    """Fill displacements and velocities (2 n,), all x, then all y, of the contact nodes."""
+    """Fill displacements and velocities (d n,) of the contact nodes: all x, all y, all across."""
     shapes = blocks.shapes
     m, rows = shapes.shape
     for j in range(rows):
@@ -81,9 +98,8 @@ def project(blocks, y, places, speeds):
 
 @helper
 def moved_by(blocks, column, q):
-    """Motion of a node, along it in column j, away from it in n + j, by modal coordinates q."""
-    n = len(blocks.spans)
-    j = column if column < n else column - n
+    """Motion of a node, along it in column j, away in n + j, across in 2 n + j, by coordinates q."""
+    j = column % len(blocks.spans)
     total = 0.0
     for span in range(blocks.spans.shape[1]):
         for i in range(blocks.spans[j, span, 0], blocks.spans[j, span, 1]):
@@ -93,7 +109,7 @@ def moved_by(blocks, column, q):
 
 @helper
 def push(blocks, forces, out):
-    """Add to ``out`` (m,) the modal forces of the node forces (2 n,), all -T, then all F."""
+    """Add to ``out`` (m,) the modal forces of the node forces (d n,): all -T, all F, all across."""
     for tile in range(len(blocks.tiles)):
         top, bottom, left, right = block_at(blocks.tiles, tile)
         for i in range(top, bottom):
@@ -105,7 +121,7 @@ def push(blocks, forces, out):
 
 @helper
 def gather(y, s, blocks, load, forces, rate):
-    """Fill the first 2 m entries of ``rate`` from the node forces (2 n,), all -T, then all F."""
+    """Fill the first 2 m entries of ``rate`` from the node forces (d n,) of :func:`push`."""
     m = len(load)
     v = y[m : 2 * m]
     for i in range(m):
@@ -123,19 +139,22 @@ def gather(y, s, blocks, load, forces, rate):
 
 @helper
 def set_rate(y, s, blocks, given, load, w, scratch, rate):
-    """Fill ``rate`` (size,) with y'. ``w`` (3, 2 n) and ``scratch`` are room to work in."""
+    """Fill ``rate`` (size,) with y'. ``w`` (3, d n) and ``scratch`` are room to work in."""
     m, n = len(load), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
     project(blocks, y, w[0], w[1])
-    moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
+    moved = motion_given(given)
     force, rates = scratch.force[0], scratch.rates[0]
     for j in range(n):
         first = 2 * m + j * states
-        F, R, contact = kernels.node_forces(j, motion_of(j, w), moved,
+        F, R, contact = kernels.node_forces(j, motion_of(j, w, s), moved,
                                             y[first : first + s.memory[j]], s, force, rates)
-        forces[j] = -kernels.force_against_x(F, R, contact, s)
+        forces[j] = -nodes.leaning(F, R, contact.slope, s)
         forces[n + j] = F
+        if nodes.in_space(s):
+            forces[2 * n + j] = -nodes.leaning(F, kernels.friction_across(force, rates),
+                                               contact.slope_across, s)
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
     gather(y, s, blocks, load, forces, rate)
@@ -148,14 +167,17 @@ def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     states = (len(y) - 2 * m) // n
     forces = w[2]
     project(blocks, y, w[0], w[1])
-    moved = kernels.GroundMotion(given[TRAVEL], given[SPEED])
+    moved = motion_given(given)
     for j in range(n):
         first = 2 * m + j * states
-        F, T, _ = kernels.node_gradients(j, motion_of(j, w), moved,
+        F, T, contact = kernels.node_gradients(j, motion_of(j, w, s), moved,
                                          y[first : first + s.memory[j]], s, out.force[j],
                                          out.rates[j], out.partial[j])
         forces[j] = -T
         forces[n + j] = F
+        if nodes.in_space(s):
+            forces[2 * n + j] = -nodes.leaning(
+                F, kernels.friction_across(out.force[j], out.rates[j]), contact.slope_across, s)
         for k in range(states):
             rate[first + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
     gather(y, s, blocks, load, forces, rate)
@@ -166,30 +188,46 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     """Fill ``out`` (size,) with df/dt at a fixed state.
 
     The ground that moves on under a node acts as the node moving back: travel enters with x,
-    speed with x'. ``acceleration`` is that of the ground, ``rate_of_loads`` (m,) the rate of the
-    modal loads.
+    speed with x'. ``acceleration`` (2,) is that of the ground's motions, ``rate_of_loads`` (m,) the
+    rate of the modal loads.
     """
     m, n = len(rate_of_loads), len(s.gap)
     states = g.rates.shape[1]
     forces = w[2]
     for i in range(m):
         out[i] = 0.0
-        out[m + i] = (rate_of_loads[i] + given[PULL_X_RATE] * s.drive_shapes[0, i]
-                      + given[PULL_Y_RATE] * s.drive_shapes[1, i])
+        out[m + i] = (rate_of_loads[i] + given[PULL_RATE] * s.drive_shapes[0, i]
+                      + given[PULL_RATE + 1] * s.drive_shapes[1, i])
+    if nodes.in_space(s):
+        for i in range(m):
+            out[m + i] += given[PULL_RATE + 2] * s.drive_shapes[2, i]
     for j in range(n):
-        v, a = s.sliding[j] * given[SPEED], s.sliding[j] * acceleration
-        forces[j] = v * g.partial[j, 1, 0] + a * g.partial[j, 1, 2]
-        forces[n + j] = -v * g.partial[j, 0, 0] - a * g.partial[j, 0, 2]
-        pressing = -v * g.partial[j, 2, 0] - a * g.partial[j, 2, 2]
+        v = nodes.moved_along(j, given[SPEED], given[SECOND_SPEED], s)
+        a = nodes.moved_along(j, acceleration[0], acceleration[1], s)
+        p = g.partial[j]
+        forces[j] = v * p[1, 0] + a * p[1, 2]
+        forces[n + j] = -v * p[0, 0] - a * p[0, 2]
+        pressing = -v * p[2, 0] - a * p[2, 2]
+        a2 = 0.0
+        if nodes.in_space(s):
+            v2 = nodes.moved_across(j, given[SPEED], given[SECOND_SPEED], s)
+            a2 = nodes.moved_across(j, acceleration[0], acceleration[1], s)
+            forces[j] += v2 * p[1, 4] + a2 * p[1, 5]
+            forces[n + j] -= v2 * p[0, 4] + a2 * p[0, 5]
+            forces[2 * n + j] = v * p[3, 0] + a * p[3, 2] + v2 * p[3, 4] + a2 * p[3, 5]
+            pressing -= v2 * p[2, 4] + a2 * p[2, 5]
         for k in range(states):
-            out[2 * m + j * states + k] = (
-                -a * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
-                if k < s.memory[j] else 0.0)
+            rate = 0.0
+            if k < s.memory[j]:
+                rate = -a * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
+                if nodes.in_space(s):
+                    rate -= a2 * g.rates[j, k, 3 + states]
+            out[2 * m + j * states + k] = rate
     push(blocks, forces, out[m : 2 * m])
 
 
 @helper
-def next_kink(y, rate, s, blocks, g, depth, slow, speed, w, within):
+def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
     """Time until the forces of a node change their character, or ``within`` if later.
 
     By the velocity and acceleration of the nodes: touch-down and lift-off on level ground, the
@@ -199,7 +237,7 @@ def next_kink(y, rate, s, blocks, g, depth, slow, speed, w, within):
     """
     m, n = len(blocks.position), len(s.gap)
     project(blocks, y, w[0], w[1])
-    for j in range(2 * n):
+    for j in range(w.shape[1]):
         w[2, j] = moved_by(blocks, j, rate[m : 2 * m])
     first = within
     for j in range(n):
@@ -211,8 +249,14 @@ def next_kink(y, rate, s, blocks, g, depth, slow, speed, w, within):
             fall = g.partial[j, 0, 1] * -v + g.partial[j, 0, 3] * -a
             if fall < 0.0 and -force / fall < first:
                 first = -force / fall
-            slip = w[1, j] - s.sliding[j] * speed
+            slip = w[1, j] - nodes.moved_along(j, moved.speed, moved.second_speed, s)
             towards = -w[2, j] if slip > 0.0 else w[2, j]
+            if nodes.in_space(s):
+                across = w[1, 2 * n + j] - nodes.moved_across(j, moved.speed, moved.second_speed, s)
+                size = math.hypot(slip, across)
+                if size > 0.0:
+                    towards = -(slip * w[2, j] + across * w[2, 2 * n + j]) / size
+                slip = size
             if abs(slip) > 1.5 * slow[j] and (abs(slip) - slow[j]) < towards * first:
                 first = (abs(slip) - slow[j]) / towards
     return first

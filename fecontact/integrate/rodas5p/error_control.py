@@ -1,12 +1,14 @@
 """Errors of a step as multiples of what is allowed."""
 
+import math
+
 import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
-from fecontact.system.kernels import ground_motion
+from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
 
 
@@ -41,7 +43,13 @@ def slip_error(error, s, blocks, control, progress, room):
     for j in range(n):
         if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
             slip = dynamics.moved_by(blocks, j, difference[m : 2 * m])
-            distance = abs(room.nodes[1, j] - s.sliding[j] * room.given[dynamics.SPEED])
+            moved = dynamics.motion_given(room.given)
+            distance = abs(room.nodes[1, j] - moved_along(j, moved.speed, moved.second_speed, s))
+            if in_space(s):
+                slip = math.hypot(slip, dynamics.moved_by(blocks, 2 * n + j,
+                                                          difference[m : 2 * m]))
+                distance = math.hypot(distance, room.nodes[1, 2 * n + j] - moved_across(
+                    j, moved.speed, moved.second_speed, s))
             part = abs(slip) / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
                 error = part
@@ -114,7 +122,7 @@ def _powers(t, y, problem, room, out):
     dynamics.project(blocks, y, room.between[0], room.between[1])
     for j in range(n):
         first = 2 * m + j * states
-        add_node_powers(j, dynamics.motion_of(j, room.between), moved,
+        add_node_powers(j, dynamics.motion_of(j, room.between, s), moved,
                         y[first : first + s.memory[j]], problem.control.stick_speed[j], s,
                         room.scratch.force[0], room.scratch.rates[0], out, out[POWER_COUNT:])
 

@@ -29,8 +29,8 @@ from fecontact.integrate import bernstein
 from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, Course, changes
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.system import kernels as kernels
-from fecontact.system.kernels import SYSTEM
+from fecontact.system import kernels, nodes
+from fecontact.system.nodes import SYSTEM
 
 EVENT = f8(f8, vector, vector)
 event_at = function_at(EVENT)
@@ -150,10 +150,13 @@ def _between(x, places, values):
 @helper
 def _zone_of(j, t, y, s, depth, force, rates, watch):
     """State of node j, and whether it is past the depth of its normal law."""
-    F, R, contact = kernels.node_forces(j, kernels.node_motion(j, y, s),
-                                        kernels.ground_motion(t, s), kernels.memory_of(j, y, s),
+    F, R, contact = kernels.node_forces(j, nodes.node_motion(j, y, s),
+                                        nodes.ground_motion(t, s), nodes.memory_of(j, y, s),
                                         s, force, rates)
     u, slip = contact.penetration, contact.slip
+    if nodes.in_space(s):
+        R, slip = math.hypot(R, kernels.friction_across(force, rates)), math.hypot(
+            slip, contact.slip_across)
     zone = OPEN
     if F != 0.0:
         if s.memory[j] > 0 and len(watch.curve_speed) > 0 and watch.curve[j, 0] != 0.0:
@@ -325,7 +328,9 @@ def _set_places(step, problem, before, room, watch):
                 shift = control.levels[k, j]
             else:
                 what, shift = SLIP, watch.stick_speed[j] * (2.0 * (k - levels) - 1.0)
-            if watch.counts[NODES] == 0 or (what == SLIP and s.memory[j] > 0) or (
+            # In space a slip velocity turns instead of changing its sign: more looks find it.
+            if watch.counts[NODES] == 0 or (
+                    what == SLIP and (s.memory[j] > 0 or nodes.in_space(s))) or (
                     count + MOST > len(watch.changed)):
                 continue
             course = Course(what, j, shift, step, s, control.ground, room.courses, row)
@@ -411,7 +416,7 @@ def _note_events(step, held_problem, held_progress, held_room, held_watch):
     room, watch = borrowed(held_room), borrowed(held_watch)
     view = _view(step, problem, progress, room)
     begun = watch.counts[FOUND]
-    looks = _LOOKS
+    looks = _MORE_LOOKS if nodes.in_space(view.system) else _LOOKS
     for k in range(len(watch.own)):
         if watch.linear[k] == 0:
             looks = _MORE_LOOKS

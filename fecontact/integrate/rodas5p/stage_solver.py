@@ -24,14 +24,15 @@ from fecontact.core.dense_lu import factorise_within, solve_within
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.dynamics import project
+from fecontact.system.nodes import in_space
 
 
 class Reduced(NamedTuple):
     """The reduced system of a step.
 
     J = [Jq, Jv] (m, 2 m); factors (m, m), their first columns and pivots (m,) of its matrix; per
-    node the inverse of G - Zz (n, s, s) and e (n, s); room to work in: (m,), (4, 2 n) and
-    (2 m, 2 n).
+    node the inverse of G - Zz (n, s, s) and e (n, s), in space (n, 2 s), for both tangents; room to
+    work in: (m,), (4, 2 n) and (2 m, 2 n), in space (6, 3 n) and (2 m, 3 n).
     """
 
     J: Array
@@ -49,13 +50,14 @@ REDUCED = types.NamedTuple(
     [matrix, matrix, integers, integers, block, matrix, vector, matrix, matrix], Reduced)
 
 
-def reduced_for(modes: int, nodes: int, states: int) -> Reduced:
+def reduced_for(modes: int, nodes: int, states: int, dimension: int) -> Reduced:
     """Zeros for a system of so many modes, contact nodes and internal variables per node."""
+    columns = dimension * nodes
     return Reduced(
         np.zeros((modes, 2 * modes)), np.zeros((modes, modes)),
         np.zeros(modes, dtype=np.int64), np.zeros(modes, dtype=np.int64),
-        np.zeros((nodes, states, states)), np.zeros((nodes, states)), np.zeros(modes),
-        np.zeros((4, 2 * nodes)), np.zeros((2 * modes, 2 * nodes)))
+        np.zeros((nodes, states, states)), np.zeros((nodes, (dimension - 1) * states)),
+        np.zeros(modes), np.zeros((2 * dimension, columns)), np.zeros((2 * modes, columns)))
 
 
 @helper
@@ -65,7 +67,7 @@ def eliminate_memory(G, s, g, w):
     The inverse itself is wanted, of a few rows that need no pivoting: G outweighs the diagonal of
     Zz, which is negative for all that relaxes.
     """
-    n, states = w.weights.shape
+    n, states = w.inverse.shape[0], w.inverse.shape[1]
     for j in range(n):
         inverse = w.inverse[j]
         for k in range(states):
@@ -88,6 +90,12 @@ def eliminate_memory(G, s, g, w):
             for other in range(s.memory[j]):
                 total += g.force[j, 3 + other] * inverse[other, k]
             w.weights[j, k] = total
+        if in_space(s):
+            for k in range(states):
+                total = 0.0
+                for other in range(s.memory[j]):
+                    total += g.force[j, 7 + states + other] * inverse[other, k]
+                w.weights[j, states + k] = total
 
 
 @helper
@@ -138,11 +146,12 @@ def products(a, b, out):
 
 @helper
 def set_answers(blocks, g, w):
-    """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n)."""
+    """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n)."""
     shapes = blocks.shapes
     m, n = len(shapes), len(g.partial)
-    states = w.weights.shape[1]
+    states = w.inverse.shape[1]
     c = w.coefficients
+    space = len(c) > 4
     for j in range(n):
         p = g.partial[j]
         pressing, slip = 0.0, 0.0
@@ -153,16 +162,45 @@ def set_answers(blocks, g, w):
             c[k, j] = -p[1, k] - pressing * p[2, k]
             c[k, n + j] = p[0, k]
         c[2, j] -= slip
+        if space:
+            _set_coefficients_across(j, g, w, pressing)
     for part in range(len(blocks.parts)):
         top, bottom, left, right = block_at(blocks.parts, part)
         for k in range(top, bottom):
-            along, away = shapes[k, :n], shapes[k, n:]
-            for first in (0, n):
+            along, away, across = shapes[k, :n], shapes[k, n:], shapes[k, n:]
+            if space:
+                across = shapes[k, 2 * n :]
+            for first in range(0, shapes.shape[1], n):
                 by_place, by_speed = w.answers[k, first:], w.answers[m + k, first:]
                 for j in range(left, right):
                     by_place[j] = c[0, first:][j] * along[j] + c[1, first:][j] * away[j]
                 for j in range(left, right):
                     by_speed[j] = c[2, first:][j] * along[j] + c[3, first:][j] * away[j]
+                if space:
+                    for j in range(left, right):
+                        by_place[j] += c[4, first:][j] * across[j]
+                        by_speed[j] += c[5, first:][j] * across[j]
+
+
+@helper
+def _set_coefficients_across(j, g, w, pressing):
+    """What a node's motion across does to its forces, and all motion to that across."""
+    n, states = len(g.partial), w.inverse.shape[1]
+    p, c = g.partial[j], w.coefficients
+    slip, second_pressing, second_along, second_across = 0.0, 0.0, 0.0, 0.0
+    for k in range(states):
+        slip += w.weights[j, k] * g.rates[j, k, 3 + states]
+        second_pressing += w.weights[j, states + k] * g.rates[j, k, 2]
+        second_along += w.weights[j, states + k] * g.rates[j, k, 1]
+        second_across += w.weights[j, states + k] * g.rates[j, k, 3 + states]
+    for k in range(4, 6):
+        c[k, j] = -p[1, k] - pressing * p[2, k]
+        c[k, n + j] = p[0, k]
+    c[5, j] -= slip
+    for k in range(6):
+        c[k, 2 * n + j] = -p[3, k] - second_pressing * p[2, k]
+    c[2, 2 * n + j] -= second_along
+    c[5, 2 * n + j] -= second_across
 
 
 @helper
@@ -204,10 +242,10 @@ def factorise_step(G, blocks, w):
 
 @helper
 def solve_stage(G, s, blocks, g, w, r, motion, out):
-    """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, 2 n) is room to work in."""
+    """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, d n) is room to work in."""
     shapes = blocks.shapes
     m, n = len(shapes), len(g.partial)
-    states = w.weights.shape[1]
+    states = w.inverse.shape[1]
     x = w.room
     for i in range(m):
         out[m + i] = r[m + i]
@@ -217,12 +255,21 @@ def solve_stage(G, s, blocks, g, w, r, motion, out):
             for k in range(states):
                 total += w.weights[j, k] * r[2 * m + j * states + k]
             motion[2, j] = -total
+            if in_space(s):
+                total = 0.0
+                for k in range(states):
+                    total += w.weights[j, states + k] * r[2 * m + j * states + k]
+                motion[2, 2 * n + j] = -total
         for part in range(len(blocks.parts)):
             top, bottom, left, right = block_at(blocks.parts, part)
             for i in range(top, bottom):
                 total = 0.0
                 for j in range(left, right):
                     total += shapes[i, j] * motion[2, j]
+                if in_space(s):
+                    rows, forces = shapes[i, 2 * n :], motion[2, 2 * n :]
+                    for j in range(left, right):
+                        total += rows[j] * forces[j]
                 out[m + i] += total
     for i in range(m):
         x[blocks.position[i]] = G * out[m + i]
@@ -246,11 +293,17 @@ def solve_stage(G, s, blocks, g, w, r, motion, out):
         p = g.partial[j, 2]
         pressing = (p[0] * motion[0, j] + p[1] * motion[0, n + j] + p[2] * motion[1, j]
                     + p[3] * motion[1, n + j])
+        across = 0.0
+        if in_space(s):
+            across = motion[1, 2 * n + j]
+            pressing += p[4] * motion[0, 2 * n + j] + p[5] * across
         first = 2 * m + j * states
         for k in range(states):
             total = 0.0
             for other in range(states):
-                total += w.inverse[j, k, other] * (
-                    r[first + other] + g.rates[j, other, 1] * motion[1, j]
-                    + g.rates[j, other, 2] * pressing)
+                known = (r[first + other] + g.rates[j, other, 1] * motion[1, j]
+                         + g.rates[j, other, 2] * pressing)
+                if in_space(s):
+                    known += g.rates[j, other, 3 + states] * across
+                total += w.inverse[j, k, other] * known
             out[first + k] = total

@@ -11,7 +11,7 @@ from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks
-from fecontact.system.kernels import SYSTEM
+from fecontact.system.nodes import GROUND_MOTION, SYSTEM, GroundMotion
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
@@ -96,8 +96,8 @@ class Step(NamedTuple):
         Its begin, its length, and the time at its end.
     latest : float
         The last time at which what is given in time counts: before ``target`` if that is a break.
-    speed : float
-        Speed of the ground just after its begin.
+    moved : GroundMotion
+        Motion of the ground just after its begin.
     caution : float
         Length of the step before, which failed, if this one is cut to end at a kink of the
         forces; else zero.
@@ -109,12 +109,12 @@ class Step(NamedTuple):
     h: float
     target: float
     latest: float
-    speed: float
+    moved: GroundMotion
     caution: float
     at_break: bool
 
 
-STEP_TYPE = types.NamedTuple([f8] * 6 + [types.boolean], Step)
+STEP_TYPE = types.NamedTuple([f8] * 4 + [GROUND_MOTION, f8, types.boolean], Step)
 
 
 class Progress(NamedTuple):
@@ -163,8 +163,8 @@ class Room(NamedTuple):
     """Room to work in.
 
     Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
-    what the names say; ``nodes`` (3, 2 n), ``given`` and ``load`` for what acts at the time of a
-    stage, ``between`` (2, 2 n) for the nodes at a point within the step, ``power`` (4, p + 2 n) for
+    what the names say; ``nodes`` (3, d n), ``given`` and ``load`` for what acts at the time of a
+    stage, ``between`` (2, d n) for the nodes at a point within the step, ``power`` (4, p + 2 n) for
     a quadrature. ``ends`` to ``places`` serve to look at the
     course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
     what they may do.
@@ -201,30 +201,35 @@ ROOM = types.NamedTuple(
     Room)
 
 
-def gradients_for(nodes: int, states: int) -> motion.Gradients:
+def gradients_for(nodes: int, states: int, dimension: int) -> motion.Gradients:
     """Zeros for so many contact nodes with so many internal variables each."""
-    return motion.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
-                            np.zeros((nodes, states, 3 + states)))
+    length, width = (2 * (4 + states), 4 + states) if dimension == 3 else (3 + states, 3 + states)
+    return motion.Gradients(np.zeros((nodes, 1 + dimension, 2 * dimension)),
+                            np.zeros((nodes, length)), np.zeros((nodes, states, width)))
 
 
-def room_for(modes: int, nodes: int, states: int) -> Room:
+def room_for(modes: int, nodes: int, states: int, dimension: int) -> Room:
     """Room for a system of so many modes, contact nodes and internal variables per node."""
+    columns = dimension * nodes
     size = 2 * modes + nodes * states
     stage, right, base, time_rate, after, rate_after = np.zeros((6, size))
     return Room(
         np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
         stage, right, base, time_rate, after, rate_after,
-        np.zeros((3, 2 * nodes)), np.zeros((2, 2 * nodes)), np.zeros(motion.GIVEN),
+        np.zeros((3, columns)), np.zeros((2, columns)), np.zeros(motion.GIVEN),
         np.zeros(modes), np.zeros(modes),
         np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)),
-        stage_solver.reduced_for(modes, nodes, states),
-        gradients_for(nodes, states), gradients_for(nodes, states),
-        np.zeros((3, 2 * nodes)), np.zeros((3, size)), np.zeros((courses.DOUBT + 1, 3 * nodes)),
+        stage_solver.reduced_for(modes, nodes, states, dimension),
+        gradients_for(nodes, states, dimension), gradients_for(nodes, states, dimension),
+        np.zeros((3, columns)), np.zeros((3, size)),
+        np.zeros((courses.DOUBT + 1, (2 * dimension - 1) * nodes)),
         np.zeros((3, courses.COEFFICIENTS)),
         np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST))
 
 
-def progress_for(state: Array, time: float, step: float, modes: int, nodes: int) -> Progress:
+def progress_for(
+    state: Array, time: float, step: float, modes: int, nodes: int, dimension: int
+) -> Progress:
     """A run that is about to start."""
     numbers = np.zeros(NUMBERS)
     numbers[TIME], numbers[STEP] = time, step
@@ -232,4 +237,4 @@ def progress_for(state: Array, time: float, step: float, modes: int, nodes: int)
     return Progress(
         numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
         np.zeros(modes), np.zeros(powers), np.zeros(powers),
-        gradients_for(nodes, (size - 2 * modes) // nodes))
+        gradients_for(nodes, (size - 2 * modes) // nodes, dimension))

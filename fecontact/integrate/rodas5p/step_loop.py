@@ -40,6 +40,7 @@ from fecontact.integrate.rodas5p.state import (
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, propagate_at
 from fecontact.laws.signatures import signal_at
+from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, powers
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
@@ -74,7 +75,7 @@ def _watched(watch):
 
 
 @helper
-def _aim(t, h, exactly, speed, end, problem, progress, room):
+def _aim(t, h, exactly, moved, end, problem, progress, room):
     """The next step to try, of about the length h, or ``exactly`` that, but not past a break.
 
     A step of which one has just failed ends at a kink of the forces that lies ahead.
@@ -97,7 +98,7 @@ def _aim(t, h, exactly, speed, end, problem, progress, room):
     if limit > 0.0:
         reach = max(target - t, limit)
         kink = dynamics.next_kink(progress.state, progress.rate, problem.system, problem.blocks,
-                                  progress.gradients, control.depth, control.slow, speed,
+                                  progress.gradients, control.depth, control.slow, moved,
                                   room.nodes, reach)
         # Nearer ones are left to the error control, lest steps shrink without end.
         if 1e-3 * limit < kink < 0.9 * reach:
@@ -105,7 +106,7 @@ def _aim(t, h, exactly, speed, end, problem, progress, room):
             target = min(t + 1.0003 * kink, stop)
             caution = limit
         numbers[CAUTIOUS] = 0.0
-    return Step(t, target - t, target, latest, speed, caution, is_break and target == stop)
+    return Step(t, target - t, target, latest, moved, caution, is_break and target == stop)
 
 
 @helper
@@ -114,13 +115,14 @@ def _linearise(step, after_t, problem, progress, room):
     s, control = problem.system, problem.control
     m = len(control.largest)
     later = min(step.t + 1e-4 * step.h, step.latest)
-    acceleration = 0.0
+    first, second = 0.0, 0.0
     if later > step.t:
-        speed = signal_at(s.ground_motion)(later, s.ground_motion_parameters)[1]
-        acceleration = (speed - room.given[dynamics.SPEED]) / (later - step.t)
+        moved = ground_motion(later, s)
+        first = (moved.speed - room.given[dynamics.SPEED]) / (later - step.t)
+        second = (moved.second_speed - room.given[dynamics.SECOND_SPEED]) / (later - step.t)
     for i in range(m):
         room.pull_rate[i] = 0.0
-    for axis in range(2):
+    for axis in range(len(s.drive)):
         if s.drive_damping[axis] != 0.0 and later > step.t:
             rise = (signal_at(s.drive[axis])(later, s.drive_parameters[axis])[1]
                     - signal_at(s.drive[axis])(after_t, s.drive_parameters[axis])[1])
@@ -131,7 +133,7 @@ def _linearise(step, after_t, problem, progress, room):
         rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
         for i in range(m):
             room.pull_rate[i] += rate * s.load_shapes[k, i]
-    dynamics.set_time_rate(s, problem.blocks, room.given, acceleration, progress.gradients,
+    dynamics.set_time_rate(s, problem.blocks, room.given, (first, second), progress.gradients,
                            room.pull_rate, room.nodes, room.time_rate)
     for i in range(m):
         progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
@@ -207,9 +209,9 @@ def _error_at_end(step, end, problem, progress, room):
 def _unfelt_part(step, again, smallest, problem, progress, room):
     """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
     s, blocks, control = problem.system, problem.blocks, problem.control
-    if restless(step.speed, step.h, s, blocks, control, room) and again < _MOST_AGAIN:
+    if restless(step.moved, step.h, s, blocks, control, room) and again < _MOST_AGAIN:
         set_courses(s, blocks, control.ground, progress.state, room.after, room)
-        if doubtful(step.speed, step.h, s, control.ground, control.levels, control.slip_scale,
+        if doubtful(step.moved, step.h, s, control.ground, control.levels, control.slip_scale,
                     room):
             part = first_unfelt_at(control.unfelt)(step, again, problem, progress, room)
             if part * step.h > 100.0 * smallest and part < 1.0:
@@ -307,8 +309,8 @@ def _go_on(step, problem, progress, room, output):
     here, there = progress.gradients, room.gradients_after
     n, states, width = here.rates.shape
     for j in range(n):
-        for row in range(3):
-            for k in range(4):
+        for row in range(here.partial.shape[1]):
+            for k in range(here.partial.shape[2]):
                 here.partial[j, row, k] = there.partial[j, row, k]
         for k in range(width):
             here.force[j, k] = there.force[j, k]
@@ -356,7 +358,8 @@ def advance(held_problem, held_progress, held_room, held_output, held_vary, held
     if counts[STARTED] == 0:
         _start(t, problem, progress, room, output, watch)
     set_ends(t, progress.state, s, problem.blocks, control.ground, room.ends)
-    new, speed, attempts, exactly, again = True, 0.0, 0, False, 0
+    new, attempts, exactly, again = True, 0, False, 0
+    moved = ground_motion(t, s)
     while counts[OUTPUTS] < len(output.times):
         # A step that failed is repeated before the call returns: derivatives are not kept.
         if new and (attempts >= most or (_watched(watch) and full(watch))):
@@ -365,8 +368,8 @@ def advance(held_problem, held_progress, held_room, held_output, held_vary, held
         if new:
             # Rates just after t: they may jump at a break.
             dynamics.set_given(np.nextafter(t, end), s, room.given, room.load)
-            speed = room.given[dynamics.SPEED]
-        step = _aim(t, h, exactly, speed, end, problem, progress, room)
+            moved = dynamics.motion_given(room.given)
+        step = _aim(t, h, exactly, moved, end, problem, progress, room)
         _attempt(step, new, end, problem, progress, room)
         new = False
 

@@ -21,6 +21,7 @@ from fecontact.integrate.courses import (
 )
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.laws.signatures import friction_at, normal_at
+from fecontact.system.nodes import in_space
 
 _UNFELT = f8(run_arrays.STEP_TYPE, i8, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM)
 first_unfelt_at = function_at(_UNFELT)
@@ -119,7 +120,8 @@ def _first_unfelt(step, again, held_problem, held_progress, held_room):
     first = 2.0
     for column in range(2 * n):
         what, j = (SLIP, column) if column < n else (GAP, column - n)
-        if room.courses[DOUBT, column] == 0.0 or (what == SLIP and s.memory[j] > 0):
+        if room.courses[DOUBT, column] == 0.0 or (
+                what == SLIP and (s.memory[j] > 0 or in_space(s))):
             continue
         for level in range(levels.shape[0] if what == GAP else 1):
             shift = levels[level, j] if what == GAP else 0.0

@@ -33,7 +33,14 @@ from fecontact.core.types import Array
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
-from fecontact.system.kernels import SYSTEM, ground_motion, node_contact
+from fecontact.system.nodes import (
+    SYSTEM,
+    ground_motion,
+    in_space,
+    moved_across,
+    moved_along,
+    node_contact,
+)
 
 # Differences are taken over this part of the scales of the laws.
 _PART = 1e-4
@@ -50,6 +57,8 @@ def probing_distance(u, blocks, control, w):
     for j in range(n):
         largest = max(largest, abs(w[1, j]) / control.slip_scale[j])
         largest = max(largest, abs(w[0, n + j]) / control.depth[j])
+        if w.shape[1] > 2 * n:
+            largest = max(largest, abs(w[1, 2 * n + j]) / control.slip_scale[j])
     for k in range(len(control.memory_scale)):
         largest = max(largest, abs(u[2 * m + k]) / control.memory_scale[k])
     return _PART / largest
@@ -78,8 +87,8 @@ def learn(here, usual):
     """Let the usual sizes be the largest seen."""
     n, states, width = here.rates.shape
     for j in range(n):
-        for row in range(3):
-            for k in range(4):
+        for row in range(here.partial.shape[1]):
+            for k in range(here.partial.shape[2]):
                 usual.partial[j, row, k] = max(usual.partial[j, row, k],
                                                abs(here.partial[j, row, k]))
         for k in range(width):
@@ -90,28 +99,37 @@ def learn(here, usual):
 
 @helper
 def set_sinking(t, y, s, blocks, v, out):
-    """Fill out (2, n): slope of the ground under each node, and rate of its penetration."""
+    """Fill out (2, n): slope of the ground under each node, and rate of its penetration.
+
+    In space (3, n): with the slope along the second tangent.
+    """
     moved = ground_motion(t, s)
     dynamics.project(blocks, y, v.nodes[0], v.nodes[1])
     for j in range(len(s.abscissa)):
-        contact = node_contact(j, dynamics.motion_of(j, v.nodes), moved, s)
+        contact = node_contact(j, dynamics.motion_of(j, v.nodes, s), moved, s)
         out[0, j], out[1, j] = contact.slope, contact.rate
+        if len(out) > 2:
+            out[2, j] = contact.slope_across
 
 
 @helper
-def differences(ahead, here, behind, usual, factor, u, travelled, sinking, blocks, w):
+def differences(ahead, here, behind, usual, factor, u, travelled, sinking, s, blocks, w):
     """Put the difference quotients of gradients along the stage u into those ahead.
 
     A stage that moves a node as the step does shows with its forward side what is within the
-    step.
+    step. ``travelled`` is what the ground's two motions have done by then.
     """
     n, states, width = ahead.rates.shape
     dynamics.project(blocks, u, w[0], w[1])
     for j in range(n):
-        sunk = sinking[0, j] * (w[0, j] - travelled) - w[0, n + j]
+        sunk = sinking[0, j] * (
+            w[0, j] - moved_along(j, travelled[0], travelled[1], s)) - w[0, n + j]
+        if in_space(s):
+            sunk += sinking[2, j] * (
+                w[0, 2 * n + j] - moved_across(j, travelled[0], travelled[1], s))
         forward = sunk * sinking[1, j] >= 0.0
-        for row in range(3):
-            for k in range(4):
+        for row in range(ahead.partial.shape[1]):
+            for k in range(ahead.partial.shape[2]):
                 ahead.partial[j, row, k] = _difference(
                     ahead.partial[j, row, k], here.partial[j, row, k], behind.partial[j, row, k],
                     factor, forward, usual.partial[j, row, k])
@@ -210,16 +228,15 @@ propagate_at = function_at(_PROPAGATE)
 
 
 def variation_for(
-    columns: int, modes: int, nodes: int, states: int, width: float, tolerance: float,
-    faded: float,
+    columns: int, modes: int, nodes: int, states: int, dimension: int, width: float,
+    tolerance: float, faded: float,
 ) -> Variation:
     """Room for so many columns; the first ``size`` of them are the unit matrix.
 
     ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
     """
     size = 2 * modes + nodes * states
-    room = [dynamics.Gradients(np.zeros((nodes, 3, 4)), np.zeros((nodes, 3 + states)),
-                               np.zeros((nodes, states, 3 + states))) for _ in range(4)]
+    room = [run_arrays.gradients_for(nodes, states, dimension) for _ in range(4)]
     start = np.zeros((columns, size))
     np.fill_diagonal(start, 1.0)
     least = np.zeros(columns)
@@ -232,7 +249,8 @@ def variation_for(
                      np.zeros((columns, modes)), np.zeros((columns, size)),
                      np.zeros((modes, 2 * modes)), np.zeros((modes, 2 * modes)),
                      np.zeros((modes, 2 * modes)), np.zeros((7, size)),
-                     np.zeros((3, 2 * nodes)), np.zeros((2, nodes)), np.zeros(dynamics.GIVEN),
+                     np.zeros((3, dimension * nodes)), np.zeros((dimension, nodes)),
+                     np.zeros(dynamics.GIVEN),
                      np.zeros(modes), np.zeros(modes), *room)
 
 
@@ -287,7 +305,7 @@ def _propagate(step, held_problem, held_progress, held_room, held_vary):
     if size == 2 * m:
         columns.set_solver(G, blocks, reduced, v)
     set_sinking(step.t, state, s, blocks, v, v.sinking)
-    speed = ground_motion(step.t, s).speed
+    moved = ground_motion(step.t, s)
     for i in range(tableau.STAGES):
         now = step.t if i == 0 else min(step.t + tableau.NODES[i] * step.h, step.latest)
         tableau.combined(tableau.A[i], 1.0, state, stages, Y)
@@ -313,7 +331,7 @@ def _propagate(step, held_problem, held_progress, held_room, held_vary):
             else:
                 dynamics.set_rate_and_gradients(Y, s, blocks, v.given, v.load, w, v.behind, rate)
         differences(v.ahead, gradients, v.behind, v.usual, 1.0 / reach, stages[i],
-                    speed * advance, v.sinking, blocks, w)
+                    (moved.speed * advance, moved.second_speed * advance), v.sinking, s, blocks, w)
         if size > 2 * m:
             columns.one_by_one(i, step.h, G, s, blocks, gradients, reduced, forced, varies, v)
         else:

@@ -10,6 +10,7 @@ import numpy as np
 from fecontact.core.compiled import helper
 from fecontact.core.dense_lu import solve_within
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
+from fecontact.system.nodes import in_space
 
 # Products of matrices with more multiplications than these go to BLAS.
 _LARGE = 2000
@@ -79,7 +80,7 @@ def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
 
 @helper
 def _push(g, s, blocks, x, w, rate):
-    """Add to w[2] (2 n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
+    """Add to w[2] (d n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
     n, states, _ = g.rates.shape
     m = len(blocks.position)
     dynamics.project(blocks, x, w[0], w[1])
@@ -89,14 +90,27 @@ def _push(g, s, blocks, x, w, rate):
         first = 2 * m + j * states
         tangential = p[1, 0] * a + p[1, 1] * b + p[1, 2] * c + p[1, 3] * d
         pressing = p[2, 0] * a + p[2, 1] * b + p[2, 2] * c + p[2, 3] * d
+        normal = p[0, 0] * a + p[0, 1] * b + p[0, 2] * c + p[0, 3] * d
+        f = 0.0
+        if in_space(s):
+            e, f = w[0, 2 * n + j], w[1, 2 * n + j]
+            tangential += p[1, 4] * e + p[1, 5] * f
+            pressing += p[2, 4] * e + p[2, 5] * f
+            normal += p[0, 4] * e + p[0, 5] * f
+            w[2, 2 * n + j] -= (p[3, 0] * a + p[3, 1] * b + p[3, 2] * c + p[3, 3] * d
+                                + p[3, 4] * e + p[3, 5] * f)
+            for k in range(s.memory[j]):
+                w[2, 2 * n + j] -= g.force[j, 7 + states + k] * x[first + k]
         for k in range(s.memory[j]):
             tangential += g.force[j, 3 + k] * x[first + k]
             total = g.rates[j, k, 1] * c + g.rates[j, k, 2] * pressing
+            if in_space(s):
+                total += g.rates[j, k, 3 + states] * f
             for other in range(s.memory[j]):
                 total += g.rates[j, k, 3 + other] * x[first + other]
             rate[first + k] += total
         w[2, j] -= tangential
-        w[2, n + j] += (p[0, 0] * a + p[0, 1] * b + p[0, 2] * c + p[0, 3] * d)
+        w[2, n + j] += normal
 
 
 @helper

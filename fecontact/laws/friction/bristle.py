@@ -11,7 +11,8 @@ from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NotNegative, OneOrAbove, PerNode, Positive
 from fecontact.laws.friction.base import LimitedFriction, MemoryFriction, require_at_least
-from fecontact.laws.signatures import memory_friction_law
+from fecontact.laws.friction.planar import clear, direction
+from fecontact.laws.signatures import memory_friction_law, planar_friction_law
 
 # Time constant [s] of the decay of internal variables without normal force.
 _FADING = 1e-7
@@ -99,6 +100,121 @@ def bouc_wen(v, F, z, p, force, rates):
     rates[0, 3] = -v * share * exponent * power * side / yielding
 
 
+@helper
+def _fade_both(z, rates):
+    """Decay rates of a vector without normal force."""
+    for i in range(2):
+        rates[i, 0] = -z[i] / _FADING
+        rates[i, 3 + i] = -1.0 / _FADING
+
+
+@helper
+def _approach(s, exponent):
+    """h(s) = [1 - |1 - s|^(i-1) (1 - s)] / s of Dahl's law, and its derivative."""
+    i = exponent
+    if abs(s) < 1e-3:
+        # Series, whose next term is below round-off of what is left.
+        c2 = 0.5 * i * (i - 1.0)
+        c3 = c2 * (i - 2.0) / 3.0
+        c4 = c3 * (i - 3.0) / 4.0
+        c5 = c4 * (i - 4.0) / 5.0
+        return (i + s * (-c2 + s * (c3 + s * (-c4 + s * c5))),
+                -c2 + s * (2.0 * c3 + s * (-3.0 * c4 + s * 4.0 * c5)))
+    left = 1.0 - s
+    power = abs(left) ** (i - 1.0)
+    covered = 1.0 - power * left
+    return covered / s, (i * power * s - covered) / (s * s)
+
+
+@planar_friction_law
+def _planar_dahl(law, v1, v2, F, z, p, force, rates):
+    """R = F sigma z, z' = v - |v| h(s) sigma z / mu with s = sigma z.e / mu."""
+    clear(force, rates)
+    mu, stiffness, exponent = p[0], p[1], p[2]
+    if F <= 0.0:
+        _fade_both(z, rates)
+        return
+    a = stiffness / mu
+    speed, e1, e2 = direction(v1, v2, z[0], z[1])
+    along = z[0] * e1 + z[1] * e2
+    h, h_s = _approach(a * along, exponent)
+    for i in range(2):
+        row = i * (4 + len(rates))
+        force[row] = F * stiffness * z[i]
+        force[row + 2] = stiffness * z[i]
+        force[row + 3 + i] = F * stiffness
+        v = v1 if i == 0 else v2
+        rates[i, 0] = v - speed * h * a * z[i]
+        for k in range(2):
+            e = e1 if k == 0 else e2
+            unit = 1.0 if i == k else 0.0
+            rates[i, 1 if k == 0 else 3 + len(rates)] = unit - a * z[i] * (
+                h * e + h_s * a * (z[k] - along * e))
+            rates[i, 3 + k] = -speed * a * (h * unit + z[i] * h_s * a * e)
+
+
+@planar_friction_law
+def _planar_lugre(law, v1, v2, F, z, p, force, rates):
+    """R = F [sigma_0 z + sigma_1(|v|) z' + sigma_2 v], z' = v - sigma_0 |v| z / g(|v|)."""
+    clear(force, rates)
+    static, kinetic, stribeck, exponent = p[0], p[1], p[2], p[3]
+    stiffness, damping, viscous, decay = p[4], p[5], p[6], p[7]
+    if F <= 0.0:
+        _fade_both(z, rates)
+        return
+    speed, e1, e2 = direction(v1, v2, z[0], z[1])
+    x = (speed / stribeck) ** exponent
+    excess = (static - kinetic) * math.exp(-x)
+    g = kinetic + excess
+    # |v| g' / g: finite at rest for every exponent.
+    fall = -exponent * x * excess / g
+    fade = damping * math.exp(-((decay * speed) ** 2))
+    for i in range(2):
+        row = i * (4 + len(rates))
+        v = v1 if i == 0 else v2
+        u = stiffness * z[i] / g
+        rate = v - speed * u
+        ratio = stiffness * z[i] + fade * rate + viscous * v
+        rates[i, 0] = rate
+        force[row], force[row + 2] = F * ratio, ratio
+        for k in range(2):
+            e, other = (e1, v1) if k == 0 else (e2, v2)
+            unit = 1.0 if i == k else 0.0
+            rate_v = unit - u * e * (1.0 - fall)
+            rate_z = -speed * stiffness / g * unit
+            column = 1 if k == 0 else 3 + len(rates)
+            rates[i, column], rates[i, 3 + k] = rate_v, rate_z
+            force[row + column] = F * (fade * (rate_v - 2.0 * decay * decay * other * rate)
+                                       + viscous * unit)
+            force[row + 3 + k] = F * (stiffness * unit + fade * rate_z)
+
+
+@planar_friction_law
+def _planar_bouc_wen(law, v1, v2, F, z, p, force, rates):
+    """R = mu F z, u_s z' = v - (beta |v.z| + (1 - beta) v.z) |z|^(n-2) z."""
+    clear(force, rates)
+    mu, yielding, beta, exponent = p[0], p[1], p[2], p[3]
+    if F <= 0.0:
+        _fade_both(z, rates)
+        return
+    size = math.hypot(z[0], z[1])
+    a1, a2 = (z[0] / size, z[1] / size) if size > 0.0 else (0.0, 0.0)
+    along = v1 * a1 + v2 * a2
+    share = beta * (1.0 if along >= 0.0 else -1.0) + 1.0 - beta
+    power = size ** (exponent - 1.0)
+    for i in range(2):
+        row = i * (4 + len(rates))
+        v, a = (v1, a1) if i == 0 else (v2, a2)
+        force[row], force[row + 2], force[row + 3 + i] = mu * F * z[i], mu * z[i], mu * F
+        rates[i, 0] = (v - share * along * power * size * a) / yielding
+        for k in range(2):
+            other, b = (v1, a1) if k == 0 else (v2, a2)
+            unit = 1.0 if i == k else 0.0
+            rates[i, 1 if k == 0 else 3 + len(rates)] = (unit - share * power * size * a * b) / yielding
+            rates[i, 3 + k] = -share * power * (
+                other * a + along * ((exponent - 2.0) * a * b + unit)) / yielding
+
+
 @dataclass(frozen=True)
 class DahlFriction(LimitedFriction):
     r"""Dahl's law: a spring whose stiffness falls to zero as friction reaches mu F.
@@ -128,6 +244,7 @@ class DahlFriction(LimitedFriction):
     """
 
     kernel: ClassVar = dahl
+    planar_kernel: ClassVar = _planar_dahl
 
     friction_coefficient: Positive = 0.55
     presliding_stiffness: Annotated[Positive, Unit("1/m")] = 1e5
@@ -194,6 +311,7 @@ class LuGreFriction(MemoryFriction):
     """
 
     kernel: ClassVar = lugre
+    planar_kernel: ClassVar = _planar_lugre
 
     static_coefficient: PerNode = 0.8
     kinetic_coefficient: Positive = 0.55
@@ -264,6 +382,7 @@ class BoucWenFriction(LimitedFriction):
     """
 
     kernel: ClassVar = bouc_wen
+    planar_kernel: ClassVar = _planar_bouc_wen
 
     friction_coefficient: NotNegative = 0.55
     yield_displacement: Annotated[Positive, Unit("m")] = 5e-6

@@ -1,5 +1,6 @@
 """Friction laws of springs and sliders: Jenkins' element and Iwan's parallel arrangements."""
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -10,7 +11,8 @@ from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NotNegative, Positive
 from fecontact.laws.friction.base import LimitedFriction
-from fecontact.laws.signatures import memory_friction_law
+from fecontact.laws.friction.planar import clear
+from fecontact.laws.signatures import memory_friction_law, planar_friction_law
 
 
 @memory_friction_law
@@ -41,6 +43,37 @@ def _maxwell_slip(v, F, z, p, force, rates):
             force[3 + i] = spring
 
 
+@planar_friction_law
+def _planar_maxwell_slip(law, v1, v2, F, z, p, force, rates):
+    """Each element returns to the disc |c z| <= phi F along its own direction."""
+    clear(force, rates)
+    count, second = len(z) // 2, 4 + len(rates)
+    relaxation = p[0]
+    for i in range(count):
+        spring, mu = p[1 + i], p[1 + count + i]
+        first = 2 * i
+        size = math.hypot(z[first], z[first + 1])
+        excess = size - mu * F / spring
+        rates[first, 0], rates[first, 1] = v1, 1.0
+        rates[first + 1, 0], rates[first + 1, second - 1] = v2, 1.0
+        if excess <= 0.0:
+            for c in range(2):
+                force[second * c] += spring * z[first + c]
+                force[second * c + 3 + first + c] = spring
+            continue
+        for c in range(2):
+            a = z[first + c] / size
+            force[second * c] += mu * F * a
+            force[second * c + 2] += mu * a
+            rates[first + c, 0] -= excess * a / relaxation
+            rates[first + c, 2] = mu * a / (spring * relaxation)
+            for k in range(2):
+                b = z[first + k] / size
+                turn = ((1.0 if c == k else 0.0) - a * b) / size
+                force[second * c + 3 + first + k] = mu * F * turn
+                rates[first + c, 3 + first + k] = -(a * b + excess * turn) / relaxation
+
+
 @dataclass(frozen=True)
 class _MaxwellSlip(LimitedFriction):
     """``memory`` springs and sliders in parallel, between the body and the ground.
@@ -54,6 +87,7 @@ class _MaxwellSlip(LimitedFriction):
     """
 
     kernel: ClassVar = _maxwell_slip
+    planar_kernel: ClassVar = _planar_maxwell_slip
     extensive: ClassVar = frozenset({"stiffness"})
 
     stiffness: Annotated[Positive, Unit("N/m")] = 1e7

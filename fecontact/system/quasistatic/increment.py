@@ -29,14 +29,8 @@ from fecontact.core.compiled import (
 )
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.types import Array, Integers
-from fecontact.system.kernels import (
-    SYSTEM,
-    GroundMotion,
-    NodeMotion,
-    force_against_x,
-    node_contact,
-    normal_gradients,
-)
+from fecontact.system.kernels import force_against_x, normal_gradients
+from fecontact.system.nodes import SYSTEM, GroundMotion, NodeMotion, node_contact
 
 # Out-of-balance force that counts as rounding, relative to the forces that cancel, and the most
 # that is accepted where it falls no further.

@@ -15,7 +15,7 @@ from numba import types
 from fecontact.core.compiled import block, borrowed, f8, helper, integers, kernel, matrix, vector
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import normal_at
-from fecontact.system.kernels import SYSTEM
+from fecontact.system.nodes import SYSTEM
 from fecontact.system.quasistatic.increment import (
     AGAINST,
     FORCE,
