@@ -99,15 +99,24 @@ def as_pair(values: Any, what: str) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
-def as_unit_pair(values: Any, what: str) -> tuple[float, float]:
-    """A direction (x, y) of length one; InputError for one of length zero."""
-    direction = np.array(as_pair(values, what))
-    length = float(np.hypot(*direction))
+def as_place(values: Any, what: str) -> tuple[float, ...]:
+    """Convert to two or three finite coordinates; InputError otherwise."""
+    place = as_floats(values, what)
+    if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
+        raise InputError(f"{what} = {shown(values)} must be a pair of coordinates x, y [m], or in "
+                         f"space three, x, y, z.")
+    return tuple(place.tolist())
+
+
+def as_direction(values: Any, what: str) -> tuple[float, ...]:
+    """A direction (x, y) or (x, y, z) of length one; InputError for one of length zero."""
+    direction = np.array(as_place(values, what))
+    length = float(np.hypot(*direction) if len(direction) == 2 else np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
         raise InputError(f"{what} = {shown(values)} must be longer than zero.")
     # What has length one stays the same when it is written to a file and read back.
-    x, y = direction if abs(length - 1.0) <= 1e-12 else direction / length
-    return float(x), float(y)
+    unit = direction if abs(length - 1.0) <= 1e-12 else direction / length
+    return tuple(unit.tolist())
 
 
 def as_integers(values: Any, what: str) -> Integers:

@@ -157,7 +157,7 @@ def _rest_under_friction(
     """State at rest with what its friction remembers."""
     rest = initial.state() if isinstance(initial, LoadHistory) else initial
     memory = rest.memory(system)
-    ground, travel = system.ground, system.prescribed_motion.base.travel(time)
+    ground, travel = system.ground, system.prescribed_motion.motions[0].travel(time)
     moved = travel - rest.travel
     if moved and (ground.wavy or ground.friction_scale_kernel is not None):
         raise InputError(f"The ground has travelled {rest.travel:g} m in the state at rest, but "

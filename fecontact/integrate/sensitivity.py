@@ -240,4 +240,4 @@ def _slip_limit(
 def _passing(system: ContactSystem) -> Array:
     """Speed (n,) with which the other side passes each node, as its parameter says."""
     motion = system.prescribed_motion
-    return np.asarray(motion.factors * motion.base.speed)
+    return np.tensordot([one.speed for one in motion.motions], motion.factors, 1)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, as_pair, require_kind
+from fecontact.core.checks import as_floats, as_place, require_kind
 from fecontact.core.errors import (
     InputError,
     choices,
@@ -19,7 +19,12 @@ from fecontact.core.errors import (
 from fecontact.core.units import Unit
 from fecontact.laws.signals.harmonic import Harmonic, Signal
 
-_COMPONENTS = ("x", "y", "phi")
+AXES = ("x", "y", "z")
+BOUNDARY_STRESSES = ("pressure", "shear", "shear_across")
+PLANE_COMPONENTS = ("x", "y", "phi")
+SPACE_COMPONENTS = ("x", "y", "z", "phi_x", "phi_y", "phi_z")
+_BASE = tuple(f"base_acceleration_{axis}" for axis in AXES)
+_COMPONENTS = ("x", "y", "z", "phi", "phi_x", "phi_y", "phi_z")
 
 
 @dataclass(frozen=True)
@@ -28,22 +33,22 @@ class Drive:
 
     .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin w_E t
 
-    acts on the body in -x, and likewise in y; u_x may be another motion. By default the dashpots
+    acts on the body in -x, and likewise in y and, of solids, in z; u_x may be another motion. By default the dashpots
     act on the absolute velocity of B, as here; relative ones on ``x_B' - u_x'``, as where spring
     and dashpot share their driven end.
 
     Parameters
     ----------
-    stiffness_x, stiffness_y : float
-        c_x, c_y, zero or above [N/m].
-    damping_x, damping_y : float
-        b_x, b_y, zero or above [N s/m].
-    amplitude_x, amplitude_y : float
-        x_0, y_0 [m].
+    stiffness_x, stiffness_y, stiffness_z : float
+        c_x, c_y, c_z, zero or above [N/m].
+    damping_x, damping_y, damping_z : float
+        b_x, b_y, b_z, zero or above [N s/m].
+    amplitude_x, amplitude_y, amplitude_z : float
+        x_0, y_0, z_0 [m].
     angular_frequency : float
         w_E, zero or above [rad/s].
-    motion_x, motion_y : Signal, optional
-        u_x(t), u_y(t) [m], instead of the harmonic motion.
+    motion_x, motion_y, motion_z : Signal, optional
+        u_x(t), u_y(t), u_z(t) [m], instead of the harmonic motion.
     dashpots : 'absolute' or 'relative'
         Whether the dashpots act on the velocity of B, or on that relative to the driven end.
 
@@ -56,58 +61,84 @@ class Drive:
 
     stiffness_x: Annotated[float, Unit("N/m")] = 0.0
     stiffness_y: Annotated[float, Unit("N/m")] = 0.0
+    stiffness_z: Annotated[float, Unit("N/m")] = 0.0
     damping_x: Annotated[float, Unit("N s/m")] = 0.0
     damping_y: Annotated[float, Unit("N s/m")] = 0.0
+    damping_z: Annotated[float, Unit("N s/m")] = 0.0
     amplitude_x: Annotated[float, Unit("m")] = 0.0
     amplitude_y: Annotated[float, Unit("m")] = 0.0
+    amplitude_z: Annotated[float, Unit("m")] = 0.0
     angular_frequency: Annotated[float, Unit("rad/s")] = 0.0
     motion_x: Annotated[Signal | None, Unit("m")] = None
     motion_y: Annotated[Signal | None, Unit("m")] = None
+    motion_z: Annotated[Signal | None, Unit("m")] = None
     dashpots: Literal["absolute", "relative"] = "absolute"
 
     def __post_init__(self) -> None:
+        given = {f"{part}_{axis}": getattr(self, f"{part}_{axis}")
+                 for part in ("stiffness", "damping", "amplitude") for axis in AXES}
         require_not_negative(
-            "Drive", stiffness_x=self.stiffness_x, stiffness_y=self.stiffness_y,
-            damping_x=self.damping_x, damping_y=self.damping_y,
-            angular_frequency=self.angular_frequency,
-        )
+            "Drive", angular_frequency=self.angular_frequency,
+            **{name: value for name, value in given.items() if not name.startswith("amplitude")})
         require_choice("Drive", "dashpots", self.dashpots, ("absolute", "relative"))
-        require_finite("Drive", amplitude_x=self.amplitude_x, amplitude_y=self.amplitude_y)
-        for component, motion, amplitude in (
-                ("x", self.motion_x, self.amplitude_x), ("y", self.motion_y, self.amplitude_y)):
+        require_finite("Drive", **{name: value for name, value in given.items()
+                                   if name.startswith("amplitude")})
+        for axis in AXES:
+            motion, amplitude = getattr(self, f"motion_{axis}"), given[f"amplitude_{axis}"]
             if motion is None:
                 continue
-            _require_signal("Drive", f"motion_{component}", motion)
+            _require_signal("Drive", f"motion_{axis}", motion)
             if amplitude != 0.0:
-                raise InputError(f"Drive: amplitude_{component} = {amplitude!r} cannot be "
-                                 f"combined with motion_{component}; give one of them.")
-        if self.motion_x is not None and self.motion_y is not None and self.angular_frequency:
+                raise InputError(f"Drive: amplitude_{axis} = {amplitude!r} cannot be "
+                                 f"combined with motion_{axis}; give one of them.")
+        if self.motion_x is not None and self.motion_y is not None and self.angular_frequency and (
+                self.motion_z is not None or not self.amplitude_z):
             raise InputError(f"Drive: angular_frequency = {self.angular_frequency!r} has no "
                              f"effect beside motion_x and motion_y; leave it out.")
 
     @property
-    def motions(self) -> tuple[Signal, Signal]:
-        """Motions of the driven ends of the springs in x and y [m]."""
-        w = self.angular_frequency
-        return (self.motion_x or Harmonic(self.amplitude_x, w),
-                self.motion_y or Harmonic(self.amplitude_y, w))
+    def stiffness(self) -> tuple[float, float, float]:
+        """c_x, c_y and c_z [N/m]."""
+        return self.stiffness_x, self.stiffness_y, self.stiffness_z
 
     @property
-    def moves(self) -> tuple[bool, bool]:
-        """Whether the driven ends in x and y act on B, by a spring or a relative dashpot."""
+    def damping(self) -> tuple[float, float, float]:
+        """b_x, b_y and b_z [N s/m]."""
+        return self.damping_x, self.damping_y, self.damping_z
+
+    @property
+    def motions(self) -> tuple[Signal, Signal, Signal]:
+        """Motions of the driven ends of the springs in x, y and z [m]."""
+        w = self.angular_frequency
+        return (self.motion_x or Harmonic(self.amplitude_x, w),
+                self.motion_y or Harmonic(self.amplitude_y, w),
+                self.motion_z or Harmonic(self.amplitude_z, w))
+
+    @property
+    def moves(self) -> tuple[bool, bool, bool]:
+        """Whether the driven ends in x, y and z act on B, by a spring or a relative dashpot."""
         relative = self.dashpots == "relative"
-        return (bool(self.stiffness_x or (relative and self.damping_x)),
-                bool(self.stiffness_y or (relative and self.damping_y)))
+        x, y, z = (bool(c or (relative and b))
+                   for c, b in zip(self.stiffness, self.damping, strict=True))
+        return x, y, z
+
+    @property
+    def in_space(self) -> bool:
+        """Whether something acts along z."""
+        return bool(self.stiffness_z or self.damping_z or self.amplitude_z
+                    or self.motion_z is not None)
 
     @property
     def frequency_hz(self) -> float:
         """Frequency of the excitation [Hz]; zero without one.
 
-        That of the harmonic motion if it has an amplitude, else the lower one of motion_x and
-        motion_y, else w_E / (2 pi).
+        That of the harmonic motion if it has an amplitude, else the lowest one of motion_x,
+        motion_y and motion_z, else w_E / (2 pi).
         """
-        given = [motion for motion in (self.motion_x, self.motion_y) if motion is not None]
-        harmonic = self.angular_frequency > 0.0 and (self.amplitude_x or self.amplitude_y)
+        given = [motion for motion in (self.motion_x, self.motion_y, self.motion_z)
+                 if motion is not None]
+        harmonic = self.angular_frequency > 0.0 and (
+            self.amplitude_x or self.amplitude_y or self.amplitude_z)
         if harmonic or not given:
             return self.angular_frequency / (2.0 * math.pi)
         return min((motion.frequency_hz for motion in given if motion.frequency_hz is not None),
@@ -120,11 +151,13 @@ class PointLoad:
 
     Parameters
     ----------
-    point : str, int or (x, y)
+    point : str, int, (x, y) or (x, y, z)
         'B', 'C' or a further named point; a contact node by its number from 0; or a place in the
         body [m].
     component : 'x', 'y' or 'phi'
-        A force along +x, along +y (away from the ground), or a moment counter-clockwise.
+        A force along +x, along +y (away from the ground), or a moment counter-clockwise. On solids
+        'x', 'y', 'z' (away from the ground), or moments 'phi_x', 'phi_y', 'phi_z'; at contact nodes
+        along their first and second tangent and their normal.
     signal : Signal
         Its history [N], [N m].
 
@@ -134,18 +167,18 @@ class PointLoad:
         For an unknown component, or an invalid point or signal.
     """
 
-    point: Annotated[str | int | tuple[float, float], Unit("m")] = "C"
-    component: Literal["x", "y", "phi"] = "y"
+    point: Annotated[str | int | tuple[float, ...], Unit("m")] = "C"
+    component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] = "y"
     signal: Signal = field(kw_only=True)
 
     def __post_init__(self) -> None:
         if isinstance(self.point, Integral) and not isinstance(self.point, bool):
             object.__setattr__(self, "point", int(self.point))
         elif isinstance(self.point, tuple | list):
-            object.__setattr__(self, "point", as_pair(self.point, "PointLoad: point"))
+            object.__setattr__(self, "point", as_place(self.point, "PointLoad: point"))
         elif not isinstance(self.point, str):
             raise InputError(f"PointLoad: point = {self.point!r} must be the name of a point, the "
-                             f"number of a contact node, or a place (x, y).")
+                             f"number of a contact node, or a place (x, y), in space (x, y, z).")
         if self.component not in _COMPONENTS:
             raise InputError(f"PointLoad: component = {self.component!r} must be one of "
                              f"{choices(_COMPONENTS)}"
@@ -168,7 +201,10 @@ class BoundaryLoad:
         Along the inward normal: positive presses on the body [Pa].
     shear : float or Signal
         Along the boundary with the body on the left, counter-clockwise around it: to +x on a
-        bottom, +y on a right side, -x on a top [Pa].
+        bottom, +y on a right side, -x on a top [Pa]. On a solid along the first tangent of the
+        face.
+    shear_across : float or Signal
+        Along the second tangent of a solid's face [Pa].
 
     Raises
     ------
@@ -179,14 +215,15 @@ class BoundaryLoad:
     boundary: str
     pressure: Annotated[float | Signal, Unit("Pa")] = 0.0
     shear: Annotated[float | Signal, Unit("Pa")] = 0.0
+    shear_across: Annotated[float | Signal, Unit("Pa")] = 0.0
 
     def __post_init__(self) -> None:
         require_kind("BoundaryLoad", str, boundary=self.boundary)
-        for name in ("pressure", "shear"):
-            if not isinstance(getattr(self, name), Signal):
-                require_finite("BoundaryLoad", **{name: getattr(self, name)})
-        if not isinstance(self.pressure, Signal) and not isinstance(self.shear, Signal) and not (
-                self.pressure or self.shear):
+        given = {name: getattr(self, name) for name in BOUNDARY_STRESSES}
+        for name, value in given.items():
+            if not isinstance(value, Signal):
+                require_finite("BoundaryLoad", **{name: value})
+        if not any(isinstance(value, Signal) or value for value in given.values()):
             raise InputError(f"BoundaryLoad: pressure and shear on '{self.boundary}' are zero; "
                              f"give one of them, or leave the load out.")
 
@@ -202,12 +239,14 @@ class Load:
     Parameters
     ----------
     normal : float
-        F_N0, positive towards the ground [N]: the constant load ``[0, -normal, 0]`` at C.
+        F_N0, positive towards the ground [N]: the constant load ``[0, -normal, 0]`` at C; along -z
+        on solids.
     forces : sequence of PointLoad
         Further forces and moments at points.
-    gravity : (float, float), optional
-        Acceleration g in x and y, (0, -9.81) towards ground below the body [m/s^2].
-    base_acceleration_x, base_acceleration_y : Signal, optional
+    gravity : (float, float) or (float, float, float), optional
+        Acceleration g in x and y, (0, -9.81) towards ground below the body [m/s^2]; of solids in x,
+        y and z.
+    base_acceleration_x, base_acceleration_y, base_acceleration_z : Signal, optional
         Acceleration a of the base in the inertial frame [m/s^2].
     boundaries : sequence of BoundaryLoad
         Pressure and shear along boundaries.
@@ -220,18 +259,19 @@ class Load:
 
     normal: Annotated[float, Unit("N")] = 0.0
     forces: tuple[PointLoad, ...] = ()
-    gravity: Annotated[tuple[float, float] | None, Unit("m/s^2")] = None
+    gravity: Annotated[tuple[float, ...] | None, Unit("m/s^2")] = None
     base_acceleration_x: Annotated[Signal | None, Unit("m/s^2")] = None
     base_acceleration_y: Annotated[Signal | None, Unit("m/s^2")] = None
+    base_acceleration_z: Annotated[Signal | None, Unit("m/s^2")] = None
     boundaries: tuple[BoundaryLoad, ...] = ()
 
     def __post_init__(self) -> None:
         require_finite("Load", normal=self.normal)
         if self.gravity is not None:
             gravity = as_floats(self.gravity, "Load: gravity")
-            if gravity.shape != (2,) or not np.isfinite(gravity).all():
+            if gravity.shape not in ((2,), (3,)) or not np.isfinite(gravity).all():
                 raise InputError(f"Load: gravity = {self.gravity!r} must be two finite numbers, "
-                                 f"the accelerations in x and y [m/s^2].")
+                                 f"the accelerations in x and y, or of a solid three [m/s^2].")
             object.__setattr__(self, "gravity", tuple(gravity.tolist()))
         for name, kind in (("forces", PointLoad), ("boundaries", BoundaryLoad)):
             given = getattr(self, name)
@@ -239,9 +279,14 @@ class Load:
                     isinstance(item, kind) for item in given):
                 raise InputError(f"Load: {name} = {given!r} must be a list of {kind.__name__}.")
             object.__setattr__(self, name, tuple(given))
-        for name in ("base_acceleration_x", "base_acceleration_y"):
+        for name in _BASE:
             if getattr(self, name) is not None:
                 _require_signal("Load", name, getattr(self, name))
+
+    @property
+    def base_accelerations(self) -> tuple[Signal | None, Signal | None, Signal | None]:
+        """Accelerations of the base in x, y and z."""
+        return self.base_acceleration_x, self.base_acceleration_y, self.base_acceleration_z
 
     @property
     def signals(self) -> dict[str, Signal]:
@@ -249,9 +294,9 @@ class Load:
         given: list[tuple[str, Any]] = [
             (f"forces.{k}", force.signal) for k, force in enumerate(self.forces)]
         given += [(name, getattr(self, name))
-                  for name in ("base_acceleration_x", "base_acceleration_y")]
+                  for name in _BASE]
         given += [(f"boundaries.{k}.{name}", getattr(load, name))
-                  for k, load in enumerate(self.boundaries) for name in ("pressure", "shear")]
+                  for k, load in enumerate(self.boundaries) for name in BOUNDARY_STRESSES]
         return {name: value for name, value in given if isinstance(value, Signal)}
 
 

@@ -22,7 +22,7 @@ from fecontact.reduction.assembly.links import Links
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
-from fecontact.system import kernels, nodes
+from fecontact.system import kernels
 from fecontact.system.arrays import system_arrays
 from fecontact.system.friction_memory import bristle_history
 from fecontact.system.gap import Gap, gap_values
@@ -36,9 +36,11 @@ from fecontact.system.interfaces import (
     motion_sources,
     outer_name,
     prescribed_motion,
+    slides,
     system_fields,
 )
 from fecontact.system.loads import require_motion
+from fecontact.system.nodes import SystemArrays
 
 NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a rough "
                  "surface with its stiffness and roughness_height, or another law: `fecontact "
@@ -55,7 +57,7 @@ _KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
 
 def needs_friction(basis: ModalBasis) -> bool:
     """Whether a contact node can move along the ground, so that friction matters."""
-    return bool(basis.contact_T[:, 0].any())
+    return bool(slides(basis).any())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,7 +158,13 @@ class ContactSystem(Summarised):
                 if not isinstance(one, law):
                     raise InputError(f"ContactSystem: {name} = {one!r} must be a "
                                      f"{law.__name__}.")
-        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+        if self.basis.dimension == 2:
+            for what, needs in (("Ground", self.ground.in_space), ("Drive", self.drive.in_space)):
+                if needs:
+                    raise InputError(f"ContactSystem: the {what.lower()} acts or moves along a "
+                                     f"third direction, but the body is plane; leave that out, or "
+                                     f"make a solid.")
+        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
         _ = self.prescribed_motion
         for part in (self.law_groups("normal"), self.law_groups("friction")):
@@ -183,8 +191,8 @@ class ContactSystem(Summarised):
         own = dict(self.basis.summary())
         drive, ground = self.drive, self.ground
         low, high = ground.height_range
-        stiffness = [f"{quantity(value, 'N/m')} in {axis}" for axis, value in (
-            ("x", drive.stiffness_x), ("y", drive.stiffness_y)) if value]
+        stiffness = [f"{quantity(value, 'N/m')} in {axis}"
+                     for axis, value in zip("xyz", drive.stiffness, strict=True) if value]
         moved = drive.frequency_hz if any(motion.largest > 0.0 for motion in drive.motions) else 0.0
         return [
             *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
@@ -252,7 +260,9 @@ class ContactSystem(Summarised):
         """Scale (n s,) of each internal variable of the state."""
         scales = np.ones((self.basis.contact_nodes, self.memory))
         for nodes, _, law in self.law_groups("friction"):
-            scales[nodes, : law.memory] = law.state_scale
+            # In space both components of a vector have its scale.
+            scale = np.repeat(law.state_scale, self.basis.dimension - 1)
+            scales[nodes, : len(scale)] = scale
         return scales.reshape(-1)
 
     def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
@@ -298,12 +308,11 @@ class ContactSystem(Summarised):
              for nodes, _, law in self.law_groups("friction")], axis=-1)
 
     @cached_property
-    def arrays(self) -> nodes.SystemArrays:
+    def arrays(self) -> SystemArrays:
         """The system as arrays for the compiled kernels."""
         return system_arrays(
             self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
-            self.drive, self.load, np.asarray(self.gap, dtype=float),
-            motion=self.prescribed_motion.base, sliding=self.prescribed_motion.factors)
+            self.drive, self.load, np.asarray(self.gap, dtype=float), self.prescribed_motion)
 
     def rhs(self, t: float, y: Array) -> Array:
         """Rate y' (2 m + n s,) of the state y = [q, q', z]."""
@@ -321,15 +330,17 @@ class ContactSystem(Summarised):
         """Contact quantities (N, n, 6) at N times and states (N, 2 m + n s).
 
         The columns are normal force [N], friction force [N], penetration [m], its rate [m/s],
-        slip velocity [m/s] and the rate of the ground's height under the node [m/s]. InputError
-        for states of wrong shape.
+        slip velocity [m/s] and the rate of the ground's height under the node [m/s]; in space (N,
+        n, 8), with friction force and slip velocity along the second tangent. InputError for
+        states of wrong shape.
         """
         times = np.ascontiguousarray(times, dtype=float)
         states = np.ascontiguousarray(states, dtype=float)
         if times.ndim != 1 or states.shape != (len(times), self.size):
             raise InputError(f"The states at {times.size} times must have shape ({times.size}, "
                              f"{self.size}), not {states.shape}.")
-        out = np.empty((len(times), self.basis.contact_nodes, kernels.STATE_COLUMNS))
+        out = np.empty((len(times), self.basis.contact_nodes,
+                        kernels.state_columns(self.arrays)))
         kernels.contact_history(times, states, self.arrays, out)
         return out
 
@@ -415,7 +426,7 @@ def _sliding_speed(sliding: Sliding) -> str:
 def _load_summary(load: Load) -> str:
     parts = [quantity(load.normal, "N")]
     if load.gravity is not None:
-        parts.append(f"gravity ({load.gravity[0]:.4g}, {load.gravity[1]:.4g}) m/s²")
+        parts.append(f"gravity ({', '.join(f'{g:.4g}' for g in load.gravity)}) m/s²")
     if load.boundaries:
         parts.append(f"on {listed([one.boundary for one in load.boundaries])}")
     if load.signals:

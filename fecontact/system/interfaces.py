@@ -1,7 +1,8 @@
 """Interfaces of several bodies as parts of a contact system, and the motion of their other sides.
 
 The compiled right-hand side has one function of time for the prescribed motion of all contact
-nodes, and a factor for each of them: ``V_tj(t) = factor_j V(t)``.
+nodes, and a factor for each of them: ``V_tj(t) = factor_j V(t)``. In space there are two functions,
+and factors for both tangents.
 """
 
 from collections.abc import Mapping, Sequence
@@ -124,7 +125,7 @@ def system_fields(
             gaps.append(np.zeros(count))
             continue
         one = given[name]
-        if one.friction is None and basis.contact_T[nodes, 0].any():
+        if one.friction is None and slides(basis)[nodes].any():
             raise InputError(f"Interface '{name}' lacks friction, although its contact nodes can "
                              f"move along the other side: give a friction law with its "
                              f"coefficients, such as ConstantFriction(0.0) for no friction.")
@@ -151,16 +152,26 @@ def _require_joined(
     for name, basis in bodies.items():
         if basis.rigid_modes and name not in ends and not basis.T[0].any():
             free = np.abs(basis.T[:, :, basis.angular_frequencies == 0.0]).max(axis=(0, 2))
-            ways = [way for way, moved in zip(("x", "y", "rotation"), free, strict=True) if moved]
+            names = ("x", "y", "rotation") if basis.dimension == 2 else (
+                "x", "y", "z", "rotation", "rotation", "rotation")
+            ways = [*dict.fromkeys(way for way, moved in zip(names, free, strict=True) if moved)]
             how = f" in {listed(ways)}" if ways else ""
             raise InputError(f"ContactSystem: body '{name}' is free{how}, but no "
                              f"interface and no link touches it; join it to another body, support "
                              f"it, or leave it out.")
 
 
+def slides(basis: ModalBasis) -> NDArray[np.bool_]:
+    """Whether each contact node (n,) can move along its tangents."""
+    return np.asarray(basis.contact_T[:, : basis.dimension - 1].any(axis=(1, 2)))
+
+
 @dataclass(frozen=True, eq=False)
 class MotionSource:
-    """What moves the other side of some contact nodes, ``V_tj = along_j V(t)``."""
+    """What moves the other side of some contact nodes, ``V_tj = along_j V(t)``.
+
+    ``along`` is (k,), in space (k, 2), for k nodes.
+    """
 
     what: str
     nodes: NDArray[np.bool_]
@@ -180,14 +191,35 @@ class PrescribedMotion:
 
     Attributes
     ----------
-    base : Ground
-        Flat ground of that motion.
-    factors : (n,) array
-        Tangential velocity of the other side of each node by this speed.
+    motions : tuple of Ground
+        Flat ground of each motion: one in the plane, one or two in space.
+    factors : (k, n) array
+        Tangential velocity of the other side of each node by the speed of each motion; in space
+        (k, n, 2), for both tangents.
     """
 
-    base: Ground
+    motions: tuple[Ground, ...]
     factors: Array
+
+    @property
+    def constant(self) -> bool:
+        """Whether no speed depends on time."""
+        return all(one.motion is None for one in self.motions)
+
+    def travel(self, time: float) -> Array:
+        """Travel (n,), in space (n, 2), of the other side of each node at a time [m]."""
+        return np.tensordot([one.travel(time) for one in self.motions], self.factors, 1)
+
+    def velocity(self, time: float) -> Array:
+        """Velocity (n,), in space (n, 2), of the other side of each node at a time [m/s]."""
+        return np.tensordot([one.velocity(time) for one in self.motions], self.factors, 1)
+
+    def largest_speed(self, t0: float, t1: float) -> float:
+        """Upper bound of the speed of any node's other side from t0 to t1 [m/s]."""
+        largest = np.abs(self.factors.reshape(len(self.motions), len(self.factors[0]), -1))
+        speeds = [one.largest_speed(t0, t1) for one in self.motions]
+        found = np.tensordot(speeds, largest, 1)
+        return float(np.linalg.norm(found, axis=-1).max(initial=0.0))
 
 
 def motion_sources(
@@ -195,8 +227,7 @@ def motion_sources(
 ) -> list[MotionSource]:
     """Ground, if it has nodes, and each sliding interface."""
     n, first = basis.contact_nodes, 0
-    places = basis.positions[2 : 2 + n]
-    tangents = np.stack([basis.normals[:, 1], -basis.normals[:, 0]], axis=1)
+    places, tangents = basis.contact_places, basis.tangents
     on_ground = basis.ground_nodes.copy()
     sources = []
     for name, count in basis.groups:
@@ -210,9 +241,25 @@ def motion_sources(
                                         one.along(places[nodes], tangents[nodes]), one.speed,
                                         one.motion))
     if on_ground.any():
-        along = np.ones(np.count_nonzero(on_ground))
-        sources.insert(0, MotionSource("the ground", on_ground, along, ground.speed, ground.motion))
+        sources[:0] = _ground_sources(ground, on_ground, places[on_ground], tangents[on_ground])
     return sources
+
+
+def _ground_sources(
+    ground: Ground, nodes: NDArray[np.bool_], places: Array, tangents: Array
+) -> list[MotionSource]:
+    """The ground's motion along x; in space along y and its rotation too, if it has them."""
+    if tangents.ndim == 2:
+        return [MotionSource("the ground", nodes, np.ones(len(places)), ground.speed,
+                             ground.motion)]
+    found = [MotionSource("the ground", nodes, tangents[:, :, 0], ground.speed, ground.motion)]
+    across = MotionSource("the ground along y", nodes, tangents[:, :, 1], ground.speed_y,
+                          ground.motion_y)
+    arms = places[:, :2] - np.array(ground.centre)
+    turned = np.einsum("nkd,nd->nk", tangents[:, :, :2],
+                       np.column_stack([-arms[:, 1], arms[:, 0]]))
+    turning = MotionSource("the rotation of the ground", nodes, turned, ground.rotation_speed, None)
+    return [*found, across, turning]
 
 
 def checked_sliding(
@@ -233,17 +280,19 @@ def checked_sliding(
             raise InputError(f"ContactSystem: sliding names the interface {group!r}"
                              f"{nearest(group, names)}, but there are {choices(names)}.")
         require_kind(f"Interface '{group}'", (SlidingTranslation, SlidingRotation), sliding=one)
-    leaning = basis.normals[basis.ground_nodes] != (0.0, 1.0)
+    upright = (0.0, 1.0) if basis.dimension == 2 else (0.0, 0.0, 1.0)
+    leaning = basis.normals[basis.ground_nodes] != upright
     if ground.wavy and leaning.any():
-        raise InputError("ContactSystem: waves of the ground need contact nodes whose normal is "
-                         "(0, 1), but some on the ground have others; make the ground flat.")
+        raise InputError(f"ContactSystem: waves of the ground need contact nodes whose normal is "
+                         f"{upright[:-1] + (1,)}, but some on the ground have others; make the "
+                         f"ground flat.")
     return MappingProxyType(dict(sliding))
 
 
 def prescribed_motion(
     basis: ModalBasis, ground: Ground, sliding: Mapping[str, Sliding]
 ) -> PrescribedMotion:
-    """One function of time and the factors of the nodes.
+    """Functions of time and the factors of the nodes: one in the plane, up to two in space.
 
     A single source keeps its own speed as the parameter. Several constant speeds become factors of
     a speed of one.
@@ -254,26 +303,34 @@ def prescribed_motion(
         If a speed varies in time beside others that are not zero.
     """
     sources = motion_sources(basis, ground, sliding)
-    factors = np.zeros(basis.contact_nodes)
+    size = (basis.contact_nodes,) if basis.dimension == 2 else (basis.contact_nodes, 2)
+    most = basis.dimension - 1
     if len(sources) < 2:
+        factors = np.zeros((1, *size))
         for source in sources:
-            factors[source.nodes] = source.along
-        lead = sources[0] if sources else None
-    else:
-        moving = [source for source in sources if source.moves]
-        varying = [source for source in moving if source.motion is not None]
-        if varying and len(moving) > 1:
-            raise InputError(f"ContactSystem: {varying[0].what} varies in time while "
-                             f"{choices([one.what for one in moving if one is not varying[0]])} "
-                             f"moves too; with a motion in time all other speeds must be zero.")
-        lead = varying[0] if varying else None
-        for source in moving:
-            factors[source.nodes] = source.along * (1.0 if varying else source.speed)
-        if not varying:
-            return PrescribedMotion(Ground(speed=1.0), factors)
-    if lead is None:
-        return PrescribedMotion(Ground(), factors)
-    return PrescribedMotion(Ground(speed=lead.speed, motion=lead.motion), factors)
+            factors[0, source.nodes] = source.along
+            return PrescribedMotion((Ground(speed=source.speed, motion=source.motion),), factors)
+        return PrescribedMotion((Ground(),), factors)
+    varying = [source for source in sources if source.motion is not None]
+    steady = [source for source in sources if source.motion is None]
+    moving = [source for source in steady if source.moves]
+    if len(varying) + bool(moving) > most:
+        others = [source.what for source in (*varying[1:], *moving)]
+        raise InputError(f"ContactSystem: {varying[0].what} varies in time while {choices(others)} "
+                         f"moves too; with {'a motion' if most == 1 else 'two motions'} in time all "
+                         f"other speeds must be zero.")
+    motions = [Ground(speed=source.speed, motion=source.motion) for source in varying]
+    factors = np.zeros((len(varying), *size))
+    for by, source in zip(factors, varying, strict=True):
+        by[source.nodes] = source.along
+    if len(varying) < most:
+        # Whatever their values: which motions there are must not depend on a speed being zero.
+        together = np.zeros(size)
+        for source in steady:
+            together[source.nodes] += source.speed * source.along
+        motions.append(Ground(speed=1.0))
+        factors = np.concatenate([factors, together[None]])
+    return PrescribedMotion(tuple(motions), factors)
 
 
 def inner_name(name: str) -> str:

@@ -26,6 +26,7 @@ from fecontact.core.compiled import block, borrowed, f8, helper, integers, kerne
 from fecontact.laws.signatures import friction_at, memory_at, normal_at, planar_at, signal_at
 from fecontact.system.nodes import (
     SYSTEM,
+    SystemArrays,
     force_room,
     ground_motion,
     in_space,
@@ -41,6 +42,11 @@ from fecontact.system.nodes import (
 (NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE,
  FRICTION_ACROSS, SLIP_ACROSS) = range(8)
 STATE_COLUMNS, SPACE_STATE_COLUMNS = 6, 8
+
+
+def state_columns(arrays: SystemArrays) -> int:
+    """Number of columns of the per-node results of a system."""
+    return SPACE_STATE_COLUMNS if len(arrays.T2) else STATE_COLUMNS
 
 
 @helper

@@ -10,7 +10,7 @@ from fecontact.core.types import Array
 from fecontact.laws.excitation import Load
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
-from fecontact.system import kernels, nodes
+from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.friction_memory import settled
 from fecontact.system.jacobian import jacobian
@@ -99,9 +99,10 @@ def equilibrium(
                             "(ground.friction_variation); start from rest.")
     arrays = _at_mean(system)
     if not friction:
-        arrays = at_rest(arrays, system.prescribed_motion.base.travel(time))
+        arrays = at_rest(arrays, *(one.travel(time) for one in system.prescribed_motion.motions))
     # On level ground, and with its normal vertical, contact forces do not lean.
-    slides = bool(arrays.leans and ground.wavy and arrays.Tx.any() and not standing)
+    slides = bool(arrays.leans and ground.wavy and (arrays.Tx.any() or arrays.T2.any())
+                  and not standing)
     problem = Balance(arrays._replace(leans=0), time, system.penetration_scale)
     solution = problem.equilibrium()
     if system.basis.springs:
@@ -130,13 +131,18 @@ def _among_springs(
     return problem.slide(start, system.penetration_scale, system.stored_energy)
 
 
-def at_rest(arrays: nodes.SystemArrays, travel: float) -> nodes.SystemArrays:
+def at_rest(
+    arrays: SystemArrays, travel: float, second_travel: float = 0.0
+) -> SystemArrays:
     """Arrays of a system without friction, on ground at rest that has travelled [m]."""
     return arrays._replace(
         friction=np.full_like(arrays.friction, _frictionless.address),
         memory=np.zeros_like(arrays.memory),
         bristle_stiffness=np.zeros((2, len(arrays.gap), 0)), ground_motion=_still.address,
-        ground_motion_parameters=np.array([travel], dtype=float))
+        planar=np.full_like(arrays.planar, along_slip.address),
+        ground_motion_parameters=np.array([travel], dtype=float),
+        second_motion=_still.address if len(arrays.planar) else 0,
+        second_motion_parameters=np.array([second_travel], dtype=float))
 
 
 def resting(
@@ -161,7 +167,7 @@ def resting(
 class Balance:
     """Out-of-balance modal forces of a resting or steadily sliding body."""
 
-    def __init__(self, arrays: nodes.SystemArrays, time: float, scale: float) -> None:
+    def __init__(self, arrays: SystemArrays, time: float, scale: float) -> None:
         self.arrays = arrays
         self.load = arrays.constant_load
         self._time = time
@@ -173,7 +179,8 @@ class Balance:
         # Stiffness of the fully closed contact, and its force at zero displacement.
         far = np.full(n, max(10.0 * scale, 2.0 * self._penetration(scale)))
         values, self.face_stiffness = self.normal(far)
-        undisplaced = np.empty((n, kernels.STATE_COLUMNS))
+        columns = kernels.state_columns(arrays)
+        undisplaced = np.empty((n, columns))
         kernels.contact_state(time, self._state, arrays, undisplaced)
         self.face_force = values + self.face_stiffness * (
             undisplaced[:, kernels.PENETRATION] - far)
@@ -181,6 +188,8 @@ class Balance:
         self._initial = np.abs(arrays.Ty).T @ np.where(
             arrays.on_ground, 0.0, np.abs(undisplaced[:, kernels.NORMAL_FORCE]))
         tangential = (arrays.Tx**2).T @ self.face_stiffness
+        if len(arrays.T2):
+            tangential = tangential + (arrays.T2**2).T @ self.face_stiffness
         normal = (arrays.Ty**2).T @ self.face_stiffness
         diagonal = np.abs(np.diag(arrays.stiffness))
         self.scale = diagonal + tangential + normal
@@ -352,7 +361,7 @@ class Balance:
         return step * (longest / moved if exactly else min(1.0, longest / moved))
 
     def _energy(self, q: Array, stored: Callable[[Array], Array]) -> float:
-        state = np.empty((len(self.arrays.gap), kernels.STATE_COLUMNS))
+        state = np.empty((len(self.arrays.gap), kernels.state_columns(self.arrays)))
         kernels.contact_state(self._time, self._settled(q), self.arrays, state)
         elastic = 0.5 * q @ self.arrays.stiffness @ q - self.load @ q
         return float(elastic + stored(state[:, kernels.PENETRATION]))
@@ -361,7 +370,7 @@ class Balance:
         """Symmetric stiffness (m, m) at q, for ground that is level under each node."""
         arrays = self.arrays
         self._state[: len(q)] = q
-        state = np.empty((len(arrays.gap), kernels.STATE_COLUMNS))
+        state = np.empty((len(arrays.gap), kernels.state_columns(arrays)))
         kernels.contact_state(self._time, self._state, arrays, state)
         slope = self.normal(state[:, kernels.PENETRATION].copy())[1]
         return np.asarray(arrays.stiffness + (arrays.Ty.T * slope) @ arrays.Ty)
@@ -398,7 +407,7 @@ class Balance:
         return min(rounding, _UNBALANCED * applied) if applied > 0.0 else rounding
 
 
-def _at_mean(system: ContactSystem) -> nodes.SystemArrays:
+def _at_mean(system: ContactSystem) -> SystemArrays:
     """The system's arrays with the mean values of drive and loads as constant loads.
 
     Only constant signals contribute; time-dependent ones are taken to have zero mean.
@@ -406,7 +415,7 @@ def _at_mean(system: ContactSystem) -> nodes.SystemArrays:
     arrays = system.arrays
     load = arrays.constant_load.copy()
     springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
-    given = [*zip(springs, system.drive.motions, strict=True),
+    given = [*zip(springs, system.drive.motions[: len(springs)], strict=True),
              *zip(arrays.load_shapes, system.load.signals.values(), strict=True)]
     for shape, source in given:
         if isinstance(source, Constant):

@@ -45,10 +45,11 @@ class ContactField(VectorField):
     def _moves_forcing(self, varying: frozenset[str]) -> bool:
         moved = varying & _FORCING
         ground = self._family.base.ground
-        steady = self._family.base.prescribed_motion.base.motion is None
+        steady = self._family.base.prescribed_motion.constant
         flat = not ground.wavy and ground.friction_variation is None and steady
         if flat and "profile_parameters" not in moved:
-            moved = moved - {"ground_motion_parameters", "sliding"}
+            moved = moved - {"ground_motion_parameters", "second_motion_parameters", "sliding",
+                             "sliding_across"}
         return bool(moved)
 
     def system(self, values: Array | None = None) -> ContactSystem:

@@ -218,7 +218,7 @@ def _problem(
         arrays, _static(static_coefficient, n), cluster, rows, sliding, 1e-4 * longest,
         -1.0 if restitution is None else float(restitution), 0.0, 0,
         np.array([*ground.height_range, np.inf if wave is None else wave]),
-        int(system.prescribed_motion.base.motion is None), compiled_derivative.address,
+        int(system.prescribed_motion.constant), compiled_derivative.address,
         compiled_change.address)
     rubbing = np.any(rows != 0.0, axis=1)
     if restitution is not None and system.basis.springs:
@@ -317,13 +317,12 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
     largest = np.abs(system.basis.T[:, :2]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
     depth = system.penetration_scale
-    fastest = float(np.abs(arrays.sliding).max()) * system.prescribed_motion.base.largest_speed(
-        float(times[0]), float(times[-1]))
+    fastest = system.prescribed_motion.largest_speed(float(times[0]), float(times[-1]))
     speed = max(0.01 * fastest,
                 depth / longest)
     # Velocities that drive and loads bring about in each mode, within a step where it is slow.
     springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
-    pushes = [(springs, [motion.largest for motion in drive.motions]),
+    pushes = [(springs, [motion.largest for motion in drive.motions[: len(springs)]]),
               (arrays.load_shapes, [signal.largest for signal in system.load.signals.values()])]
     push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
     slowest = np.maximum(np.diag(arrays.stiffness), 1.0 / longest**2)
@@ -332,7 +331,7 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
               + 0.5 * abs(state[:m] @ system.arrays.stiffness @ state[:m])
               + work_of_loads(system.basis, system.load, depth)
               + sum(0.5 * c * motion.largest**2 for c, motion in zip(
-                  (drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
+                  drive.stiffness, drive.motions, strict=True))
               + 0.5 * driven @ driven)
     return np.concatenate([depth / largest, np.maximum(speed / largest, _DRIVEN * driven),
                            np.full(POWER_COUNT + n, energy or 0.5 * speed**2)])

@@ -7,6 +7,7 @@ looked at too, so that none escapes. Functions of users and the stick of frictio
 known at the looks only.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from fecontact.core.checks import as_floats
+from fecontact.core.checks import as_direction, as_floats, as_pair
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import (
     InputError,
@@ -18,6 +18,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
+from fecontact.laws.ground.height_map import HeightMap
 from fecontact.laws.ground.motion import (
     GroundMotion,
     HarmonicSpeed,
@@ -52,12 +53,22 @@ class Ground:
         y_A, zero or above; zero is flat ground [m].
     wavelength : float
         lambda_w, positive [m].
-    profile : Profile, optional
-        Heights [m] instead of the sine.
+    profile : Profile or HeightMap, optional
+        Heights [m] instead of the sine; a map of heights over x and y below solids only.
     motion : GroundMotion, optional
         Time-dependent speed; by default the constant V.
     friction_variation : Profile, optional
         s(xi): the friction force is multiplied by 1 + s, which must not be negative.
+    speed_y, motion_y : float and GroundMotion, optional
+        The same along y, below solids only [m/s].
+    rotation_speed : float
+        Rotation about the normal, below solids only, positive counter-clockwise from above
+        [rad/s]; of flat and even ground.
+    centre : (float, float)
+        Where the axis of rotation stands [m].
+    wave_direction : (float, float)
+        Direction in x and y along which waves and friction vary below solids; of any length above
+        zero, stored with length one.
     normal : 'surface' or 'vertical'
         Direction of the contact force: normal to the surface as above, or always vertical,
         f_x = 0, as in the source. Waves put energy into the body then, even at rest.
@@ -72,24 +83,40 @@ class Ground:
     speed: Annotated[float, Unit("m/s")] = 0.0
     amplitude: Annotated[float, Unit("m")] = 0.0
     wavelength: Annotated[float, Unit("m")] = 2.5e-3
-    profile: Annotated[Profile | None, Unit("m")] = None
+    profile: Annotated[Profile | HeightMap | None, Unit("m")] = None
     motion: GroundMotion | None = None
     friction_variation: Profile | None = None
     normal: Literal["surface", "vertical"] = "surface"
+    speed_y: Annotated[float, Unit("m/s")] = 0.0
+    motion_y: GroundMotion | None = None
+    rotation_speed: Annotated[float, Unit("rad/s")] = 0.0
+    centre: Annotated[tuple[float, float], Unit("m")] = (0.0, 0.0)
+    wave_direction: tuple[float, float] = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        require_finite("Ground", speed=self.speed)
+        require_finite("Ground", speed=self.speed, speed_y=self.speed_y,
+                       rotation_speed=self.rotation_speed)
         require_not_negative("Ground", amplitude=self.amplitude)
         require_positive("Ground", wavelength=self.wavelength)
-        for name, kind in (("profile", Profile), ("motion", GroundMotion),
-                           ("friction_variation", Profile)):
+        object.__setattr__(self, "centre", as_pair(self.centre, "Ground: centre"))
+        along = as_direction(self.wave_direction, "Ground: wave_direction")
+        object.__setattr__(self, "wave_direction",
+                           as_pair(along, "Ground: wave_direction"))
+        for name, kind in (("profile", (Profile, HeightMap)), ("motion", GroundMotion),
+                           ("friction_variation", Profile), ("motion_y", GroundMotion)):
             given = getattr(self, name)
             if given is not None and not isinstance(given, kind):
-                raise InputError(f"Ground: {name} = {given!r} must be a {kind.__name__}.")
+                kinds = kind if isinstance(kind, tuple) else (kind,)
+                raise InputError(f"Ground: {name} = {given!r} must be a "
+                                 f"{' or '.join(one.__name__ for one in kinds)}.")
         if self.profile is not None and self.amplitude != 0.0:
             raise InputError(f"Ground: amplitude = {self.amplitude!r} cannot be combined with "
                              f"profile; give one of them.")
         require_choice("Ground", "normal", self.normal, ("surface", "vertical"))
+        if self.rotation_speed and (self.wavy or self.friction_variation is not None):
+            raise InputError(f"Ground: rotation_speed = {self.rotation_speed!r} needs flat and even "
+                             f"ground; leave out the waves and friction_variation, or let an "
+                             f"interface slide.")
         self._require_friction()
 
     def _require_friction(self) -> None:
@@ -107,7 +134,7 @@ class Ground:
                              f"kernel of a profile must add its first parameter to the height.")
 
     @cached_property
-    def _shape(self) -> Profile:
+    def _shape(self) -> Profile | HeightMap:
         if self.profile is not None:
             return self.profile
         return Sine(self.amplitude, self.wavelength) if self.amplitude > 0.0 else Flat()
@@ -116,6 +143,12 @@ class Ground:
     def wavy(self) -> bool:
         """Whether the height varies."""
         return not self._shape.flat
+
+    @property
+    def in_space(self) -> bool:
+        """Whether it moves or varies in ways that only solids above it feel."""
+        return bool(self.speed_y or self.motion_y is not None or self.rotation_speed
+                    or self.wave_direction != (1.0, 0.0) or isinstance(self.profile, HeightMap))
 
     @property
     def steepest_slope(self) -> float:
@@ -137,13 +170,21 @@ class Ground:
     def height(self, abscissa: ArrayLike, time: float = 0.0) -> Array:
         """Height [m] at abscissae of the inertial frame [m] at a time [s]."""
         require_finite("Ground", time=time)
-        return self._shape.height(as_floats(abscissa, "Ground: abscissa") - self.travel(time))
+        return self._profile("height").height(
+            as_floats(abscissa, "Ground: abscissa") - self.travel(time))
 
     def slope(self, abscissa: ArrayLike, time: float = 0.0) -> Array:
         """Slope at abscissae of the inertial frame [m] at a time [s]."""
         require_finite("Ground", time=time)
         places = as_floats(abscissa, "Ground: abscissa") - self.travel(time)
-        return self._shape.shape(places)[..., 1].copy()
+        return self._profile("slope").shape(places)[..., 1].copy()
+
+    def _profile(self, what: str) -> Profile:
+        """The profile; InputError for ground whose height depends on x and y."""
+        if isinstance(self._shape, HeightMap):
+            raise InputError(f"Ground: {what} at abscissae needs a profile, but this ground has a "
+                             f"map of heights over x and y; use profile.shape(x, y).")
+        return self._shape
 
     def travel(self, time: float) -> float:
         """Travel [m] since t = 0 at a time [s]."""
@@ -171,8 +212,13 @@ class Ground:
 
     @property
     def profile_kernel(self) -> CompiledLaw:
-        """Compiled profile."""
-        return self._shape.kernel
+        """Compiled profile; flat beside a map of heights."""
+        return Flat.kernel if isinstance(self._shape, HeightMap) else self._shape.kernel
+
+    @property
+    def surface_kernel(self) -> CompiledLaw | None:
+        """Compiled map of heights; None where the profile tells the height."""
+        return self._shape.kernel if isinstance(self._shape, HeightMap) else None
 
     def profile_parameters(self) -> Array:
         """Parameters of the compiled profile."""

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from fecontact.core.checks import as_floats, as_unit_pair, require_kind
+from fecontact.core.checks import as_floats, as_direction, require_kind
 from fecontact.core.errors import (
     InputError,
     require_finite,
@@ -193,7 +193,7 @@ def check_ends(spring: Spring | NonlinearSpring) -> None:
     _check_points(spring)
     owner = type(spring).__name__
     if spring.direction is not None:
-        object.__setattr__(spring, "direction", as_unit_pair(
+        object.__setattr__(spring, "direction", as_direction(
             spring.direction, f"{owner}: direction"))
     elif spring.second is None:
         raise InputError(f"{owner}: a spring to the base needs direction = (x, y).")

@@ -1,0 +1,163 @@
+"""Measured heights of the ground over two directions."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numba import types
+
+from fecontact.core.checks import as_floats
+from fecontact.core.compiled import CompiledLaw, helper, i8, kernel, matrix, vector
+from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.types import Array, ArrayLike
+from fecontact.core.units import Unit
+from fecontact.laws.signatures import ground_surface, surface_at
+
+# Leading parameters of the kernel: level, origin, spacing, numbers of points.
+_HEAD = 7
+
+
+@kernel(types.void(i8, vector, vector, vector, matrix))
+def _shape(address, x, y, p, out):
+    for k in range(len(x)):
+        found = surface_at(address)(x[k], y[k], p)
+        for c in range(6):
+            out[k, c] = found[c]
+
+
+@helper
+def _weights(u):
+    """Cubic B-spline weights of four points at the part u of an interval, with two derivatives."""
+    v = 1.0 - u
+    return ((v * v * v / 6.0, (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0,
+             (4.0 - 6.0 * v * v + 3.0 * v * v * v) / 6.0, u * u * u / 6.0),
+            (-0.5 * v * v, u * (1.5 * u - 2.0), v * (2.0 - 1.5 * v), 0.5 * u * u),
+            (v, 3.0 * u - 2.0, 3.0 * v - 2.0, u))
+
+
+@ground_surface
+def _spline(x, y, p):
+    nx, ny = int(p[5]), int(p[6])
+    a, b = (x - p[1]) / p[3], (y - p[2]) / p[4]
+    i, k = math.floor(a), math.floor(b)
+    wx, sx, bx = _weights(a - i)
+    wy, sy, by = _weights(b - k)
+    height, zx, zy, zxx, zxy, zyy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for r in range(4):
+        row = int(i + r - 1) % nx
+        level, slope, bend = 0.0, 0.0, 0.0
+        for c in range(4):
+            value = p[7 + row * ny + int(k + c - 1) % ny]
+            level += wy[c] * value
+            slope += sy[c] * value
+            bend += by[c] * value
+        height += wx[r] * level
+        zx += sx[r] * level
+        zy += wx[r] * slope
+        zxx += bx[r] * level
+        zxy += sx[r] * slope
+        zyy += wx[r] * bend
+    return (p[0] + height, zx / p[3], zy / p[4], zxx / (p[3] * p[3]), zxy / (p[3] * p[4]),
+            zyy / (p[4] * p[4]))
+
+
+@dataclass(frozen=True)
+class HeightMap:
+    r"""Heights of the ground below solids, measured over a grid that repeats itself.
+
+    .. math:: z(x, y) = \sum_{ij} c_{ij}\, B_3\left(\tfrac{x - x_0}{h_x} - i\right)
+        B_3\left(\tfrac{y - y_0}{h_y} - j\right)
+
+    the bicubic spline through all points, with continuous slopes and curvatures. The map is
+    repeated in both directions: its last row borders on its first one.
+
+    Parameters
+    ----------
+    heights : (N, M) sequence
+        Heights z at N places in x and M in y, positive out of the ground; at least 4 x 4 [m].
+    spacing_x, spacing_y : float
+        h_x and h_y, distances of the points, positive [m].
+    origin_x, origin_y : float
+        Place of the first point [m].
+
+    Raises
+    ------
+    InputError
+        For heights that are not a grid of finite numbers, or are too few.
+    """
+
+    kernel: ClassVar[CompiledLaw] = _spline
+
+    heights: Annotated[tuple[tuple[float, ...], ...], Unit("m")]
+    spacing_x: Annotated[float, Unit("m")]
+    spacing_y: Annotated[float, Unit("m")]
+    origin_x: Annotated[float, Unit("m")] = 0.0
+    origin_y: Annotated[float, Unit("m")] = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive("HeightMap", spacing_x=self.spacing_x, spacing_y=self.spacing_y)
+        require_finite("HeightMap", origin_x=self.origin_x, origin_y=self.origin_y)
+        grid = as_floats(self.heights, "HeightMap: heights")
+        if grid.ndim != 2 or min(grid.shape) < 4 or not np.isfinite(grid).all():
+            raise InputError(f"HeightMap: heights of shape {grid.shape} must be a grid of finite "
+                             f"numbers, at least 4 x 4.")
+        object.__setattr__(self, "heights", tuple(tuple(row) for row in grid.tolist()))
+
+    def parameters(self) -> Array:
+        """Level, origin, spacing, numbers of points and the coefficients c."""
+        return np.concatenate([[0.0, self.origin_x, self.origin_y, self.spacing_x, self.spacing_y],
+                               np.shape(self.heights), self._coefficients.ravel()])
+
+    @cached_property
+    def _coefficients(self) -> Array:
+        from scipy.ndimage import spline_filter
+
+        return np.asarray(spline_filter(np.array(self.heights), order=3, mode="grid-wrap"))
+
+    @cached_property
+    def _samples(self) -> Array:
+        """The six values of the map at points four times as dense."""
+        n, m = np.shape(self.heights)
+        x = self.origin_x + self.spacing_x * np.arange(4 * n) / 4.0
+        y = self.origin_y + self.spacing_y * np.arange(4 * m) / 4.0
+        return self.shape(*np.meshgrid(x, y, indexing="ij"))
+
+    @cached_property
+    def steepest_slope(self) -> float:
+        """Upper bound of the slope, by the differences of the coefficients."""
+        c = self._coefficients
+        along = np.abs(c - np.roll(c, 1, axis=0)).max() / self.spacing_x
+        across = np.abs(c - np.roll(c, 1, axis=1)).max() / self.spacing_y
+        return float(np.hypot(along, across))
+
+    @cached_property
+    def height_range(self) -> tuple[float, float]:
+        """Bounds of the height [m], by the coefficients."""
+        return float(self._coefficients.min()), float(self._coefficients.max())
+
+    @cached_property
+    def shortest_wavelength(self) -> float | None:
+        """Wavelength of the sine with the same range and steepest slope [m]; None when flat.
+
+        At least twice the smaller spacing.
+        """
+        heights = self._samples[..., 0]
+        slope = float(np.hypot(self._samples[..., 1], self._samples[..., 2]).max())
+        if np.ptp(heights) == 0.0 or slope == 0.0:
+            return None
+        return max(math.pi * float(np.ptp(heights)) / slope,
+                   2.0 * min(self.spacing_x, self.spacing_y))
+
+    @property
+    def flat(self) -> bool:
+        """Whether the height is the same everywhere."""
+        return self.shortest_wavelength is None
+
+    def shape(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Height, z_x, z_y, z_xx, z_xy and z_yy (..., 6) at places (...,) of its own frame [m]."""
+        places = np.broadcast_arrays(as_floats(x, "HeightMap: x"), as_floats(y, "HeightMap: y"))
+        out = np.empty((places[0].size, 6))
+        _shape(self.kernel.address, places[0].ravel(), places[1].ravel(), self.parameters(), out)
+        return out.reshape(*places[0].shape, 6)
