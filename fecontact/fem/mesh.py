@@ -279,7 +279,7 @@ class Mesh(Summarised):
         signs = [-1.0 if mirror == axis else 1.0 for axis in axes]
         turn = _turn(float(angles)) if self.dimension == 2 else _turn_in_space(angles)
         nodes, middles = (places * signs @ turn.T + by
-                          for places in (self.nodes, self.curved_middles))
+                          for places in (self.nodes, np.asarray(self.curved_middles)))
         return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles)
 
     def summary(self) -> list[tuple[str, str]]:

@@ -123,7 +123,10 @@ _LINE = {0: 0, 1: 1, _H: 2}
 
 
 def _simplex(dimension: int, count: int, local: Array) -> tuple[Array, Array]:
-    L = np.concatenate([1.0 - local.sum(axis=-1, keepdims=True), local], axis=-1)
+    first = 1.0 - local[..., 0]
+    for axis in range(1, dimension):
+        first = first - local[..., axis]
+    L = np.concatenate([first[..., None], local], axis=-1)
     D = np.vstack([-np.ones(dimension), np.eye(dimension)])
     if count == dimension + 1:
         return L, np.broadcast_to(D, (*L.shape, dimension))
