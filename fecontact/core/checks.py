@@ -4,12 +4,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from fecontact.core.errors import InputError, require_positive, shown
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, Coordinates, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
 _LARGEST = 1e12  # factor of displacements, which are drawn in single precision
@@ -99,16 +99,16 @@ def as_pair(values: Any, what: str) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
-def as_place(values: Any, what: str) -> tuple[float, ...]:
-    """Convert to two or three finite coordinates; InputError otherwise."""
+def as_place(values: Any, what: str) -> Coordinates:
+    """Convert to two finite coordinates, or three of a solid; InputError otherwise."""
     place = as_floats(values, what)
     if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
-        raise InputError(f"{what} = {shown(values)} must be a pair of coordinates x, y [m], or in "
-                         f"space three, x, y, z.")
-    return tuple(place.tolist())
+        raise InputError(f"{what} = {shown(values)} must be coordinates x, y, or x, y, z in a "
+                         f"solid [m].")
+    return cast(Coordinates, tuple(place.tolist()))
 
 
-def as_direction(values: Any, what: str) -> tuple[float, ...]:
+def as_direction(values: Any, what: str) -> Coordinates:
     """A direction (x, y) or (x, y, z) of length one; InputError for one of length zero."""
     direction = np.array(as_place(values, what))
     length = float(np.hypot(*direction) if len(direction) == 2 else np.linalg.norm(direction))
@@ -116,7 +116,7 @@ def as_direction(values: Any, what: str) -> tuple[float, ...]:
         raise InputError(f"{what} = {shown(values)} must be longer than zero.")
     # What has length one stays the same when it is written to a file and read back.
     unit = direction if abs(length - 1.0) <= 1e-12 else direction / length
-    return tuple(unit.tolist())
+    return cast(Coordinates, tuple(unit.tolist()))
 
 
 def as_integers(values: Any, what: str) -> Integers:
