@@ -308,8 +308,8 @@ def doubtful(moved, h, s, bounds, levels, slip_scale, room):
 
     A gap or slip velocity may change sign more often than its end values show, a contact be twice
     as deep in between, or slip begin and end. ``levels`` (k, n) are the penetrations at which
-    normal forces begin; ``moved`` is the motion of the ground. Row DOUBT of ``room.courses`` marks the
-    quantities concerned.
+    normal forces begin; ``moved`` is the motion of the ground. Row DOUBT of ``room.courses`` marks
+    the quantities concerned.
     """
     c = room.courses
     n = levels.shape[1]

@@ -12,6 +12,7 @@ from .friction.stribeck import (
     ProductFriction,
 )
 from .ground.fourier_series import FourierSeries
+from .ground.height_map import HeightMap
 from .ground.measured_profile import MeasuredProfile
 from .ground.motion import GroundMotion, HarmonicSpeed, SpeedRamp
 from .ground.profile import Flat, Profile, Sine
@@ -27,7 +28,7 @@ from .registry import law_names
 from .signals.base import Signal
 from .signals.harmonic import Constant, Harmonic, Harmonics, SweptSine
 from .signals.transient import Pulse, Step, Tabulated
-from .signatures import friction_law, ground_profile, memory_friction_law, normal_law, signal
+from .signatures import friction_law, ground_profile, memory_friction_law, normal_law, planar_friction_law, signal
 from .wear import ArchardWear, EnergyWear, WearLaw
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "Harmonic",
     "HarmonicSpeed",
     "Harmonics",
+    "HeightMap",
     "HyperbolicFriction",
     "IwanFriction",
     "JenkinsFriction",
@@ -96,5 +98,6 @@ __all__ = [
     "law_names",
     "memory_friction_law",
     "normal_law",
+    "planar_friction_law",
     "signal",
 ]

@@ -33,9 +33,9 @@ class Drive:
 
     .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin w_E t
 
-    acts on the body in -x, and likewise in y and, of solids, in z; u_x may be another motion. By default the dashpots
-    act on the absolute velocity of B, as here; relative ones on ``x_B' - u_x'``, as where spring
-    and dashpot share their driven end.
+    acts on the body in -x, and likewise in y and, of solids, in z; u_x may be another motion. By
+    default the dashpots act on the absolute velocity of B, as here; relative ones on ``x_B' -
+    u_x'``, as where spring and dashpot share their driven end.
 
     Parameters
     ----------

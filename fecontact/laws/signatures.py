@@ -24,8 +24,8 @@ space        force, rates)``             both components: R_i, dR_i/dv1, dR_i/dF
 ground       ``f(xi, p)``                y, y', y'': height [m], or factor of the friction force,
                                          at the abscissa xi of the ground's own frame [m] and its
                                          derivatives
-surface      ``f(x, y, p)``              z, z_x, z_y, z_xx, z_xy, z_yy: height of the ground [m] at a
-                                         place of its own frame [m], and its derivatives
+surface      ``f(x, y, p)``              z, z_x, z_y, z_xx, z_xy, z_yy: height of the ground [m] at
+                                         a place of its own frame [m], and its derivatives
 signal       ``f(t, p)``                 value and rate of a function of time: travel of the ground
                                          [m], displacement of the drive [m], load [N]
 ===========  ==========================  =========================================================

@@ -6,84 +6,115 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.compiled import CompiledLaw
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.ground.ground import Ground
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.nodes import SystemArrays
+from fecontact.system.interfaces import PrescribedMotion
 from fecontact.system.loads import load_rows
+from fecontact.system.nodes import SystemArrays
 
 LawGroup = tuple[slice, Array, Any]
 
 
 def system_arrays(
     basis: ModalBasis, normal_groups: Iterable[LawGroup], friction_groups: Iterable[LawGroup],
-    ground: Ground, drive: Drive, load: Load, gap: Array, *, motion: Ground, sliding: Array,
+    ground: Ground, drive: Drive, load: Load, gap: Array, motion: PrescribedMotion,
 ) -> SystemArrays:
     """Matrices, rows, parameters and addresses of the laws of a system.
 
     The groups are contact nodes that share a law: their place, each one's part of their face, and
-    the law; see :meth:`fecontact.ContactSystem.law_groups`. ``motion`` moves the other side of node
-    j, ``sliding[j]`` times.
+    the law; see :meth:`fecontact.ContactSystem.law_groups`.
     """
-    B = basis.T[0]
-    stiffness = np.array(basis.stiffness_matrix)
-    damping = basis.damping.copy()
-    springs = np.array([drive.stiffness_x, drive.stiffness_y], dtype=float)
-    dashpots = np.array([drive.damping_x, drive.damping_y], dtype=float)
-    for axis, c, b in ((0, drive.stiffness_x, drive.damping_x),
-                       (1, drive.stiffness_y, drive.damping_y)):
-        stiffness += c * np.outer(B[axis], B[axis])
-        damping += b * np.outer(B[axis], B[axis])
-    n = basis.contact_nodes
+    d, n, m = basis.dimension, basis.contact_nodes, basis.modes
+    B = basis.T[0, :d]
+    stiffness, damping = np.array(basis.stiffness_matrix), basis.damping.copy()
+    for row, c, b in zip(B, drive.stiffness, drive.damping, strict=False):
+        stiffness += c * np.outer(row, row)
+        damping += b * np.outer(row, row)
     friction_groups = list(friction_groups)
     normal, normal_parameters = _law_table(normal_groups)
     friction, friction_parameters = _law_table(friction_groups)
-    memory = [np.full(nodes.stop - nodes.start, law.memory, dtype=np.int64)
+    memory = [np.full(nodes.stop - nodes.start, (d - 1) * law.memory, dtype=np.int64)
               for nodes, _, law in friction_groups]
     constant_load, load_shapes = load_rows(basis, load)
-    signals = load.signals.values()
-    scale = ground.friction_scale_kernel
+    signals, motions = load.signals.values(), drive.motions[:d]
+    scale, surface = ground.friction_scale_kernel, ground.surface_kernel
+    first, second = motion.motions[0], motion.motions[-1]
+    rows = basis.contact_T
     return SystemArrays(
         stiffness=stiffness,
         damping=damping,
         modal_damping=basis.damping.copy(),
         constant_load=basis.centrifugal_load + constant_load,
-        drive_shapes=np.array(B[:2], dtype=float),
-        drive_stiffness=springs,
-        drive_damping=dashpots if drive.dashpots == "relative" else np.zeros(2),
+        drive_shapes=np.array(B, dtype=float),
+        drive_stiffness=np.array(drive.stiffness[:d], dtype=float),
+        drive_damping=(np.array(drive.damping[:d], dtype=float)
+                       if drive.dashpots == "relative" else np.zeros(d)),
         load_shapes=load_shapes,
-        Tx=basis.contact_T[:, 0].copy(),
-        Ty=basis.contact_T[:, 1].copy(),
+        Tx=rows[:, 0].copy(),
+        Ty=rows[:, d - 1].copy(),
+        T2=rows[:, 1].copy() if d == 3 else np.zeros((0, m)),
         abscissa=basis.contact_x.copy(),
+        ordinate=basis.contact_places[:, 1].copy() if d == 3 else np.zeros(0),
         gap=np.array(np.broadcast_to(gap, n)),
-        sliding=np.array(sliding, dtype=float),
-        bristle_stiffness=_bristles(friction_groups, n),
+        sliding=np.array(motion.factors[0] if d == 2 else motion.factors[0, :, 0]),
+        sliding_across=_sliding_across(motion.factors) if d == 3 else np.zeros((3, 0)),
+        wave_direction=np.array(ground.wave_direction) if d == 3 else np.zeros(0),
+        bristle_stiffness=_bristles(friction_groups, n, d - 1),
         normal_parameters=normal_parameters,
         friction_parameters=friction_parameters,
         profile_parameters=ground.profile_parameters(),
         friction_scale_parameters=ground.friction_scale_parameters(),
-        ground_motion_parameters=motion.motion_parameters(),
-        drive_parameters=_rows([motion.parameters() for motion in drive.motions]),
+        ground_motion_parameters=first.motion_parameters(),
+        second_motion_parameters=(second.motion_parameters() if second is not first
+                                  else np.zeros(1)),
+        drive_parameters=_rows([motion.parameters() for motion in motions]),
         load_parameters=_rows([signal.parameters() for signal in signals]),
         normal=normal,
         friction=friction,
+        planar=_planar(friction_groups) if d == 3 else np.zeros(0, dtype=np.int64),
         memory=np.concatenate(memory),
         on_ground=basis.ground_nodes.astype(np.int64),
-        drive=_addresses(motion.kernel for motion in drive.motions),
+        drive=_addresses(motion.kernel for motion in motions),
         load=_addresses(signal.kernel for signal in signals),
         profile=ground.profile_kernel.address,
+        surface=0 if surface is None else surface.address,
         friction_scale=0 if scale is None else scale.address,
-        ground_motion=motion.motion_kernel.address,
+        ground_motion=first.motion_kernel.address,
+        second_motion=0 if second is first else second.motion_kernel.address,
         leans=int(ground.normal == "surface"),
     )
 
 
-def _bristles(friction_groups: list[LawGroup], n: int) -> Array:
+def _sliding_across(factors: Array) -> Array:
+    """Rows (3, n): first motion across, second motion along and across."""
+    second = factors[1] if len(factors) > 1 else np.zeros_like(factors[0])
+    return np.array([factors[0, :, 1], second[:, 0], second[:, 1]])
+
+
+def _planar(friction_groups: list[LawGroup]) -> Integers:
+    """Addresses (n,) of friction in two directions; InputError for a law that has none."""
+    found = []
+    for nodes, _, law in friction_groups:
+        kernel = along_slip if law.memory == 0 else law.planar_kernel
+        if kernel is None:
+            raise InputError(f"{type(law).__name__} has internal variables, but no planar_kernel, "
+                             f"its function in two directions, and cannot act on solids; give it "
+                             f"one, or use a law without memory.")
+        found.append(np.full(nodes.stop - nodes.start, kernel.address, dtype=np.int64))
+    return np.concatenate(found)
+
+
+def _bristles(friction_groups: list[LawGroup], n: int, components: int) -> Array:
     """Stiffness (2, n, s) of the internal variables, and its derivative to the normal force."""
-    found = np.zeros((2, n, max((law.memory for _, _, law in friction_groups), default=0)))
+    most = max((law.memory for _, _, law in friction_groups), default=0)
+    found = np.zeros((2, n, components * most))
     for nodes, share, law in friction_groups:
-        found[:, nodes, : law.memory] = law.bristle_stiffness_of(share)
+        found[:, nodes, : components * law.memory] = np.repeat(
+            law.bristle_stiffness_of(share), components, axis=2)
     return found
 
 

@@ -29,7 +29,7 @@ def common_period(system: ContactSystem) -> float | None:
     drive, ground = system.drive, system.ground
     given: list[tuple[str, Any]] = [
         (f"drive.motion_{axis}", motion)
-        for axis, acts, motion in zip("xy", drive.moves, drive.motions, strict=True) if acts]
+        for axis, acts, motion in zip("xyz", drive.moves, drive.motions, strict=True) if acts]
     given += [(f"load.{name}", signal) for name, signal in system.load.signals.items()]
     periods = []
     for name, source in given:
@@ -40,16 +40,23 @@ def common_period(system: ContactSystem) -> float | None:
             raise AnalysisError(f"{name} is not periodic; periodic orbits need a drive and loads "
                                 f"that repeat.")
         periods.append(1.0 / source.frequency_hz)
-    if system.prescribed_motion.base.motion is not None:
+    if not system.prescribed_motion.constant:
         raise AnalysisError("A motion of the ground, or of a side that slides, makes its speed "
                             "depend on time; periodic orbits are computed for constant speed.")
     shapes = [("ground.friction_variation", ground.friction_variation)]
-    if ground.wavy:
+    if ground.height_map is not None and ground.wavy and (ground.speed or ground.speed_y):
+        raise AnalysisError("ground.height_map repeats in two directions; periodic orbits need "
+                            "waves along one, such as a Sine, or ground at rest.")
+    if ground.wavy and ground.height_map is None:
         shapes.append(("ground.profile", ground.profile or Sine(ground.amplitude,
                                                                 ground.wavelength)))
     for name, shape in shapes:
-        if shape is not None and not shape.flat and ground.speed != 0.0:
-            periods.append(_repeat_length(name, shape) / abs(ground.speed))
+        speed = ground.speed
+        if system.basis.dimension == 3:
+            speed = (ground.speed * ground.wave_direction[0]
+                     + ground.speed_y * ground.wave_direction[1])
+        if shape is not None and not shape.flat and speed != 0.0:
+            periods.append(_repeat_length(name, shape) / abs(speed))
     return _common(periods)
 
 

@@ -284,7 +284,7 @@ def checked_sliding(
     leaning = basis.normals[basis.ground_nodes] != upright
     if ground.wavy and leaning.any():
         raise InputError(f"ContactSystem: waves of the ground need contact nodes whose normal is "
-                         f"{upright[:-1] + (1,)}, but some on the ground have others; make the "
+                         f"{(*upright[:-1], 1)}, but some on the ground have others; make the "
                          f"ground flat.")
     return MappingProxyType(dict(sliding))
 
@@ -317,8 +317,8 @@ def prescribed_motion(
     if len(varying) + bool(moving) > most:
         others = [source.what for source in (*varying[1:], *moving)]
         raise InputError(f"ContactSystem: {varying[0].what} varies in time while {choices(others)} "
-                         f"moves too; with {'a motion' if most == 1 else 'two motions'} in time all "
-                         f"other speeds must be zero.")
+                         f"moves too; with {'a motion' if most == 1 else 'two motions'} in time "
+                         f"all other speeds must be zero.")
     motions = [Ground(speed=source.speed, motion=source.motion) for source in varying]
     factors = np.zeros((len(varying), *size))
     for by, source in zip(factors, varying, strict=True):

@@ -67,10 +67,25 @@ def _memory_jacobian_across(j, k, s, force, rates, partial, out):
     row = 2 * m + j * states + k
     by_slip = rates[k, 3 + states]
     for i in range(m):
-        tx, ty, across = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
+        across = s.T2[j, i]
         out[row, i] += rates[k, 2] * partial[2, 4] * across
         out[row, m + i] += (by_slip + rates[k, 2] * partial[2, 5]) * across
         out[m + i, row] -= force[7 + states + k] * across
+
+
+@helper
+def _add_across(j, count, s, partial, gradients, active):
+    """Complete the rows of a node by its motion and its force along the second tangent."""
+    m = s.Tx.shape[1]
+    for i in range(m):
+        tx, ty, across = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
+        active[count, 2 * m + i] = across
+        for part in range(2):
+            gradients[2 * part, count, i] -= partial[1, 4 + part] * across
+            gradients[2 * part + 1, count, i] += partial[0, 4 + part] * across
+            gradients[4 + part, count, i] = -(
+                partial[3, 2 * part] * tx + partial[3, 2 * part + 1] * ty
+                + partial[3, 4 + part] * across)
 
 
 @kernel(types.i8(f8, vector, SYSTEM, block, matrix, matrix))
@@ -109,21 +124,6 @@ def contact_gradients(t, y, s, gradients, active, out):
             _add_across(j, count, s, partial, gradients, active)
         count += 1
     return count
-
-
-@helper
-def _add_across(j, count, s, partial, gradients, active):
-    """Complete the rows of a node by its motion and its force along the second tangent."""
-    m = s.Tx.shape[1]
-    for i in range(m):
-        tx, ty, across = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
-        active[count, 2 * m + i] = across
-        for part in range(2):
-            gradients[2 * part, count, i] -= partial[1, 4 + part] * across
-            gradients[2 * part + 1, count, i] += partial[0, 4 + part] * across
-            gradients[4 + part, count, i] = -(
-                partial[3, 2 * part] * tx + partial[3, 2 * part + 1] * ty
-                + partial[3, 4 + part] * across)
 
 
 @kernel(types.void(f8, vector, SYSTEM, matrix))

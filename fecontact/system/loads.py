@@ -5,13 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
-from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.excitation import (
+    AXES,
+    BOUNDARY_STRESSES,
+    PLANE_COMPONENTS,
+    SPACE_COMPONENTS,
+    Drive,
+    Load,
+)
 from fecontact.laws.signals.base import Signal
 from fecontact.reduction.modal_basis import ModalBasis
-
-_COMPONENTS = ("x", "y", "phi")
 
 
 @dataclass(frozen=True)
@@ -45,29 +50,44 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
     """
     if basis.link_load is not None:
         yield ActingLoad("the preload of links", basis.link_load, 1.0, "they hold")
+    d = basis.dimension
+    components = PLANE_COMPONENTS if d == 2 else SPACE_COMPONENTS
     if load.normal:
-        yield ActingLoad(f"normal = {load.normal!r}", basis.T[1, 1], -load.normal,
-                         "'C' moves along y")
+        yield ActingLoad(f"normal = {load.normal!r}", basis.T[1, d - 1], -load.normal,
+                         f"'C' moves along {AXES[d - 1]}")
+    if load.gravity is not None and len(load.gravity) != d:
+        raise InputError(f"Load: gravity = {load.gravity} must have {d} components, as the body "
+                         f"is {'plane' if d == 2 else 'a solid'}.")
     for axis, g in enumerate(load.gravity or ()):
         if g:
             what = f"gravity = {load.gravity}"
             yield ActingLoad(what, _inertia(basis, what)[axis], g,
-                             f"the body moves along {'xy'[axis]}")
+                             f"the body moves along {AXES[axis]}")
     for force in load.forces:
-        turn = "turns" if force.component == "phi" else f"moves along {force.component}"
+        if force.component not in components:
+            raise InputError(f"Load: a force at {force.point!r} has the component "
+                             f"{force.component!r}, but points of this body have "
+                             f"{choices(components)}.")
+        turn = "turns" if force.component.startswith("phi") else f"moves along {force.component}"
         yield ActingLoad(f"a force at {force.point!r} with component {force.component!r}",
-                         _point_rows(basis, force.point)[_COMPONENTS.index(force.component)],
+                         _point_rows(basis, force.point)[components.index(force.component)],
                          force.signal, f"{force.point!r} {turn}")
-    for axis, signal in enumerate((load.base_acceleration_x, load.base_acceleration_y)):
+    for axis, signal in enumerate(load.base_accelerations):
         if signal is not None:
-            what = f"base_acceleration_{'xy'[axis]}"
+            what = f"base_acceleration_{AXES[axis]}"
+            if axis >= d:
+                raise InputError(f"Load: {what} acts on solids only, but the body is plane.")
             yield ActingLoad(what, -_inertia(basis, what)[axis], signal,
-                             f"the body moves along {'xy'[axis]}")
+                             f"the body moves along {AXES[axis]}")
     for one in load.boundaries:
-        for row, name in zip(basis.boundary_row(one.boundary), ("pressure", "shear"), strict=True):
+        rows = basis.boundary_row(one.boundary)
+        for index, name in enumerate(BOUNDARY_STRESSES):
             value = getattr(one, name)
             if isinstance(value, Signal) or value:
-                yield ActingLoad(f"{name} on '{one.boundary}'", row, value,
+                if index >= d:
+                    raise InputError(f"Load: {name} on '{one.boundary}' acts on solids only, but "
+                                     f"the body is plane.")
+                yield ActingLoad(f"{name} on '{one.boundary}'", rows[index], value,
                                  f"'{one.boundary}' moves along with it")
 
 
@@ -85,18 +105,17 @@ def load_rows(basis: ModalBasis, load: Load) -> tuple[Array, Array]:
 def work_of_loads(basis: ModalBasis, load: Load, depth: float) -> float:
     """Magnitude of the work of the constant loads when the body moves by a small depth [J]."""
     constant, _ = load_rows(basis, replace(load, normal=0.0))
-    largest = np.abs(basis.T[:, :2]).max(axis=(0, 1))
+    largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
     moved = np.divide(depth, largest, out=np.zeros(basis.modes), where=largest > 0.0)
     return float(abs(load.normal) * depth + np.abs(constant) @ moved)
 
 
 def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
     """Raise InputError for a drive or load in a direction in which no mode moves its point."""
-    acting = [(f"Drive: {name} = {value!r}", basis.T[0, axis], f"'B' moves along {'xy'[axis]}")
-              for axis, name, value in ((0, "stiffness_x", drive.stiffness_x),
-                                        (0, "damping_x", drive.damping_x),
-                                        (1, "stiffness_y", drive.stiffness_y),
-                                        (1, "damping_y", drive.damping_y)) if value]
+    acting = [(f"Drive: {part}_{name} = {value!r}", basis.T[0, axis], f"'B' moves along {name}")
+              for axis, name in enumerate(AXES[: basis.dimension])
+              for part in ("stiffness", "damping")
+              if (value := getattr(drive, f"{part}_{name}"))]
     acting += [(f"Load: {part.what}", part.row, part.still) for part in acting_loads(basis, load)]
     for what, row, still in acting:
         if not row.any():
@@ -115,8 +134,8 @@ def _inertia(basis: ModalBasis, what: str) -> Array:
     return basis.inertia_rows
 
 
-def _point_rows(basis: ModalBasis, point: str | int | tuple[float, float]) -> Array:
-    """Rows (3, m) of a named point, a contact node or a place."""
+def _point_rows(basis: ModalBasis, point: str | int | tuple[float, ...]) -> Array:
+    """Rows (3, m), in space (6, m), of a named point, a contact node or a place."""
     if not isinstance(point, tuple):
         return np.asarray(basis.T[basis.point_index(point)])
     if basis.mode_shapes is None:

@@ -61,14 +61,15 @@ def _too_far(system: ContactSystem, states: Array) -> str | None:
     # Masses without positions have no size to compare with.
     if size == 0.0:
         return None
-    rows = basis.T[used, :2].reshape(-1, basis.modes).T
+    d = basis.dimension
+    rows = basis.T[used, :d].reshape(-1, basis.modes).T
     farthest = 0.0
     with np.errstate(over="ignore", invalid="ignore"):
         for first in range(0, len(states), _BLOCK):
             moved = states[first : first + _BLOCK, : basis.modes] @ rows
-            moved = moved.reshape(len(moved), -1, 2)
-            moved[..., 0] -= moved[..., 0].mean(axis=1, keepdims=True)
-            farthest = max(farthest, float(np.hypot(moved[..., 0], moved[..., 1]).max()))
+            moved = moved.reshape(len(moved), -1, d)
+            moved[..., : d - 1] -= moved[..., : d - 1].mean(axis=1, keepdims=True)
+            farthest = max(farthest, float(np.sqrt((moved**2).sum(axis=-1)).max()))
     if farthest <= size:
         return None
     return (f"points of the body move by {farthest:.2g} m, more than its own size of {size:.2g} m; "

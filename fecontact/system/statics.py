@@ -8,6 +8,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, require_finite
 from fecontact.core.types import Array
 from fecontact.laws.excitation import Load
+from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
 from fecontact.system import kernels
@@ -15,6 +16,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.friction_memory import settled
 from fecontact.system.jacobian import jacobian
 from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
+from fecontact.system.nodes import SystemArrays
 
 # Largest out-of-balance fraction of the load, regardless of the rounding of other forces.
 _UNBALANCED = 1e-6

@@ -129,10 +129,10 @@ def observe(moved, Y, p, nodes):
             force = normal_at(s.normal[j])(contact.penetration, contact.rate,
                                            s.normal_parameters[j])[0]
         else:
-            grip = pressing_force(j, contact.place, 1.0, s)
+            grip = pressing_force(j, contact, 1.0, s)
             if stick_limit(j, grip, p) == 0.0:
                 grip = 0.0
-        pressing = pressing_force(j, contact.place, force, s)
+        pressing = pressing_force(j, contact, force, s)
         nodes[j, FORCE], nodes[j, PRESSING] = force, pressing
         nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate

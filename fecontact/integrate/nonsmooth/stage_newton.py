@@ -27,8 +27,8 @@ from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
 from fecontact.integrate.nonsmooth.problem import CREEP
 from fecontact.laws.signatures import friction_at
-from fecontact.system.kernels import force_against_x, normal_gradients
-from fecontact.system.nodes import node_contact, node_motion
+from fecontact.system.kernels import normal_gradients
+from fecontact.system.nodes import leaning, node_contact, node_motion
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
@@ -139,7 +139,7 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             R_along = R_v + R_F * (g * partial[2, 0] + partial[2, 2])
             R_away = R_F * (g * partial[2, 1] + partial[2, 3])
         force[j] = R
-        T = force_against_x(F, R, contact, s)
+        T = leaning(F, R, contact.slope, s)
         if s.leans:
             R_along += contact.slope * along + g * F * contact.curvature
             R_away += contact.slope * away

@@ -98,7 +98,7 @@ def project(blocks, y, places, speeds):
 
 @helper
 def moved_by(blocks, column, q):
-    """Motion of a node, along it in column j, away in n + j, across in 2 n + j, by coordinates q."""
+    """Motion of a node by coordinates q: along in column j, away in n + j, across in 2 n + j."""
     j = column % len(blocks.spans)
     total = 0.0
     for span in range(blocks.spans.shape[1]):

@@ -210,7 +210,8 @@ def _planar_bouc_wen(law, v1, v2, F, z, p, force, rates):
         for k in range(2):
             other, b = (v1, a1) if k == 0 else (v2, a2)
             unit = 1.0 if i == k else 0.0
-            rates[i, 1 if k == 0 else 3 + len(rates)] = (unit - share * power * size * a * b) / yielding
+            column = 1 if k == 0 else 3 + len(rates)
+            rates[i, column] = (unit - share * power * size * a * b) / yielding
             rates[i, 3 + k] = -share * power * (
                 other * a + along * ((exponent - 2.0) * a * b + unit)) / yielding
 

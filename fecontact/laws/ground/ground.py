@@ -53,8 +53,8 @@ class Ground:
         y_A, zero or above; zero is flat ground [m].
     wavelength : float
         lambda_w, positive [m].
-    profile : Profile or HeightMap, optional
-        Heights [m] instead of the sine; a map of heights over x and y below solids only.
+    profile : Profile, optional
+        Heights [m] instead of the sine.
     motion : GroundMotion, optional
         Time-dependent speed; by default the constant V.
     friction_variation : Profile, optional
@@ -69,6 +69,8 @@ class Ground:
     wave_direction : (float, float)
         Direction in x and y along which waves and friction vary below solids; of any length above
         zero, stored with length one.
+    height_map : HeightMap, optional
+        Heights over x and y below solids, instead of sine and profile.
     normal : 'surface' or 'vertical'
         Direction of the contact force: normal to the surface as above, or always vertical,
         f_x = 0, as in the source. Waves put energy into the body then, even at rest.
@@ -83,7 +85,7 @@ class Ground:
     speed: Annotated[float, Unit("m/s")] = 0.0
     amplitude: Annotated[float, Unit("m")] = 0.0
     wavelength: Annotated[float, Unit("m")] = 2.5e-3
-    profile: Annotated[Profile | HeightMap | None, Unit("m")] = None
+    profile: Annotated[Profile | None, Unit("m")] = None
     motion: GroundMotion | None = None
     friction_variation: Profile | None = None
     normal: Literal["surface", "vertical"] = "surface"
@@ -92,6 +94,7 @@ class Ground:
     rotation_speed: Annotated[float, Unit("rad/s")] = 0.0
     centre: Annotated[tuple[float, float], Unit("m")] = (0.0, 0.0)
     wave_direction: tuple[float, float] = (1.0, 0.0)
+    height_map: HeightMap | None = None
 
     def __post_init__(self) -> None:
         require_finite("Ground", speed=self.speed, speed_y=self.speed_y,
@@ -102,20 +105,22 @@ class Ground:
         along = as_direction(self.wave_direction, "Ground: wave_direction")
         object.__setattr__(self, "wave_direction",
                            as_pair(along, "Ground: wave_direction"))
-        for name, kind in (("profile", (Profile, HeightMap)), ("motion", GroundMotion),
-                           ("friction_variation", Profile), ("motion_y", GroundMotion)):
+        for name, kind in (("profile", Profile), ("motion", GroundMotion),
+                           ("friction_variation", Profile), ("motion_y", GroundMotion),
+                           ("height_map", HeightMap)):
             given = getattr(self, name)
             if given is not None and not isinstance(given, kind):
-                kinds = kind if isinstance(kind, tuple) else (kind,)
-                raise InputError(f"Ground: {name} = {given!r} must be a "
-                                 f"{' or '.join(one.__name__ for one in kinds)}.")
+                raise InputError(f"Ground: {name} = {given!r} must be a {kind.__name__}.")
         if self.profile is not None and self.amplitude != 0.0:
             raise InputError(f"Ground: amplitude = {self.amplitude!r} cannot be combined with "
                              f"profile; give one of them.")
+        if self.height_map is not None and (self.profile is not None or self.amplitude != 0.0):
+            raise InputError("Ground: height_map cannot be combined with amplitude or profile; "
+                             "give one of them.")
         require_choice("Ground", "normal", self.normal, ("surface", "vertical"))
         if self.rotation_speed and (self.wavy or self.friction_variation is not None):
-            raise InputError(f"Ground: rotation_speed = {self.rotation_speed!r} needs flat and even "
-                             f"ground; leave out the waves and friction_variation, or let an "
+            raise InputError(f"Ground: rotation_speed = {self.rotation_speed!r} needs flat and "
+                             f"even ground; leave out the waves and friction_variation, or let an "
                              f"interface slide.")
         self._require_friction()
 
@@ -135,6 +140,8 @@ class Ground:
 
     @cached_property
     def _shape(self) -> Profile | HeightMap:
+        if self.height_map is not None:
+            return self.height_map
         if self.profile is not None:
             return self.profile
         return Sine(self.amplitude, self.wavelength) if self.amplitude > 0.0 else Flat()
@@ -148,7 +155,7 @@ class Ground:
     def in_space(self) -> bool:
         """Whether it moves or varies in ways that only solids above it feel."""
         return bool(self.speed_y or self.motion_y is not None or self.rotation_speed
-                    or self.wave_direction != (1.0, 0.0) or isinstance(self.profile, HeightMap))
+                    or self.wave_direction != (1.0, 0.0) or self.height_map is not None)
 
     @property
     def steepest_slope(self) -> float:
@@ -183,7 +190,7 @@ class Ground:
         """The profile; InputError for ground whose height depends on x and y."""
         if isinstance(self._shape, HeightMap):
             raise InputError(f"Ground: {what} at abscissae needs a profile, but this ground has a "
-                             f"map of heights over x and y; use profile.shape(x, y).")
+                             f"map of heights over x and y; use height_map.shape(x, y).")
         return self._shape
 
     def travel(self, time: float) -> float:
@@ -213,12 +220,12 @@ class Ground:
     @property
     def profile_kernel(self) -> CompiledLaw:
         """Compiled profile; flat beside a map of heights."""
-        return Flat.kernel if isinstance(self._shape, HeightMap) else self._shape.kernel
+        return Flat.kernel if self.height_map is not None else self._shape.kernel
 
     @property
     def surface_kernel(self) -> CompiledLaw | None:
         """Compiled map of heights; None where the profile tells the height."""
-        return self._shape.kernel if isinstance(self._shape, HeightMap) else None
+        return None if self.height_map is None else self.height_map.kernel
 
     def profile_parameters(self) -> Array:
         """Parameters of the compiled profile."""

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from fecontact.core.checks import as_floats, as_direction, require_kind
+from fecontact.core.checks import as_direction, as_floats, require_kind
 from fecontact.core.errors import (
     InputError,
     require_finite,

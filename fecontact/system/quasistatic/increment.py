@@ -29,8 +29,8 @@ from fecontact.core.compiled import (
 )
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.types import Array, Integers
-from fecontact.system.kernels import force_against_x, normal_gradients
-from fecontact.system.nodes import SYSTEM, GroundMotion, NodeMotion, node_contact
+from fecontact.system.kernels import normal_gradients
+from fecontact.system.nodes import SYSTEM, GroundMotion, NodeMotion, leaning, node_contact
 
 # Out-of-balance force that counts as rounding, relative to the forces that cancel, and the most
 # that is accepted where it falls no further.
@@ -148,7 +148,7 @@ def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
                               borrowed(held_room))
     n, m = s.Tx.shape
     q, node, residual, out = pose.q, pose.node, room.residual, room.partial
-    moved = GroundMotion(travel, 0.0)
+    moved = GroundMotion(travel, 0.0, 0.0, 0.0)
     terms = 0.0
     for i in range(m):
         total, size = load[i], abs(load[i])
@@ -163,11 +163,11 @@ def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
         for i in range(m):
             x += s.Tx[j, i] * q[i]
             height += s.Ty[j, i] * q[i]
-        contact = node_contact(j, NodeMotion(x, height, 0.0, 0.0), moved, s)
+        contact = node_contact(j, NodeMotion(x, height, 0.0, 0.0, 0.0, 0.0), moved, s)
         F, pressing = normal_gradients(j, contact, s, out)
         gone = s.sliding[j] * travel
         R = _rub(j, x - gone, pressing, sliders, pose, room, out)
-        T = force_against_x(F, R, contact, s)
+        T = leaning(F, R, contact.slope, s)
         node[j, FORCE], node[j, PRESSING], node[j, PENETRATION] = F, pressing, contact.penetration
         node[j, PLACE], node[j, AGAINST], node[j, LEANING] = x - gone, T, F * contact.slope
         if s.leans:
