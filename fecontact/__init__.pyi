@@ -24,12 +24,13 @@ from .fem.generate import Beam, Block, Pendulum, generate
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
 from .fem.points import Patch
+from .integrate.contact_quantities import ContactState
 from .integrate.ensemble import ensemble
 from .integrate.events import Event, event
 from .integrate.initial_state import RigidStart
 from .integrate.sensitivity import sensitivity
 from .integrate.simulate import simulate
-from .integrate.trajectory import ContactState, Status, Trajectory
+from .integrate.trajectory import Status, Trajectory
 from .laws.excitation import BoundaryLoad, Drive, Load, PointLoad
 from .laws.ground.ground import Ground
 from .output.files.case import read_case, write_case

@@ -20,7 +20,6 @@ _OF_NODES = {"normal_force": "N", "friction_force": "N", "penetration": "m",
              "pressure": "Pa", "friction_work": "J"}
 _TOTALS = {"total_normal_force": "normal_force", "total_friction_force": "friction_force",
            "total_friction_work": "friction_work"}
-_COMPONENTS = {"x": 0, "y": 1, "phi": 2}
 
 QUANTITIES = (*_OF_POINTS, *_OF_NODES, *_TOTALS)
 
@@ -81,23 +80,28 @@ def history(
         return History(getattr(trajectory, quantity)[:, node], _OF_NODES[quantity],
                        f"{title} of {point_name(point, basis)}")
     motion = getattr(trajectory, quantity)(point)
-    if component not in _COMPONENTS or _COMPONENTS[component] >= motion.shape[1]:
+    components = basis.components[: motion.shape[1]]
+    if component not in components:
         raise InputError(f"component = {component!r} is not one of {point_name(point, basis)}; "
-                         f"choose from {choices(list(_COMPONENTS)[: motion.shape[1]])}.")
+                         f"choose from {choices(components)}.")
     unit = _OF_POINTS[quantity]
-    unit = unit.replace("m", "rad") if component == "phi" else unit
+    unit = unit.replace("m", "rad") if component.startswith("phi") else unit
     if is_relative(point, basis):
         title = f"relative {title}"
-        way = {"x": "along t", "y": "along n"}.get(component, component)
+        ways = {"x": "along t", "y": "along n"} if basis.dimension == 2 else {
+            "x": "along t", "y": "along t2", "z": "along n"}
+        way = ways.get(component, component)
     else:
         way = component
-    return History(motion[:, _COMPONENTS[component]], unit,
+    return History(motion[:, components.index(component)], unit,
                    f"{title} {way} of {point_name(point, basis)}")
 
 
 def usual_component(system: ContactSystem) -> str:
-    """Component in which a system moves most: y where only this is driven, else x."""
+    """Component in which a system moves most: the one that alone is driven, else x."""
     drive = system.drive
+    if drive.stiffness_z > 0.0 and not (drive.stiffness_x or drive.stiffness_y):
+        return "z"
     return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"
 
 

@@ -18,8 +18,6 @@ Place = tuple[str | int, str]
 Kind = Literal["receptance", "mobility", "accelerance"]
 
 _POWERS = {"receptance": 0, "mobility": 1, "accelerance": 2}
-_COMPONENTS = {"x": 0, "y": 1, "phi": 2}
-_UNITS = {"x": "m", "y": "m", "phi": "rad"}
 _RATES = ("", "/s", "/s^2")
 _CHUNK = 2_000_000  # matrix entries processed at a time
 
@@ -67,8 +65,8 @@ class Receptance:
 
     def unit(self, response: int = 0, excitation: int = 0) -> str:
         """Unit of a response, such as m/N."""
-        moved = _UNITS[self.responses[response][1]] + _RATES[_POWERS[self.kind]]
-        push = "N m" if self.excitations[excitation][1] == "phi" else "N"
+        moved = ("rad" if self.responses[response][1].startswith("phi") else "m") + _RATES[_POWERS[self.kind]]
+        push = "N m" if self.excitations[excitation][1].startswith("phi") else "N"
         return f"{moved}/({push})" if " " in push else f"{moved}/{push}"
 
     @property
@@ -205,10 +203,7 @@ def _rows(basis: ModalBasis, places: tuple[Place, ...]) -> Array:
             raise InputError(f"{place!r} must be a pair of a point and a component, like "
                              f"('B', 'x').")
         point, component = place
-        if component not in _COMPONENTS:
-            raise InputError(f"The component {component!r} at {point!r} must be one of "
-                             f"{choices(_COMPONENTS)}.")
-        rows.append(basis.T[basis.point_index(point), _COMPONENTS[component]])
+        rows.append(basis.point_row(point, component))
     if not rows:
         raise InputError("A frequency response needs at least one excitation and one response.")
     return np.array(rows)

@@ -148,7 +148,7 @@ def _warn_of_active_friction(run: Trajectory, rtol: float) -> None:
     j = int(given.argmax())
     if given[j] == 0.0:
         return
-    exchanged = np.trapezoid(np.abs(run.friction_force * run.slip_velocity), run.time, axis=0)
+    exchanged = np.trapezoid(np.abs(run.slip_power), run.time, axis=0)
     if (given[j] > max(_GIVEN, 1e3 * rtol) * exchanged.max()
             and given[j] > rtol * run.energies.stored.max()):
         law = next(law for nodes, _, law in run.system.law_groups("friction")

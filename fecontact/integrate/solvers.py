@@ -208,7 +208,9 @@ class SetValued(Solver):
         """See :meth:`Solver.run`; InputError for a system that it cannot run."""
         from fecontact.integrate.nonsmooth.driver import integrate_set_valued
         from fecontact.integrate.reference.scipy import longest_step
+        from fecontact.system.model_limits import require_plane
 
+        require_plane(task.system, "SetValued")
         found = integrate_set_valued(
             task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
             impact_law=self.impact_law, tangential_restitution=self.tangential_restitution,

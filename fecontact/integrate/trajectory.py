@@ -1,21 +1,18 @@
 """Results of a run: modal histories and quantities derived from them."""
 
 from dataclasses import dataclass, field, replace
-from enum import Enum, IntEnum
+from enum import Enum
 from functools import cached_property
 from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
+from fecontact.integrate.contact_quantities import ContactQuantities
 from fecontact.integrate.events import Events
-from fecontact.laws.wear import WearLaw
-from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import POWERS
 
@@ -38,14 +35,6 @@ class Status(Enum):
     IMPACT_UNSOLVED = "No impulses meet the conditions of an impact with friction."
     IMPACT_GAINED = "An impact gained energy: use equal restitutions, or impact_law = 'poisson'."
     FAILED = "The integrator could not go on; what was computed until then is kept."
-
-
-class ContactState(IntEnum):
-    """State of a contact node."""
-
-    OPEN = 0
-    STICK = 1
-    SLIP = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +156,7 @@ class Solution:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Summarised):
+class Trajectory(ContactQuantities, Summarised):
     """Motion of a contact system at N output times.
 
     Attributes
@@ -268,22 +257,25 @@ class Trajectory(Summarised):
             if (values := getattr(self, name)) is not None}
         return replace(self, **kept, **counted)
 
-    def displacement(self, point: str | int | tuple[float, float]) -> Array:
+    def displacement(self, point: str | int | tuple[float, ...]) -> Array:
         """Displacement x, y [m] and rotation phi [rad] (N, 3) of a point.
+
+        Of solids x, y, z and the rotations about them (N, 6); of contact nodes in their own frame,
+        along the first tangent, the second one in space, and the normal.
 
         Parameters
         ----------
         point : str, int or (x, y)
             'B', 'C' or a further named point; a contact node by its number from 0; or the
-            displacement node of the body nearest to a place (then without phi: (N, 2)).
+            displacement node of the body nearest to a place (then without rotations).
         """
         return self.modal_coordinates @ self._rows(point).T
 
-    def velocity(self, point: str | int | tuple[float, float]) -> Array:
+    def velocity(self, point: str | int | tuple[float, ...]) -> Array:
         """Velocity [m/s] and angular velocity [rad/s] (N, 3) of a point; see displacement."""
         return self.modal_velocities @ self._rows(point).T
 
-    def _rows(self, point: str | int | tuple[float, float]) -> Array:
+    def _rows(self, point: str | int | tuple[float, ...]) -> Array:
         basis = self.system.basis
         if isinstance(point, str | int | np.integer):
             return basis.T[basis.point_index(point if isinstance(point, str) else int(point))]
@@ -297,116 +289,6 @@ class Trajectory(Summarised):
             raise InputError(f"The point {point} lies outside the body, {distance.min():.3g} m "
                              f"away from it.")
         return basis.mode_shapes.shapes[nearest_node]
-
-    @cached_property
-    def _contact(self) -> Array:
-        history = self.system.contact_history(self.time, self.states)
-        for column, held in ((kernels.NORMAL_FORCE, self.held_normal_force),
-                             (kernels.FRICTION_FORCE, self.held_friction_force)):
-            if held is not None:
-                history[:, :, column] = held
-        return history
-
-    @property
-    def normal_force(self) -> Array:
-        """Normal forces F (N, n) on the body, zero or above [N]."""
-        return self._contact[:, :, kernels.NORMAL_FORCE]
-
-    @property
-    def friction_force(self) -> Array:
-        """Friction forces R (N, n); on the body they act in -x [N]."""
-        return self._contact[:, :, kernels.FRICTION_FORCE]
-
-    @property
-    def penetration(self) -> Array:
-        """Penetrations u (N, n), negative where open [m]."""
-        return self._contact[:, :, kernels.PENETRATION]
-
-    @property
-    def penetration_rate(self) -> Array:
-        """Rates u' (N, n) of the penetrations, positive towards the ground [m/s]."""
-        return self._contact[:, :, kernels.PENETRATION_RATE]
-
-    @property
-    def slip_velocity(self) -> Array:
-        """Slip velocities (N, n) of the body relative to the ground [m/s]."""
-        return self._contact[:, :, kernels.SLIP_VELOCITY]
-
-    @property
-    def friction_work(self) -> Array:
-        """Energy (N, n) lost by friction at each node since the first time [J].
-
-        What bristles store and give back is not part of it. From the integrator if stored, else by
-        the trapezoidal rule over the output times.
-        """
-        if self.node_friction_work is not None:
-            return self.node_friction_work
-        storing = self._bristles[1]
-        return self._summed(self.friction_force * self.slip_velocity - storing)
-
-    @property
-    def creep_work(self) -> Array:
-        """Part (N, n) of :attr:`friction_work` that is lost in stick [J].
-
-        Smoothed friction creeps where a rough surface rests; that wears nothing. Zero for friction
-        with memory. From the integrator if stored, else by the trapezoidal rule.
-        """
-        if self.node_creep_work is not None:
-            return self.node_creep_work
-        if self.held_friction_force is not None:
-            return np.zeros_like(self.friction_force)
-        stick = (self.contact_state == ContactState.STICK) & (self.system.arrays.memory == 0)
-        return self._summed(np.where(stick, self.friction_force * self.slip_velocity, 0.0))
-
-    def _summed(self, power: Array) -> Array:
-        """Integral (N, n) of powers (N, n) from the first time by the trapezoidal rule."""
-        steps = 0.5 * np.diff(self.time)[:, None] * (power[1:] + power[:-1])
-        return np.vstack([np.zeros(power.shape[1]), np.cumsum(steps, axis=0)])
-
-    @cached_property
-    def _bristles(self) -> tuple[Array, Array]:
-        """Energy (N, n) that the internal variables store [J], and the power into it [W]."""
-        return self.system.bristle_energy(self.time, self.states)
-
-    @property
-    def slip_work(self) -> Array:
-        """Energy (N, n) lost by friction in slip since the first time [J]; it never falls."""
-        return np.asarray(np.maximum.accumulate(self.friction_work - self.creep_work, axis=0))
-
-    def wear_depth(self, law: WearLaw, thickness: float) -> Array:
-        """Depth (N, n) worn off the body in slip at each node since the first time [m].
-
-        ``law`` is an EnergyWear or ArchardWear, ``thickness`` that of the face out of the plane
-        [m]. Raises InputError for anything else, or a thickness that is not above zero.
-        """
-        require_kind("wear_depth", WearLaw, law=law)
-        require_positive("wear_depth", thickness=thickness)
-        slips = self.contact_state == ContactState.SLIP
-        power = self.friction_force * self.slip_velocity - self._bristles[1]
-        pressed = np.abs(self.normal_force * self.slip_velocity)
-        volume = law.volume(self.slip_work, np.where(slips, power, 0.0),
-                            np.where(slips, pressed, 0.0))
-        return volume / (self.system.basis.tributary * thickness)
-
-    @property
-    def line_load(self) -> Array:
-        """Normal force per length of the contact face (N, n) [N/m]."""
-        return self.normal_force / self.system.basis.tributary
-
-    @property
-    def pressure(self) -> Array:
-        """Normal force per area (N, n) [Pa]; InputError if the basis has no thickness."""
-        return self.normal_force / self.system.basis.contact_areas
-
-    @cached_property
-    def contact_state(self) -> NDArray[np.int8]:
-        """State (N, n) of the contact nodes, values of :class:`ContactState`.
-
-        Open without normal force; sticking below the slip velocity of largest friction.
-        """
-        stick = self.system.sticks(self.slip_velocity, self.normal_force, self.friction_force)
-        state = np.where(stick, ContactState.STICK, ContactState.SLIP)
-        return np.where(self.normal_force != 0.0, state, ContactState.OPEN).astype(np.int8)
 
     @cached_property
     def limits_exceeded(self) -> tuple[str, ...]:
@@ -430,10 +312,9 @@ class Trajectory(Summarised):
         drive, t = system.drive, self.time
         q, rate = self.modal_coordinates, self.modal_velocities
         spring = np.zeros(len(t))
-        for axis, c in ((0, drive.stiffness_x), (1, drive.stiffness_y)):
-            motion = drive.motions[axis]
-            ends = motion.history(t)[:, 0]
-            spring += 0.5 * c * (q @ basis.T[0, axis] - ends) ** 2
+        for row, c, motion in zip(basis.T[0, : basis.dimension], drive.stiffness, drive.motions,
+                                  strict=False):
+            spring += 0.5 * c * (q @ row - motion.history(t)[:, 0]) ** 2
         bristles = self._bristles[0].sum(axis=1)
         put = dict(zip(POWERS, self.work.T, strict=True))
         return Energies(

@@ -28,7 +28,14 @@ from .registry import law_names
 from .signals.base import Signal
 from .signals.harmonic import Constant, Harmonic, Harmonics, SweptSine
 from .signals.transient import Pulse, Step, Tabulated
-from .signatures import friction_law, ground_profile, memory_friction_law, normal_law, planar_friction_law, signal
+from .signatures import (
+    friction_law,
+    ground_profile,
+    memory_friction_law,
+    normal_law,
+    planar_friction_law,
+    signal,
+)
 from .wear import ArchardWear, EnergyWear, WearLaw
 
 __all__ = [

@@ -21,8 +21,6 @@ from fecontact.laws.signals.harmonic import Harmonic, Signal
 
 AXES = ("x", "y", "z")
 BOUNDARY_STRESSES = ("pressure", "shear", "shear_across")
-PLANE_COMPONENTS = ("x", "y", "phi")
-SPACE_COMPONENTS = ("x", "y", "z", "phi_x", "phi_y", "phi_z")
 _BASE = tuple(f"base_acceleration_{axis}" for axis in AXES)
 _COMPONENTS = ("x", "y", "z", "phi", "phi_x", "phi_y", "phi_z")
 

@@ -164,6 +164,20 @@ class ModalBasis(Summarised):
         return 2 if np.shape(self.T)[1] == 3 else 3
 
     @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the rows of a point: x, y, phi; in space x, y, z, phi_x, phi_y, phi_z."""
+        return ("x", "y", "phi") if self.dimension == 2 else (
+            "x", "y", "z", "phi_x", "phi_y", "phi_z")
+
+    def point_row(self, point: str | int, component: str) -> Array:
+        """Row (m,) of a component of the motion of a point; InputError for unknown ones."""
+        index = self.point_index(point)
+        if component not in self.components:
+            raise InputError(f"The component {component!r} at {point!r} must be one of "
+                             f"{choices(self.components)}.")
+        return np.asarray(self.T[index, self.components.index(component)])
+
+    @property
     def modes(self) -> int:
         """Number of modes m."""
         return len(self.angular_frequencies)

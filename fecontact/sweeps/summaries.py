@@ -19,7 +19,8 @@ from fecontact.core.docstrings import summary
 from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.user_code import user_function
-from fecontact.integrate.trajectory import ContactState, Trajectory
+from fecontact.integrate.contact_quantities import ContactState
+from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.system.powers import POWERS
 

@@ -1,5 +1,5 @@
 from .interfaces import PrescribedMotion
-from .kernels import SystemArrays
+from .nodes import SystemArrays
 from .quasistatic.history import LoadHistory, Loop
 from .quasistatic.increment import Sliders
 from .quasistatic.rest_state import RestState

@@ -10,8 +10,6 @@ from fecontact.core.types import Array
 from fecontact.laws.excitation import (
     AXES,
     BOUNDARY_STRESSES,
-    PLANE_COMPONENTS,
-    SPACE_COMPONENTS,
     Drive,
     Load,
 )
@@ -51,7 +49,7 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
     if basis.link_load is not None:
         yield ActingLoad("the preload of links", basis.link_load, 1.0, "they hold")
     d = basis.dimension
-    components = PLANE_COMPONENTS if d == 2 else SPACE_COMPONENTS
+    components = basis.components
     if load.normal:
         yield ActingLoad(f"normal = {load.normal!r}", basis.T[1, d - 1], -load.normal,
                          f"'C' moves along {AXES[d - 1]}")

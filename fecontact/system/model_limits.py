@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fecontact.core.errors import ModelWarning, choices
+from fecontact.core.errors import InputError, ModelWarning, choices
 from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw
 from fecontact.reduction.modal_basis import ModalBasis
@@ -43,6 +43,13 @@ def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple
     """
     found = (_too_far(system, states), _too_deep(system, times, states))
     return tuple(sentence for sentence in found if sentence)
+
+
+def require_plane(system: ContactSystem, what: str) -> None:
+    """Raise :class:`InputError` for solids where only plane bodies are computed."""
+    if system.basis.dimension == 3:
+        raise InputError(f"{what} is for plane bodies, but this system has contact in space; use "
+                         f"the default solver with smoothed friction, or static_equilibrium.")
 
 
 def warn_of_limits(sentences: Iterable[str], what: str) -> None:

@@ -83,7 +83,7 @@ class GroundMotion(NamedTuple):
     second_speed: float
 
 
-GROUND_MOTION = types.NamedTuple([f8] * 4, GroundMotion)
+GROUND_MOTION = types.NamedUniTuple(f8, 4, GroundMotion)
 
 
 class NodeMotion(NamedTuple):

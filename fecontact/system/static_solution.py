@@ -5,17 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError, InputError, require_finite
+from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
 from fecontact.core.types import Array
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import BodyFields, body_elements, stress_of
 from fecontact.fem.points import Place, place_rows
-from fecontact.laws.excitation import Load
+from fecontact.laws.excitation import BOUNDARY_STRESSES, Load
 from fecontact.laws.signals.base import Signal
 from fecontact.reduction.eigenmodes import FreeSystem
-
-_COMPONENTS = ("x", "y", "phi")
 
 # Largest resultant of the loads, relative to their size, that a free direction may have.
 _BALANCED = 1e-9
@@ -61,7 +59,7 @@ def static_solution(
     force = body.expansion.T @ nodal_forces(body, load, points or {}, time)
     _require_balance(body, system, force)
     u = np.asarray(body.expansion @ system.deflection(force))
-    return BodyFields(body.nodes, body_elements(body), u.reshape(-1, 2),
+    return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension),
                       stress_of(body, u[:, None])[:, :, 0])
 
 
@@ -73,7 +71,7 @@ def nodal_forces(
     def value(given: float | Signal) -> float:
         return float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
 
-    def at(point: str | int | tuple[float, float]) -> Array:
+    def at(point: str | int | tuple[float, ...]) -> Array:
         if isinstance(point, int):
             raise InputError(f"static_solution: a force at contact node {point} cannot be placed, "
                              f"as there are no contact nodes; give its name or place.")
@@ -81,18 +79,31 @@ def nodal_forces(
         name = point if isinstance(point, str) else "of a force"
         return np.asarray(place_rows(body, place, name).matrix.toarray())
 
-    total = np.zeros(2 * len(body.nodes))
+    d = body.mesh.dimension
+    total = np.zeros(d * len(body.nodes))
     if load.normal:
-        total -= load.normal * at("C")[1]
+        total -= load.normal * at("C")[d - 1]
+    components = ("x", "y", "phi") if d == 2 else ("x", "y", "z", "phi_x", "phi_y", "phi_z")
     for force in load.forces:
-        total += value(force.signal) * at(force.point)[_COMPONENTS.index(force.component)]
-    carried = [0.0 if signal is None else value(signal)
-               for signal in (load.base_acceleration_x, load.base_acceleration_y)]
-    acceleration = np.array(load.gravity or (0.0, 0.0)) - carried
+        if force.component not in components:
+            raise InputError(f"static_solution: a force at {force.point!r} has the component "
+                             f"{force.component!r}, but points of this body have "
+                             f"{choices(components)}.")
+        total += value(force.signal) * at(force.point)[components.index(force.component)]
+    carried = [0.0 if signal is None else value(signal) for signal in load.base_accelerations]
+    gravity = load.gravity or (0.0,) * d
+    if len(gravity) != d or any(carried[d:]):
+        raise InputError(f"static_solution: gravity and base acceleration must have {d} components "
+                         f"for this body.")
+    acceleration = np.array(gravity) - carried[:d]
     if acceleration.any():
         total += inertia_forces(body) @ acceleration
     for one in load.boundaries:
-        total += boundary_forces(body, one.boundary) @ [value(one.pressure), value(one.shear)]
+        stresses = [value(getattr(one, name)) for name in BOUNDARY_STRESSES]
+        if any(stresses[d:]):
+            raise InputError(f"static_solution: shear_across on '{one.boundary}' acts on solids "
+                             f"only, but the body is plane.")
+        total += boundary_forces(body, one.boundary) @ stresses[:d]
     return total
 
 
@@ -105,8 +116,8 @@ def _require_balance(body: ElasticBody, system: FreeSystem, force: Array) -> Non
     pushed = np.abs(work) > _BALANCED * size
     if not pushed.any():
         return
-    mode = np.asarray(body.expansion @ system.rigid[:, int(np.argmax(pushed))]).reshape(-1, 2)
+    mode = np.asarray(body.expansion @ system.rigid[:, int(np.argmax(pushed))]).reshape(-1, body.mesh.dimension)
     turns = np.ptp(mode, axis=0).max() > 1e-6 * np.abs(mode).max()
-    way = "a rotation" if turns else f"a translation in {'xy'[int(np.argmax(np.abs(mode[0])))]}"
+    way = "a rotation" if turns else f"a translation in {'xyz'[int(np.argmax(np.abs(mode[0])))]}"
     raise AnalysisError(f"There is no static solution: nothing holds the body against {way}, in "
                         f"which the loads push it; support it with fixed, or balance the loads.")

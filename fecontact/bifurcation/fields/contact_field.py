@@ -10,13 +10,11 @@ import numpy as np
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period
 
-_COMPONENTS = ("x", "y", "phi")
 # Relative step of differences in a parameter.
 _STEP = 2e-4
 # Smallest value for that step, relative to the base value.
@@ -24,7 +22,8 @@ _LEAST_VALUE = 1e-3
 # Arrays that prescribe functions of time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
-                      "ground_motion_parameters", "sliding"})
+                      "ground_motion_parameters", "sliding",
+                      "second_motion_parameters", "sliding_across", "wave_direction"})
 
 
 class ContactField(VectorField):
@@ -118,11 +117,9 @@ class ContactField(VectorField):
         InputError
             For a point or a component that does not exist.
         """
-        if component not in _COMPONENTS:
-            raise InputError(f"component = {component!r} must be one of {choices(_COMPONENTS)}.")
         basis = self._family.base.basis
         row = np.zeros(self.dimension)
-        row[: basis.modes] = basis.T[basis.point_index(point), _COMPONENTS.index(component)]
+        row[: basis.modes] = basis.point_row(point, component)
         return row
 
 

@@ -167,7 +167,7 @@ def energy_scale(system: ContactSystem, state: Array) -> float:
     start = 0.5 * (rate @ rate + abs(q @ system.arrays.stiffness @ q))
     springs = 0.5 * sum(
         c * motion.largest**2
-        for c, motion in zip((drive.stiffness_x, drive.stiffness_y), drive.motions, strict=True))
+        for c, motion in zip(drive.stiffness, drive.motions, strict=True))
     pressed = work_of_loads(system.basis, system.load, system.penetration_scale)
     return float(start + springs + pressed) or np.inf
 

@@ -14,7 +14,7 @@ from fecontact.core.units import count, listed
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.interfaces import motion_sources
-from fecontact.system.model_limits import limits_exceeded, warn_of_limits
+from fecontact.system.model_limits import limits_exceeded, require_plane, warn_of_limits
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.increment import (
     PENETRATION,
@@ -79,6 +79,7 @@ def load_history(
         If the path ends early or the body jumps, and as for static equilibria.
     """
     require_kind("load_history", ContactSystem, system=system)
+    require_plane(system, "load_history")
     require_kind("load_history", LoadPath, path=path)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"load_history: rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
@@ -178,7 +179,7 @@ def _given(system: ContactSystem, path: LoadPath) -> Array:
                  else path.at_points(path.forces[k]))
         loads += np.outer(value, arrays.load_shapes[k])
     ends = [scale * _constant(motion) if own is None else path.at_points(own)
-            for own, motion in zip((path.motion_x, path.motion_y), system.drive.motions,
+            for own, motion in zip((path.motion_x, path.motion_y), system.drive.motions[:2],
                                    strict=True)]
     return np.ascontiguousarray(np.column_stack([loads, *ends, path.at_points(path.travel)]))
 
