@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import as_place
 from fecontact.core.errors import InputError, MeshError, choices, nearest, require_positive
@@ -54,7 +55,7 @@ class Patch:
             object.__setattr__(self, "at", as_place(self.at, "Patch: at"))
 
 
-Place = str | Coordinates | Patch
+Place = TypeAliasType("Place", str | Coordinates | Patch)
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,7 +148,6 @@ class Patches:
         inverse = np.linalg.inv(trace * np.eye(3) - spread)
         turning = np.einsum("kab,knbc->knac", inverse[owner], _cross_matrices(moments))
         mean = surface.shape_integrals / self.areas[owner, None]
-        k, n = surface.facets.shape
         data = np.concatenate([mean[..., None, None] * np.eye(3), turning], axis=2)
         row = np.broadcast_to(6 * owner[:, None, None, None] + np.arange(6)[:, None], data.shape)
         column = np.broadcast_to(3 * surface.facets[..., None, None] + np.arange(3), data.shape)
@@ -157,6 +156,23 @@ class Patches:
             shape=(6 * self.count, 3 * len(surface.places))))
         matrix.eliminate_zeros()
         return matrix
+
+
+def linear_facets(facets: Integers) -> Integers:
+    """First-order facets (k, 3) or (k, 4) between all nodes of facets, with their orientation.
+
+    The first part of each comes first, then the second part of each, and so on.
+    """
+    parts = _PARTS[facets.shape[1]]
+    return np.concatenate([facets[:, list(part)] for part in parts])
+
+
+_PARTS = {
+    3: ((0, 1, 2),),
+    4: ((0, 1, 2, 3),),
+    6: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    9: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+}
 
 
 def _cross_matrices(vectors: Array) -> Array:
