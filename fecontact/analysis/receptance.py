@@ -65,7 +65,8 @@ class Receptance:
 
     def unit(self, response: int = 0, excitation: int = 0) -> str:
         """Unit of a response, such as m/N."""
-        moved = ("rad" if self.responses[response][1].startswith("phi") else "m") + _RATES[_POWERS[self.kind]]
+        moved = "rad" if self.responses[response][1].startswith("phi") else "m"
+        moved += _RATES[_POWERS[self.kind]]
         push = "N m" if self.excitations[excitation][1].startswith("phi") else "N"
         return f"{moved}/({push})" if " " in push else f"{moved}/{push}"
 
