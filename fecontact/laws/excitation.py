@@ -16,6 +16,7 @@ from fecontact.core.errors import (
     require_finite,
     require_not_negative,
 )
+from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
 from fecontact.laws.signals.harmonic import Harmonic, Signal
 
@@ -165,7 +166,7 @@ class PointLoad:
         For an unknown component, or an invalid point or signal.
     """
 
-    point: Annotated[str | int | tuple[float, ...], Unit("m")] = "C"
+    point: Annotated[str | int | Coordinates, Unit("m")] = "C"
     component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] = "y"
     signal: Signal = field(kw_only=True)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Coordinates
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import BodyFields, body_elements, stress_of
@@ -71,7 +71,7 @@ def nodal_forces(
     def value(given: float | Signal) -> float:
         return float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
 
-    def at(point: str | int | tuple[float, ...]) -> Array:
+    def at(point: str | int | Coordinates) -> Array:
         if isinstance(point, int):
             raise InputError(f"static_solution: a force at contact node {point} cannot be placed, "
                              f"as there are no contact nodes; give its name or place.")
@@ -116,7 +116,8 @@ def _require_balance(body: ElasticBody, system: FreeSystem, force: Array) -> Non
     pushed = np.abs(work) > _BALANCED * size
     if not pushed.any():
         return
-    mode = np.asarray(body.expansion @ system.rigid[:, int(np.argmax(pushed))]).reshape(-1, body.mesh.dimension)
+    mode = np.asarray(body.expansion @ system.rigid[:, int(np.argmax(pushed))])
+    mode = mode.reshape(-1, body.mesh.dimension)
     turns = np.ptp(mode, axis=0).max() > 1e-6 * np.abs(mode).max()
     way = "a rotation" if turns else f"a translation in {'xyz'[int(np.argmax(np.abs(mode[0])))]}"
     raise AnalysisError(f"There is no static solution: nothing holds the body against {way}, in "
