@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.analysis.histories import Point, history, point_name
 from fecontact.analysis.periodicity import strobed_states
@@ -14,7 +15,7 @@ from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_densit
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
-from fecontact.core.units import count, suitable_unit
+from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels
 from fecontact.output.plots.figure import new_figure
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 
 _COLUMNS = 1000  # most points of a line
+_ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
 _DECADES = 5.0  # range of a logarithmic axis below its highest value
 _AXES = ("x", "y")
 
@@ -255,7 +257,8 @@ def plot_receptance(
     """Plot magnitude and phase of frequency responses; those of unstable states are dashed.
 
     What is linearised about an unstable state is not what a measurement would show: the legend
-    says so.
+    says so. Responses that stay below a billionth of the largest of their unit are round-off: they
+    are left out and named below the figure.
 
     Parameters
     ----------
@@ -283,28 +286,23 @@ def plot_receptance(
                          f"component.")
     with new_figure(9.0, 6.0, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-        number = 0
+        curves, still = _responses(responses, labels)
         many = len(responses) > 1 or responses[0].values[0].size > 1
-        colours = distinct_colours(sum(response.values[0].size for response in responses))
-        for index, response in enumerate(responses):
-            for r, seen in enumerate(response.responses):
-                for e, pushed in enumerate(response.excitations):
-                    colour = colours[number]
-                    number += 1
-                    name = f"{_place(seen)} by {_place(pushed)}"
-                    if index < len(labels):
-                        name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
-                            labels[index])
-                    style = "-" if response.stable else DASHES
-                    if not response.stable:
-                        name += f"\nUNSTABLE, not to be measured:\n{response.growth_in_words}"
-                    f = response.frequency_hz
-                    upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name,
-                                   linestyle=style)
-                    lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0,
-                               linestyle=style)
+        units = list(dict.fromkeys(curve.unit for curve in curves))
+        for curve, colour in zip(curves, distinct_colours(len(curves)), strict=True):
+            style = "-" if curve.of.stable else DASHES
+            name = f"{curve.name} [{curve.unit}]" if len(units) > 1 else curve.name
+            if not curve.of.stable:
+                name += f"\nUNSTABLE, not to be measured:\n{curve.of.growth_in_words}"
+            f = curve.of.frequency_hz
+            upper.semilogy(f, np.abs(curve.values), color=colour, label=name, linestyle=style)
+            lower.plot(f, np.degrees(np.angle(curve.values)), color=colour, linewidth=1.0,
+                       linestyle=style)
+        if still:
+            figure.supxlabel(f"not drawn, as zero but for round-off: {listed(still)}", x=0.99,
+                             ha="right", fontsize=8.0, color="#6a6a6a")
         first = responses[0]
-        upper.set_ylabel(f"{first.kind} [{first.unit()}]")
+        upper.set_ylabel(f"{first.kind} [{units[0]}]" if len(units) == 1 else first.kind)
         if many or not first.stable:
             upper.legend(loc="best")
         else:
@@ -317,6 +315,33 @@ def plot_receptance(
         _whole_width(lower, first)
         figure.align_ylabels([upper, lower])
     return figure
+
+
+class _Response(NamedTuple):
+    name: str
+    unit: str
+    values: NDArray[np.complex128]
+    of: Receptance
+
+
+def _responses(
+    responses: Sequence[Receptance], labels: Sequence[str]
+) -> tuple[list[_Response], list[str]]:
+    """The curves to draw, and the names of those that are round-off."""
+    found, largest = [], dict[str, float]()
+    for index, response in enumerate(responses):
+        for r, seen in enumerate(response.responses):
+            for e, pushed in enumerate(response.excitations):
+                name = f"{_place(seen)} by {_place(pushed)}"
+                if index < len(labels):
+                    name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
+                        labels[index])
+                one = _Response(name, response.unit(r, e), response.values[:, r, e], response)
+                found.append(one)
+                largest[one.unit] = max(largest.get(one.unit, 0.0), float(np.abs(one.values).max()))
+    moves = [np.abs(one.values).max() > _ROUND_OFF * largest[one.unit] for one in found]
+    return ([one for one, moving in zip(found, moves, strict=True) if moving],
+            [one.name for one, moving in zip(found, moves, strict=True) if not moving])
 
 
 def _whole_width(panel: "Axes", response: Receptance) -> None:

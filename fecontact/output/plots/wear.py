@@ -47,7 +47,7 @@ def plot_wear(
     depth_unit, depth_symbol = suitable_unit(float(history.depth.max()), "m")
     load_unit, load_symbol = suitable_unit(float(np.abs(history.line_load).max()), "N/m")
     shown = np.unique(np.linspace(1, blocks, _PROFILES).round().astype(int))
-    title = (f"{type(history.law).__name__}, {history.acceleration:.4g} cycles per computed "
+    title = (f"{type(history.law).__name__}, {_cycles(history.acceleration, 4)} per computed "
              f"period")
     with new_figure(max(9.0, 5.0 * len(faces)), 8.0, path) as figure:
         panels = figure.subplots(3, len(faces), sharey="row", squeeze=False)
@@ -60,7 +60,7 @@ def plot_wear(
             for k in shown:
                 colour = colormaps["viridis"](0.9 * (1.0 - k / blocks))
                 profile.stairs(-depth[k][order] / depth_unit, edges / unit, baseline=None,
-                               color=colour, label=f"{history.cycles[k]:.6g} cycles",
+                               color=colour, label=_cycles(history.cycles[k]),
                                linewidth=1.5)
                 load.stairs(history.line_load[k - 1][face.nodes][order] / load_unit, edges / unit,
                             baseline=None, color=colour, linewidth=1.5)
@@ -83,6 +83,11 @@ def plot_wear(
             panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         figure.align_ylabels(panels[:, 0])
     return figure
+
+
+def _cycles(number: float, digits: int = 6) -> str:
+    """``1 cycle``, ``2500 cycles``."""
+    return f"{number:.{digits}g} cycle" + ("" if number == 1.0 else "s")
 
 
 def _faces(history: WearHistory, basis: ModalBasis | None) -> tuple[ContactFace, ...]:
