@@ -17,11 +17,11 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.face_panels import abscissa_unit, face_panels
+from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import COLOURS, DASHES, add_note, distinct_colours
-from fecontact.reduction.assembly.contact_faces import touching_faces
+from fecontact.reduction.assembly.contact_faces import shown_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -133,7 +133,7 @@ def plot_spectrogram(
         line = history(drawn.trajectory, quantity, point, component).values
         upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
                    linewidth=0.8)
-        upper.set_ylabel(f"[{symbol}]")
+        upper.set_ylabel(f"{quantity.replace('_', ' ')} [{symbol}]")
         upper.set_title(shown.title)
         factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
         top = float(found.values.max()) / factor or 1.0
@@ -209,7 +209,8 @@ def plot_poincare(
 def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
     """Plot friction work per length [J/m] and slip distance [m] along the contact face.
 
-    Of several bodies along each interface, in columns of one scale.
+    Of several bodies along each interface, of one body along each contact group, in columns; those
+    of similar values have one scale.
 
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
     constant coefficient is the friction work over that coefficient.
@@ -227,7 +228,7 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     require_kind("plot_friction_work", Trajectory, trajectory=trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    faces = touching_faces(trajectory.system.basis, "friction work")
+    faces = shown_faces(trajectory.system.basis, "friction work")
     work = trajectory.friction_work[-1] / trajectory.system.basis.tributary
     touching = trajectory.normal_force != 0.0
     speed = np.abs(trajectory.slip_velocity) * touching
@@ -235,17 +236,17 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     with new_figure(max(9.0, 4.5 * len(faces)), 5.6, path) as figure:
         add_note(figure, drawn)
         panels = face_panels(figure, faces, 2)
-        for row, (values, name, base) in enumerate(((work, "friction work per length", "N"),
+        for row, (values, name, base) in enumerate(((work, "friction work per length", "J/m"),
                                                     (slip, "slip in contact", "m"))):
-            factor, label = suitable_unit(float(np.abs(values).max()), base)
-            for face, panel in zip(faces, panels[row], strict=True):
+            sizes = [float(np.abs(values[face.nodes]).max()) for face in faces]
+            factors = scale_row(panels[row], sizes, name, base)
+            for face, panel, factor in zip(faces, panels[row], factors, strict=True):
                 unit = abscissa_unit(face)
                 panel.bar(face.abscissa / unit, values[face.nodes] / factor,
                           width=0.92 * face.tributary / unit, color=COLOURS[0])
-            # Not before all of a row are drawn: its panels share their scale.
-            panels[row, 0].set_ylim(bottom=min(0.0, float(values.min()) / factor))
-            label = label.replace("N", "J/m") if base == "N" else label
-            panels[row, 0].set_ylabel(f"{name} [{label}]")
+            # Not before all of a row are drawn: its panels may share their scale.
+            for panel in panels[row]:
+                panel.set_ylim(bottom=min(0.0, panel.dataLim.y0))
         figure.align_ylabels(panels[:, 0])
     return figure
 
@@ -296,8 +297,9 @@ def plot_receptance(
                 name += f"\nUNSTABLE, not to be measured:\n{curve.of.growth_in_words}"
             f = curve.of.frequency_hz
             upper.semilogy(f, np.abs(curve.values), color=colour, label=name, linestyle=style)
-            lower.plot(f, np.degrees(np.angle(curve.values)), color=colour, linewidth=1.0,
-                       linestyle=style)
+            # From the lower end of the axis on: what follows a force at 180 degrees does not leap.
+            degrees = (np.degrees(np.angle(curve.values)) + 190.0) % 360.0 - 190.0
+            lower.plot(f, degrees, color=colour, linewidth=1.0, linestyle=style)
         if still:
             figure.supxlabel(f"not drawn, as zero but for round-off: {listed(still)}", x=0.99,
                              ha="right", fontsize=8.0, color="#6a6a6a")

@@ -5,6 +5,7 @@ direction, whose rows in ``T`` are those of the motion relative to the other sid
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -23,7 +24,7 @@ class ContactFace:
     Attributes
     ----------
     name : str
-        Name of the interface; empty for all nodes of a single body.
+        Name of the interface, or of a contact group of a single body; empty for all its nodes.
     bodies : tuple of str
         Names of the bodies that meet there, and 'ground'; empty for a single body.
     nodes : slice
@@ -131,6 +132,17 @@ def touching_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
         raise AnalysisError(f"There is no {what}: nonlinear springs join the bodies, which touch "
                             f"at no interface.")
     return found
+
+
+def shown_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
+    """As :func:`touching_faces`, of a single body one for each of several contact groups."""
+    found = touching_faces(basis, what)
+    if several_bodies(basis) or len(basis.groups) < 2:
+        return found
+    ends = np.cumsum([0, *(count for _, count in basis.groups)])
+    parts = [slice(int(first), int(end)) for first, end in pairwise(ends)]
+    return tuple(ContactFace(name, (), nodes, basis.contact_x[nodes], "x", basis.tributary[nodes])
+                 for (name, _), nodes in zip(basis.groups, parts, strict=True))
 
 
 def node_name(basis: ModalBasis, node: int) -> str:
