@@ -85,6 +85,25 @@ def test_colours_of_a_stress_end_below_a_sharp_peak():
     assert figure.axes[0].get_xlabel() == "x [mm]"
 
 
+def test_words_of_a_stress_stay_within_the_figure():
+    """Of a slender body, whose picture is low."""
+    nodes, cells, _ = rectangle(1.0, 0.05, 20, 2)
+    stress = np.zeros((len(nodes), 4))
+    stress[:, 0] = np.linspace(0.0, 1e6, len(nodes)) + 1e7 * (np.arange(len(nodes)) == 3)
+    for component in ("von_mises", "xx"):
+        figure = plot_stress(BodyFields(nodes, cells, 1e-3 * nodes, stress),
+                             component=component)
+        figure.draw_without_rendering()
+        renderer = figure.canvas.get_renderer()
+        boxes = [figure.axes[0].title.get_window_extent(renderer),
+                 figure.axes[0].xaxis.label.get_window_extent(renderer),
+                 figure.axes[1].yaxis.label.get_window_extent(renderer)]
+        width, height = figure.canvas.get_width_height()
+        for box in boxes:
+            assert 0.0 <= box.x0 < box.x1 <= width
+            assert 0.0 <= box.y0 < box.y1 <= height
+
+
 def test_slip_and_friction_have_colours_of_their_own():
     from fecontact.output.render.force_chart import _totals
 

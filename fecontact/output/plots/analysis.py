@@ -65,6 +65,8 @@ def plot_spectrum(
         For a quantity or a point that does not exist, uneven times, another suffix, or a file
         that cannot be written.
     """
+    from matplotlib.patheffects import withStroke
+
     require_kind("plot_spectrum", Trajectory, trajectory=trajectory)
     shown = history(trajectory, quantity, point, component)
     make = power_spectral_density if density else amplitude_spectrum
@@ -87,8 +89,12 @@ def plot_spectrum(
             apart = all(abs(peak.frequency_hz - other) > 0.06 * end for other in named)
             if peak.frequency_hz < end and apart and len(named) < 6:
                 named.append(peak.frequency_hz)
+                # Numbers near an end stand beside their peak, not on the axis.
+                ends = int(peak.frequency_hz < 0.04 * end) - int(peak.frequency_hz > 0.96 * end)
                 panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value / factor),
-                               xytext=(0, 4), textcoords="offset points", ha="center", fontsize=8.5)
+                               xytext=(3 * ends, 4), textcoords="offset points", fontsize=8.5,
+                               path_effects=[withStroke(linewidth=2.0, foreground="white")],
+                               ha={1: "left", 0: "center", -1: "right"}[ends])
         panel.set_xlabel("frequency [Hz]")
         panel.set_ylabel(f"{'density' if density else 'amplitude'} [{symbol}]")
         panel.set_title(shown.title)
@@ -290,16 +296,20 @@ def plot_receptance(
         curves, still = _responses(responses, labels)
         many = len(responses) > 1 or responses[0].values[0].size > 1
         units = list(dict.fromkeys(curve.unit for curve in curves))
-        for curve, colour in zip(curves, distinct_colours(len(curves)), strict=True):
+        for number, (curve, colour) in enumerate(zip(curves, distinct_colours(len(curves)),
+                                                     strict=True)):
             style = "-" if curve.of.stable else DASHES
             name = f"{curve.name} [{curve.unit}]" if len(units) > 1 else curve.name
             if not curve.of.stable:
                 name += f"\nUNSTABLE, not to be measured:\n{curve.of.growth_in_words}"
             f = curve.of.frequency_hz
-            upper.semilogy(f, np.abs(curve.values), color=colour, label=name, linestyle=style)
+            # The first is the widest: others on top do not hide it.
+            width = 3.0 if many and number == 0 else 1.2
+            upper.semilogy(f, np.abs(curve.values), color=colour, label=name, linestyle=style,
+                           linewidth=width)
             # From the lower end of the axis on: what follows a force at 180 degrees does not leap.
             degrees = (np.degrees(np.angle(curve.values)) + 190.0) % 360.0 - 190.0
-            lower.plot(f, degrees, color=colour, linewidth=1.0, linestyle=style)
+            lower.plot(f, degrees, color=colour, linewidth=width, linestyle=style)
         if still:
             figure.supxlabel(f"not drawn, as zero but for round-off: {listed(still)}", x=0.99,
                              ha="right", fontsize=8.0, color="#6a6a6a")

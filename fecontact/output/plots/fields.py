@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 _STRESSES = ("xx", "yy", "zz", "xy")
 _DRAWN_DISPLACEMENT = 0.07  # largest one by default, relative to the body's extent
-_WIDTH, _LARGEST, _LEAST = 9.0, 8.0, 2.0  # inches: width, and limits of the height
+# Inches: width, limits of the height, and what title and labels take of it.
+_WIDTH, _LARGEST, _LEAST, _WORDS = 9.0, 8.5, 2.5, 0.8
 
 
 def plot_stress(
@@ -73,7 +74,7 @@ def plot_stress(
     cells = fields.cells
     if cells.shape[1] == 4:
         cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    drawn_height = float(np.clip(0.75 * _WIDTH * height / width, _LEAST, _LARGEST))
+    drawn_height = float(np.clip(0.75 * _WIDTH * height / width + _WORDS, _LEAST, _LARGEST))
     with new_figure(_WIDTH, drawn_height + 0.35 * cut, path) as figure:
         axis = figure.subplots()
         drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress / factor,

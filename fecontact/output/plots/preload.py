@@ -143,7 +143,8 @@ def plot_loop(
 
 
 def _unit(values: Array, unit: str) -> tuple[float, str]:
-    """Factor and symbol of a suitable unit; those of other units as they are."""
+    """Factor and symbol of a suitable unit; that of numbers without unit is a hyphen."""
     if unit == "N m":
-        return 1.0, unit
+        factor, symbol = suitable_unit(float(np.abs(values).max()), "J")
+        return factor, symbol.replace("J", "N m")
     return suitable_unit(float(np.abs(values).max()), unit) if unit else (1.0, "-")

@@ -4,6 +4,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from cycler import cycler
 
 from fecontact.analysis.resolved import Resolved
 from fecontact.core.types import Array
@@ -35,6 +36,7 @@ _PERCENTILE, _SHARP = 99.0, 0.7
 STYLE: Any = {
     "font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0,
     "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#4d4d4d",
+    "axes.prop_cycle": cycler(color=COLOURS),
     "axes.grid": True, "grid.color": "#e4e2de", "grid.linewidth": 0.7, "axes.axisbelow": True,
     "lines.linewidth": 1.2, "legend.frameon": False, "axes.titleweight": "normal",
     "xtick.color": "#303030", "ytick.color": "#303030", "axes.formatter.useoffset": False,
