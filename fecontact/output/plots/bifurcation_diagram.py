@@ -119,15 +119,15 @@ def plot_branches(
                 if point.kind is not None:
                     known.setdefault(point.kind, []).append((places[index], heights[index]))
         axis.ticklabel_format(axis="y", scilimits=(-3, 5))
-        for which, label, quantity in (("x", x_label, x), ("y", y_label, y)):
-            name_axis(axis, which, label or _label(quantity, branches[0].parameter_name),
-                      np.array(getattr(axis.dataLim, f"interval{which}")))
+        parameter, limits = branches[0].parameter_name, axis.dataLim
+        name_axis(axis, "x", x_label or _label(x, parameter), np.array(limits.intervalx))
+        name_axis(axis, "y", y_label or _label(y, parameter), np.array(limits.intervaly))
         axis.margins(x=0.02, y=0.06)
         axis.autoscale_view()
         special = _mark(axis, known)
         letters = draw_insets(figure, axis, insets, lambda at: (_value(at, x), _value(at, y)))
         _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
-        place_labels(axis, [*letters, *special])
+        place_labels(figure, axis, [*letters, *special])
     return figure
 
 

@@ -133,7 +133,7 @@ def _letter(number: int) -> str:
     return ascii_lowercase[number % 26] + (str(number // 26 + 1) if number > 25 else "")
 
 
-def place_labels(axis: "Axes", labels: Sequence[Label]) -> None:
+def place_labels(figure: "Figure", axis: "Axes", labels: Sequence[Label]) -> None:
     """Write letters beside places of a finished diagram.
 
     They stand within the axes, on no marker and on no other letters, and on curves only if these
@@ -143,8 +143,8 @@ def place_labels(axis: "Axes", labels: Sequence[Label]) -> None:
 
     if not labels:
         return
-    axis.figure.draw_without_rendering()  # the layout decides where the places are
-    points = 72.0 / axis.figure.dpi
+    figure.draw_without_rendering()  # the layout decides where the places are
+    points = 72.0 / figure.dpi
     seen = axis.transData.transform([(x, y) for _, x, y in labels]) * points
     inside = axis.get_window_extent().get_points() * points
     drawn = np.concatenate([_along(axis.transData.transform(line.get_xydata()) * points,
