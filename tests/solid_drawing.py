@@ -16,7 +16,7 @@ from fecontact.output.report.drawing import (
 )
 from fecontact.output.report.page import page
 from fecontact.output.report.payload import Payload
-from fecontact.output.report.run_report import moving_tables
+from fecontact.output.report.run_report import colour_maps, moving_tables
 
 SIZE = np.array([0.1, 0.06, 0.02])
 STIFFNESS, COEFFICIENT = 4e7, 0.4
@@ -128,7 +128,7 @@ def solid_header(drawn, payload, scale=50.0):
     return {"format": 2, "title": "Block in space", "status": "synthetic", "good": True,
             "notes": [], "facts": [], "system": [], "study": [], "versions": [], "units": UNITS,
             "time": payload.add(drawn.time, 1e-9), "charts": [chart], "phases": [],
-            "energies": [], "balance": "",
+            "energies": [], "balance": "", "maps": colour_maps(),
             "contact": contact_table(drawn.contact, payload),
             **moving_tables(drawn.motions, scale, box, drawn.ground, payload)}
 

@@ -17,8 +17,6 @@ from synthetic import run
 from test_report import EVIL, true_fields
 
 from fecontact.io import report, report_frame, report_sweep
-from fecontact.output.report.page import page
-from fecontact.output.report.payload import Payload
 from fecontact.sweeps import SweepTable
 
 

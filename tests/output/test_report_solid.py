@@ -3,6 +3,8 @@
 Needs Chromium and Playwright; see ``browsing.py``.
 """
 
+from time import process_time
+
 import numpy as np
 import pytest
 from browsing import SOFTWARE_WEBGL, Opened, launched, sync_api
@@ -194,3 +196,29 @@ def test_a_walk_along_edges_changes_nothing_but_the_order(drawn):
     assert np.median(steps) <= np.linalg.norm(SIZE / [10, 6, 4])
     label = walked.nodes[walked.labels[0][1]]
     np.testing.assert_array_equal(label, bodies.nodes[bodies.labels[0][1]])
+
+
+def test_a_large_solid_is_small_and_opens_soon(browser, tmp_path):
+    """20,000 surface points, 20 modes, 5000 instants, 400 contact nodes."""
+    drawn = solid((106, 62, 22), times=5000, nodes=(20, 20), end=0.2)
+    assert len(drawn.motions.bodies.nodes) > 20_000
+    began = process_time()
+    path = write_solid(drawn, tmp_path / "large.html")
+    assert process_time() - began < 15.0
+    assert path.stat().st_size < 8e6
+    with Opened(browser, path) as opened:
+        opened.page.wait_for_selector("html[data-whole]", state="attached", timeout=60_000)
+        ready, whole = (float(opened.page.evaluate(f"document.documentElement.dataset.{name}"))
+                        for name in ("ready", "whole"))
+        index = 3021
+        at_instant(opened, drawn, index)
+        places = np.reshape(opened.of_player("Array.from(player.places)"), (-1, 3))
+        nodes, q = drawn.motions.bodies.nodes, drawn.motions.coordinates[index]
+        error = (places - nodes) / SCALE - drawn.motions.bodies.shapes @ q
+        assert np.linalg.norm(error, axis=1).max() < 1e-4 * drawn.motions.largest_displacement
+        cost = opened.of_player("(player.draw(), player.cost)")
+        print(f"first picture after {ready} ms, all data after {whole} ms, a frame takes {cost} ms")
+        # Many times what a quiet computer takes.
+        assert ready < 8000.0
+        assert cost < 200.0
+        assert not opened.complaints

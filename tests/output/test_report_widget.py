@@ -34,8 +34,10 @@ window.model = (time) => {
     calls: () => Object.values(heard).flat().length,
     change(time) { values.time = time; for (const call of heard["change:time"]) call(); } };
 };
-const module = await import(URL.createObjectURL(new Blob([%(esm)s], { type: "text/javascript" })));
-window.open = async (place, model) => module.default.render({ model, el: document.getElementById(place) });
+const source = new Blob([%(esm)s], { type: "text/javascript" });
+const module = await import(URL.createObjectURL(source));
+window.open = async (place, model) => module.default.render(
+  { model, el: document.getElementById(place) });
 document.body.dataset.loaded = 1;
 </script>"""
 

@@ -87,7 +87,8 @@ def report_branches(
     factor, symbol = suitable_unit(largest, "m") if y.startswith("observed") else (1.0, "")
     header: dict[str, Any] = {
         "format": 1, "title": title, "units": UNITS,
-        "status": "; ".join(f"{name}: {branch.status.value}" for name, branch in named.items()),
+        "status": "; ".join(f"{name}: {branch.status.value.removesuffix('.')}"
+                            for name, branch in named.items()) + ".",
         "good": all(branch.status.name != "STALLED" for branch in named.values()),
         "notes": [f"{name}: {branch.message}" for name, branch in named.items() if branch.message],
         "xLabel": parameter_label(next(iter(named.values())).parameter_name),

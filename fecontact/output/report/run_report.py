@@ -121,7 +121,7 @@ def run_block(
         "balance": f"error of the energy balance: {found.energies.imbalance:.1e} of the largest "
                    f"term",
         "units": UNITS,
-        "contact": None, "ground": None,
+        "contact": None, "ground": None, "maps": colour_maps(),
     }
     if system.basis.contact_nodes:
         header["contact"] = contact_table(drawn_contact(found, motion), payload)
@@ -142,7 +142,7 @@ def moving_tables(
         "bodies": bodies_table(motions, payload),
         "coordinates": payload.add(motions.coordinates, motions.coordinate_steps()),
         "ground": None if ground is None else ground_table(ground, payload),
-        "scale": scale, "box": box, "maps": colour_maps(),
+        "scale": scale, "box": box,
     }
 
 

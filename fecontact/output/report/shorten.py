@@ -18,7 +18,7 @@ _NAME = re.compile(r"#?[A-Za-z_$][\w$]*\Z")
 _CLOSED = set("{}()[];,:?=*/<>&|!%.`")
 _SHORTER = tuple((re.compile(pattern), instead) for pattern, instead in (
     (r"\bconst\b", "let"), (r";}", "}"), (r"\((\w+)\)=>", r"\1=>"),
-    (r"(?<![\w.$])0\.(?=\d)", ".")))
+    (r"(?<![\w.$])0\.(?=\d)", "."), (r"\btrue\b", "!0"), (r"\bfalse\b", "!1")))
 _WORDS = frozenset(
     """async await break case catch class const constructor continue default delete do else
     export extends false finally for from function get if import in instanceof let new null
@@ -29,6 +29,9 @@ _GLOBALS = frozenset(
     ImageData Infinity JSON Map Math NaN Number Object Path2D Promise ResizeObserver
     Response Set TextDecoder TextEncoder Uint32Array Uint8Array clearTimeout devicePixelRatio
     document getComputedStyle innerHeight matchMedia parseInt performance
+    requestAnimationFrame setTimeout window""".split())  # noqa: SIM905
+_ALIKE = frozenset(
+    """Float32Array Float64Array Math Path2D Uint32Array Uint8Array document performance
     requestAnimationFrame setTimeout window""".split())  # noqa: SIM905
 
 
@@ -45,7 +48,9 @@ def shortened(text: str) -> str:
             found.append((kind, f"{token}:{names[token]}"))
         else:
             found.append((kind, token))
-    return _joined(found)
+    # Globals that never change and are used often.
+    globals_ = ",".join(f"{names[name]}={name}" for name in sorted(_ALIKE & names.keys()))
+    return (f"let {globals_};" if globals_ else "") + _joined(found)
 
 
 def _tokens(text: str) -> list[tuple[str, str]]:
@@ -116,8 +121,10 @@ def _new_names(tokens: list[tuple[str, str]], roles: list[str]) -> dict[str, str
     for (_, token), role in zip(tokens, roles, strict=True):
         if role in ("plain", "short"):
             saved[token] += len(token) - 2 if role == "plain" else -3
+    for name in _ALIKE & saved.keys():
+        saved[name] -= len(name) + 4
     ours = [name for name, letters in saved.items()
-            if letters > 0 and name not in _WORDS and name not in _GLOBALS]
+            if letters > 0 and name not in _WORDS and name not in _GLOBALS - _ALIKE]
     fresh = (name for length in (1, 2) for name in map("".join, product(ascii_letters,
                                                                         repeat=length))
              if name not in used and name not in _WORDS)
@@ -154,5 +161,8 @@ def _joined(tokens: list[tuple[str, str]]) -> str:
         code = part
         for pattern, instead in _SHORTER if part[:1] not in ("", '"', "`") else ():
             code = pattern.sub(instead, code)
-        parts.append(re.sub(r"\n\s*", "\n", code) if part[:1] == "`" else code)
+        if part.startswith("`#version"):  # a shader, whose first line is one of its own
+            first, _, rest = code.partition("\n")
+            code = first + "\n" + re.sub(r"\s*([{}(),;=+*/<>?:-])\s*", r"\1", rest)
+        parts.append(code)
     return "".join(parts)

@@ -208,7 +208,7 @@ class Player {
 
   #fit() {
     const { box, ground } = this.data, [left, right, low, high] = this.#spread();
-    this.size = min(0.9 * this.#width / (right - left), 0.74 * this.#height / (high - low));
+    this.size = min(0.9 * this.#width / (right - left), min(0.74 * this.#height, this.#height - 84) / (high - low));
     this.#centre = [0, 1, 2].map((i) => i < this.d ? 0.5 * (box[2 * i] + box[2 * i + 1]) : 0);
     if (ground && this.d < 3) this.#centre[1] -= 0.04 * this.#height / this.size;
   }

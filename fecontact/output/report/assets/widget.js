@@ -9,20 +9,19 @@ export default {
     const host = el("div.page");
     shadow.append(host);
     place.tabIndex = 0;
-    const page = await show(host, new Uint8Array(buffer, byteOffset, byteLength), place);
     let clock, waits = 0;
     // The kernel hears of the time a few times in a second, however fast it runs.
     const tell = () => { waits = 0; model.set("time", clock.time); model.save_changes(); };
-    page.link((one) => {
+    const close = await show(host, new Uint8Array(buffer, byteOffset, byteLength), place, (one) => {
       clock = one;
       clock.watchers.push(() => { waits ||= setTimeout(tell, 150); });
     });
-    const hear = () => { if (!waits && clock && clock.time !== model.get("time")) clock.set(model.get("time")); };
+    const hear = () => { if (!waits && clock?.time !== model.get("time")) clock.set(model.get("time")); };
     model.on("change:time", hear);
     return () => {
       model.off("change:time", hear);
       clearTimeout(waits);
-      page.close();
+      close();
     };
   },
 };

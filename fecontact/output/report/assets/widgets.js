@@ -176,18 +176,19 @@ function ready(host, told, refresh, player, timing) {
   };
 }
 
-// Builds a page in a host, which its `root` gives colours and is told what it shows; returns what
-// ends it.
-async function show(host, block, root) {
-  let close, clock, linked;
+// Builds a page in a host, which its `root` gives colours and is told what it shows, and again where
+// the page changes between light and dark; returns what ends it.
+async function show(host, block, root, built) {
+  let close;
   const again = async () => {
     close?.();
     palette = {};
     styled = root;
     host.replaceChildren();
     try {
-      ({ close, clock } = await build(host, await readBlock(block), root.dataset));
-      linked?.(clock);
+      const page = await build(host, await readBlock(block), root.dataset);
+      close = page.close;
+      built?.(page.clock);
     } catch (error) {
       host.append(el("p.missing", {}, typeof DecompressionStream === "undefined"
         ? "This browser is too old for this report; take one of 2023 or later."
@@ -196,6 +197,5 @@ async function show(host, block, root) {
   };
   await again();
   dark.addEventListener("change", again);
-  return { link(one) { linked = one; if (clock) one(clock); },
-    close() { dark.removeEventListener("change", again); close?.(); } };
+  return () => { dark.removeEventListener("change", again); close?.(); };
 }
