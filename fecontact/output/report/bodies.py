@@ -66,8 +66,8 @@ class Motions:
     def _stresses(self) -> Array:
         """Largest von Mises stress (P,) of each node over time."""
         stress = self.bodies.stress
-        used = stress.any(axis=(0, 2))
-        names = [name for name, one in zip(self.bodies.components, used, strict=True) if one]
+        used = np.flatnonzero(stress.any(axis=(0, 2)))
+        names = [self.bodies.components[k] for k in used]
         if not names:
             return np.zeros(len(stress))
         return _reached(stress[:, used], self.coordinates,
@@ -137,7 +137,7 @@ class Motions:
         return found[0], found[1]
 
 
-def _reached(field: Array, q: Array, size: Callable[[Array], Array]) -> _Reached:
+def _reached(field: Array, q: Array, size: Callable[[Any], Array]) -> _Reached:
     """What the sums of a field (P, c, m) over the modes reach at coordinates q (N, m).
 
     ``size`` gives one number of values (c, ...). Times are sought in single precision, in blocks of

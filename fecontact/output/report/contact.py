@@ -1,5 +1,6 @@
 """Contact of a page: places, states and forces of the contact nodes, and the ground."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,15 +30,16 @@ def drawn_contact(run: Trajectory, motion: Motion | None) -> DrawnContact:
     """Contact nodes of a run; with a motion to draw also where they and their feet are."""
     axes = np.stack(contact_directions(run.system.basis), axis=1)
     names = state_names(run)
-    return DrawnContact(
+    found = DrawnContact(
         faces=[{"title": face.title or "contact", "label": face.label,
                 "first": face.nodes.start, "abscissa": face.abscissa.tolist(),
                 "sizes": face.tributary.tolist()} for face in _touching(run)],
         axes=axes, forces=np.einsum("tnk,nik->tni", contact_forces(run), axes),
-        states=np.minimum(run.contact_state, len(names) - 1), names=names,
-        **({} if motion is None else {
-            "places": motion.contact_rows[0], "rows": motion.contact_rows[1],
-            "feet": motion.footed, "sliding": motion.sliding}))
+        states=np.minimum(run.contact_state, len(names) - 1), names=names)
+    if motion is None:
+        return found
+    places, rows = motion.contact_rows
+    return replace(found, places=places, rows=rows, feet=motion.footed, sliding=motion.sliding)
 
 
 def contact_table(contact: DrawnContact, payload: Payload) -> dict[str, Any]:

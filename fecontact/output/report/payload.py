@@ -110,8 +110,8 @@ def as_text(block: bytes) -> str:
     A tenth shorter than in base64; zeros are added at the end.
     """
     bits = np.unpackbits(np.frombuffer(block, np.uint8))
-    bits = np.pad(bits, (0, -len(bits) % 13)).reshape(-1, 13)
-    pairs = np.packbits(np.pad(bits, ((0, 0), (3, 0)))).view(">u2")
+    groups = np.pad(bits, (0, -len(bits) % 13)).reshape(-1, 13)
+    pairs = np.packbits(np.pad(groups, ((0, 0), (3, 0)))).view(">u2")
     codes = np.stack(np.divmod(pairs.astype(np.int64), 91), axis=1).astype(np.uint8) + _FIRST
     codes[codes == ord("<")] = ord("!")
     return codes.tobytes().decode("ascii")
@@ -145,7 +145,7 @@ def stored_array(described: Mapping[str, Any], contents: tuple[bytes, bytes]) ->
     planes = np.frombuffer(content, np.uint8, described["planes"] * rows * columns,
                            described["at"]).reshape(described["planes"], columns, rows)
     zigzag = sum(plane.astype(np.int64) << 8 * k for k, plane in enumerate(planes))
-    whole = (zigzag >> 1) ^ -(zigzag & 1)
+    whole = np.asarray((zigzag >> 1) ^ -(zigzag & 1))
     for _ in range(1 + described.get("order", 0)):
         whole = np.cumsum(whole, axis=1)
     for column, other in enumerate(described.get("near", ())):

@@ -27,8 +27,8 @@ _BEFORE_OBJECTS = ("const", "let", "return", "default")
 _GLOBALS = frozenset(
     """Array Blob CSSStyleSheet DataView DecompressionStream Float32Array Float64Array
     ImageData Infinity JSON Map Math NaN Number Object Path2D Promise ResizeObserver
-    Response Set TextDecoder TextEncoder Uint32Array Uint8Array clearTimeout devicePixelRatio
-    document getComputedStyle innerHeight matchMedia parseInt performance
+    Response Set TextDecoder TextEncoder Uint32Array Uint8Array clearTimeout console
+    devicePixelRatio document getComputedStyle innerHeight matchMedia parseInt performance
     requestAnimationFrame setTimeout window""".split())  # noqa: SIM905
 _ALIKE = frozenset(
     """Float32Array Float64Array Math Path2D Uint32Array Uint8Array document performance
