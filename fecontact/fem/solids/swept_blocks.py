@@ -83,7 +83,7 @@ def swept_mesh(
     across = (at[:, 2] - at[:, 0], at[:, -1] - at[:, 1]) if at.shape[1] == 4 else (
         at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
     owner = names(at, 0.5 * np.cross(*across))
-    named = {name: int(np.argmin(np.linalg.norm(nodes - np.array(place), axis=1)))
+    named = {name: np.linalg.norm(nodes - np.array(place), axis=1).argmin(keepdims=True)
              for name, place in points.items()}
     sets = {name: np.flatnonzero(chosen(nodes)) for name, chosen in (groups or {}).items()}
     return Mesh(nodes, plain.cells, {str(name): faces[owner == name]
