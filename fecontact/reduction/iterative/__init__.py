@@ -1,0 +1,1 @@
+"""Iterative solvers for the vibration modes and deflections of large solids."""
