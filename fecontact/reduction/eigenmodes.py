@@ -145,7 +145,7 @@ def rigid_modes(body: ElasticBody) -> Array:
     M = body.mass
     x, y = body.nodes.T
     held_x, held_y = (body.fixed_dofs[body.fixed_dofs % 2 == axis] // 2 for axis in range(2))
-    centres = np.array([centre for _, centre in body.hinges]).reshape(-1, 2)
+    centres = np.array([centre for _, centre, *_ in body.hinges]).reshape(-1, 2)
     lines_x = np.concatenate([x[held_y], centres[:, 0]])
     lines_y = np.concatenate([y[held_x], centres[:, 1]])
     ones = np.zeros(2 * len(x))
