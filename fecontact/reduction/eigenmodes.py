@@ -13,6 +13,7 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.factorisation import Factors, factorised
+from fecontact.reduction.solid_motions import solid_rigid_modes, solid_strain_energies
 
 # Below this size, and for a large share of all modes, the dense solver is faster.
 _DENSE = 600
@@ -28,8 +29,8 @@ class FreeSystem:
         K, symmetric and positive semi-definite, and M, positive definite.
     rigid : (f, r) array
         Mass-normalised rigid modes: ``K rigid = 0``.
-    component_mass : sparse (f / 2, f / 2) array, optional
-        Mass of one component, if x and y alternate and have equal mass.
+    component_mass : sparse (f / d, f / d) array, optional
+        Mass of one component, if the d components alternate and have equal mass.
     """
 
     stiffness: Any
@@ -84,6 +85,10 @@ class FreeSystem:
         if self.component_mass is None:
             # The product is faster by rows.
             return self.mass.T
+        if 2 * self.component_mass.shape[0] < self.mass.shape[0]:
+            return LinearOperator(
+                self.mass.shape, lambda x: (self.component_mass @ x.reshape(-1, 3)).ravel(),
+                dtype=float)
         # Both components at once, as real and imaginary part.
         both = self.component_mass.astype(complex)
         return LinearOperator(
@@ -116,11 +121,11 @@ def eigenfrequencies_hz(body: ElasticBody, count: int = 20) -> Array:
 
 
 def eigenmodes(body: ElasticBody, count: int) -> tuple[Array, Array]:
-    """The lowest angular frequencies (m,) [rad/s] and mass-normalised shapes (2 N, m).
+    """The lowest angular frequencies (m,) [rad/s] and mass-normalised shapes (d N, m).
 
     Rigid modes follow from the geometry: frequency exactly zero, translation in x, in y, rotation
-    (counter-clockwise). Elastic modes follow in order of frequency; the first of the largest
-    components of each is positive.
+    (counter-clockwise); of solids translations in x, y, z, rotations about these. Elastic modes
+    follow in order of frequency; the first of the largest components of each is positive.
 
     Raises
     ------
@@ -140,8 +145,11 @@ def rigid_modes(body: ElasticBody) -> Array:
     """Mass-normalised rigid modes (2 N, r) that the supports allow, r = 0 ... 3.
 
     Translation in x, in y, and a counter-clockwise rotation about the intersection of the lines of
-    the fixed displacements, or about the centre of mass if that is undetermined.
+    the fixed displacements, or about the centre of mass if that is undetermined. Of a solid
+    (3 N, r), r = 0 ... 6, see :mod:`fecontact.reduction.solid_motions`.
     """
+    if body.dimension == 3:
+        return solid_rigid_modes(body)
     M = body.mass
     x, y = body.nodes.T
     held_x, held_y = (body.fixed_dofs[body.fixed_dofs % 2 == axis] // 2 for axis in range(2))
@@ -188,6 +196,8 @@ def strain_energies(body: ElasticBody, shapes: Array) -> Array:
     The product with K would lose as many digits as the stiffest cells exceed the body as a whole,
     which may be all for a slender body with strongly graded cells.
     """
+    if body.dimension == 3:
+        return solid_strain_energies(body, shapes)
     basis = body.basis
     slopes = np.ascontiguousarray([function[0].grad for function in basis.basis])
     functions, _, elements, points = slopes.shape

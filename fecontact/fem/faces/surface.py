@@ -148,7 +148,6 @@ class Patches:
         inverse = np.linalg.inv(trace * np.eye(3) - spread)
         turning = np.einsum("kab,knbc->knac", inverse[owner], _cross_matrices(moments))
         mean = surface.shape_integrals / self.areas[owner, None]
-        k, n = surface.facets.shape
         data = np.concatenate([mean[..., None, None] * np.eye(3), turning], axis=2)
         row = np.broadcast_to(6 * owner[:, None, None, None] + np.arange(6)[:, None], data.shape)
         column = np.broadcast_to(3 * surface.facets[..., None, None] + np.arange(3), data.shape)
