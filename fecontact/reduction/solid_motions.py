@@ -78,7 +78,8 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
         nodes = members[first : first + _AT_ONCE]
         places = body.nodes[nodes[:, : geometry.shape[1]]]
         jacobian = np.einsum("qkj,eki->eqij", geometry, places)
-        volume = np.linalg.det(jacobian) * weights
+        # Quadratures may have negative weights.
+        volume = np.abs(np.linalg.det(jacobian)) * weights
         gradients = np.einsum("qkj,eqji->eqki", slopes, np.linalg.inv(jacobian))
         # Subtract a node: rigid displacements may be much larger than differences.
         moved = fields[nodes] - fields[nodes[:, :1]]
@@ -91,5 +92,5 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
         density = (direct * (xx * xx + yy * yy + zz * zz)
                    + 2.0 * lateral * (xx * yy + yy * zz + zz * xx)
                    + shear * sum(slide * slide for slide in slides))
-        energies += 0.5 * np.einsum("eq,eqm->m", np.abs(volume), density)
+        energies += 0.5 * np.einsum("eq,eqm->m", volume, density)
     return energies
