@@ -1,1 +1,1 @@
-"""Iterative solvers for the vibration modes and deflections of large solids."""
+"""Solvers for modes and deflections: factors, and multigrid for large solids."""

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.reduction.factorisation import factorised
-from fecontact.reduction.iterative.block_rows import BlockRows, diagonal_product
+from fecontact.reduction.solvers.factorisation import factorised
+from fecontact.reduction.solvers.block_rows import BlockRows, diagonal_product
 
 # Unknowns of linear elements that are factorised, and of the coarsest aggregates.
 _FACTORISED = 12000

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs
-from fecontact.reduction.factorisation import SymmetricFactors
+from fecontact.reduction.solvers.factorisation import SymmetricFactors
 
 
 class Flexibility:
