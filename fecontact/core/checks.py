@@ -4,12 +4,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from fecontact.core.errors import InputError, require_positive, shown
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, Coordinates, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
 _LARGEST = 1e12  # factor of displacements, which are drawn in single precision
@@ -97,6 +97,15 @@ def as_pair(values: Any, what: str) -> tuple[float, float]:
     if place.shape != (2,) or not np.isfinite(place).all():
         raise InputError(f"{what} = {shown(values)} must be a pair of coordinates x, y [m].")
     return float(place[0]), float(place[1])
+
+
+def as_place(values: Any, what: str) -> Coordinates:
+    """Convert to two finite coordinates, or three of a solid; InputError otherwise."""
+    place = as_floats(values, what)
+    if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
+        raise InputError(f"{what} = {shown(values)} must be coordinates x, y, or x, y, z in a "
+                         f"solid [m].")
+    return cast(Coordinates, tuple(place.tolist()))
 
 
 def as_unit_pair(values: Any, what: str) -> tuple[float, float]:

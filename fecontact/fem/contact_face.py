@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -25,7 +25,8 @@ class ContactNodes:
     """Rows (3 n, 2 N), places (n, 2) [m] and tributary lengths (n,) [m] of the contact nodes.
 
     Of a solid rows (6 n, 3 N), places (n, 3), areas (n,) [m^2] and outward normals (n, 3).
-    ``groups`` holds the name of each boundary and its number of nodes.
+    ``groups`` holds the name of each boundary and its number of nodes, ``owner`` the contact node
+    of each facet of a solid's boundaries, one boundary after the other.
     """
 
     matrix: Any
@@ -33,6 +34,7 @@ class ContactNodes:
     tributary: Array
     groups: tuple[tuple[str, int], ...]
     normals: Array | None = None
+    owner: Integers | None = None
 
 
 def contact_groups(
@@ -73,13 +75,18 @@ def contact_groups(
                          f"belong to only one interface.")
     faces = [contact_nodes(body, name, count)
              for name, count in zip(names, each, strict=True)]
-    return ContactNodes(
+    whole = ContactNodes(
         sp.csr_array(sp.vstack([face.matrix for face in faces])),
         np.concatenate([face.positions for face in faces]),
         np.concatenate([face.tributary for face in faces]),
         tuple(group for face in faces for group in face.groups),
-        None if body.dimension == 2 else np.concatenate([face.normals for face in faces]),
     )
+    if body.dimension == 2:
+        return whole
+    first = np.cumsum([0, *(len(face.tributary) for face in faces)])
+    return replace(whole, normals=np.concatenate([face.normals for face in faces]),
+                   owner=np.concatenate([start + face.owner for start, face in zip(
+                       first, faces, strict=False)]))
 
 
 def contact_nodes(
@@ -110,7 +117,7 @@ def contact_nodes(
     if body.dimension == 3:
         patches = contact_patches(face_surface(body, boundary), boundary, count)
         return ContactNodes(patches.rows(), patches.centres, patches.areas,
-                            ((boundary, patches.count),), patches.normals)
+                            ((boundary, patches.count),), patches.normals, patches.owner)
     if count == "all":
         nodes = face_nodes(body, boundary)
         tributary = np.zeros(len(body.nodes))

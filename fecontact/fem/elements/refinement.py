@@ -33,7 +33,7 @@ class _Cells(Protocol):
 
 # Corners of the parts among the second-order nodes of a cell, in the order of its kind. The
 # octahedron inside a tetrahedron is cut along one of its diagonals.
-_PARTS: dict[tuple[int, int], tuple[tuple[int, ...], ...]] = {
+PARTS: dict[tuple[int, int], tuple[tuple[int, ...], ...]] = {
     (2, 3): ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)),
     (2, 4): ((0, 4, 8, 7), (1, 5, 8, 4), (2, 6, 8, 5), (3, 7, 8, 6)),
     (3, 4): ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3),
@@ -78,7 +78,7 @@ def second_order_nodes(mesh: _Cells) -> tuple[Array, Integers, Integers]:
 def refined(mesh: _Cells) -> tuple[Array, Integers, dict[str, Integers], Integers, Array]:
     """Nodes, cells, boundaries, curved edges and their middles of the refined mesh."""
     places, members, faces = second_order_nodes(mesh)
-    parts = _PARTS[mesh.dimension, mesh.kind.corners]
+    parts = PARTS[mesh.dimension, mesh.kind.corners]
     cells = np.concatenate([members[:, list(part)] for part in parts])
     boundaries = {name: _facet_parts(mesh, group, faces)
                   for name, group in mesh.boundaries.items()}
@@ -115,7 +115,7 @@ def _curves(mesh: _Cells, places: Array, members: Integers) -> tuple[Integers, A
     if not len(curved):
         return np.empty((0, 2), np.int64), np.empty((0, mesh.dimension))
     local = np.array(kind.places, float)
-    pairs = np.unique(np.sort([[part[i], part[j]] for part in _PARTS[mesh.dimension, kind.corners]
+    pairs = np.unique(np.sort([[part[i], part[j]] for part in PARTS[mesh.dimension, kind.corners]
                                for i, j in kind.edges], axis=1), axis=0)
     values, _ = shape_functions(mesh.dimension, len(local), local[pairs].mean(axis=1))
     middles = np.einsum("ek,mki->mei", values, places[members[curved]]).reshape(

@@ -158,6 +158,23 @@ class Patches:
         return matrix
 
 
+def linear_facets(facets: Integers) -> Integers:
+    """First-order facets (k, 3) or (k, 4) between all nodes of facets, with their orientation.
+
+    The first part of each comes first, then the second part of each, and so on.
+    """
+    parts = _PARTS[facets.shape[1]]
+    return np.concatenate([facets[:, list(part)] for part in parts])
+
+
+_PARTS = {
+    3: ((0, 1, 2),),
+    4: ((0, 1, 2, 3),),
+    6: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    9: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+}
+
+
 def _cross_matrices(vectors: Array) -> Array:
     """Matrices (..., 3, 3) of the cross product with vectors (..., 3) from the left."""
     x, y, z = np.moveaxis(vectors, -1, 0)
