@@ -12,9 +12,9 @@ from fecontact.core.compiled import block, kernel, matrix, vector
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.reduction.solid_motions import solid_rigid_modes, solid_strain_energies
 from fecontact.reduction.solvers.factorisation import Factors, factorised
 from fecontact.reduction.solvers.solid_solver import Eigensolver, SolidSolver, possible, suited
-from fecontact.reduction.solid_motions import solid_rigid_modes, solid_strain_energies
 
 # Below this size, and for a large share of all modes, the dense solver is faster.
 _DENSE = 600
@@ -131,29 +131,35 @@ class FreeSystem:
         """The part of displacements (f,) or (f, k) that is mass-orthogonal to the rigid modes."""
         return np.asarray(shapes - self.rigid @ (self.inertia.T @ shapes))
 
-    def deflection(self, forces: Array) -> Array:
+    @property
+    def iterates(self) -> bool:
+        """Whether deflections are iterated: there is a solver, and no factors were needed."""
+        return "factors" not in self.__dict__ and self.iterative is not None
+
+    def deflection(self, forces: Array, accuracy: float = 1e-9) -> Array:
         """Elastic static response (f,) or (f, k) to forces.
 
         Forces that are not in equilibrium are balanced by the inertia of the rigid motion that they
-        cause; the response is mass-orthogonal to the rigid modes.
+        cause; the response is mass-orthogonal to the rigid modes. ``accuracy`` is the relative
+        energy norm of the residual where the response is iterated.
         """
         balanced = forces - self.inertia @ (self.rigid.T @ forces)
-        if "factors" not in self.__dict__ and self.iterative is not None:
-            found = self.iterated_deflection(np.reshape(balanced, (len(balanced), -1)))
+        if self.iterates:
+            found = self._iterated_deflection(balanced.reshape(len(balanced), -1), accuracy)
             if found is not None:
                 return found.reshape(balanced.shape)
         deflection = np.zeros_like(balanced)
         deflection[self.held] = self.factors.solve(np.ascontiguousarray(balanced[self.held]))
         return self.without_rigid(deflection)
 
-    def iterated_deflection(self, balanced: Array) -> Array | None:
+    def _iterated_deflection(self, balanced: Array, accuracy: float) -> Array | None:
         """Response (f, k) to balanced forces by conjugate gradients; None if they fail."""
         assert self.body is not None
         assert self.iterative is not None
         E = self.body.expansion
         rigid, inertia = E @ self.rigid, E @ self.inertia
         found, converged = self.iterative.deflections(
-            E @ balanced, lambda x: x - rigid @ (inertia.T @ x))
+            E @ balanced, lambda x: x - rigid @ (inertia.T @ x), accuracy)
         return self.without_rigid(E.T @ found) if converged else None
 
 

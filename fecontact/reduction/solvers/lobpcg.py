@@ -126,9 +126,14 @@ def _best(squares, X, KX, MX, W, KW, MW, P, KP, MP, active):
     values, C = eigh(K, M, subset_by_index=[0, k - 1])
     changes = C[k:, active]
     following = []
-    for place in range(3):
-        x, rest = parts[0][place], np.hstack([parts[1][place], parts[2][place]])
-        following.append((x @ C[:k] + rest @ C[k:], rest @ changes))
+    for x, fresh, last in zip(*parts, strict=True):
+        change = fresh @ changes[:w]
+        best = x @ C[:k]
+        best += fresh @ C[k : k + w]
+        if last.shape[1]:
+            change += last @ changes[w:]
+            best += last @ C[k + w :]
+        following.append((best, change))
     (X, P), (KX, KP), (MX, MP) = following
     return values, X, KX, MX, P, KP, MP
 

@@ -7,17 +7,17 @@ contain. These are solved by factors while they are few, else by smoothed aggreg
 represents the six rigid motions of each aggregate exactly.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.reduction.solvers.factorisation import factorised
 from fecontact.reduction.solvers.block_rows import BlockRows, diagonal_product
+from fecontact.reduction.solvers.factorisation import factorised
 
 # Unknowns of linear elements that are factorised, and of the coarsest aggregates.
-_FACTORISED = 12000
+_FACTORISED = 3000
 _COARSEST = 600
 
 # Products with the matrix of one smoothing, and the part of its spectrum that is damped.
@@ -113,7 +113,7 @@ def multigrid(fine: Any, coarse: Any, interpolation: Any, rigid: Array) -> Multi
 
 
 def _nodal_level(matrix: Any, interpolation: Any) -> Level:
-    """The level of nodes with three displacements each."""
+    """The level of nodes with three displacements each, and nodal interpolation to it."""
     rows = BlockRows.of(matrix, np.float32)
     inverse = np.linalg.inv(_diagonal_blocks(matrix)).astype(np.float32)
     P = interpolation.astype(np.float32)
@@ -125,11 +125,8 @@ def _nodal_level(matrix: Any, interpolation: Any) -> Level:
     def precondition(x: Any) -> Any:
         return diagonal_product(inverse, x.reshape(len(inverse), 3, -1)).reshape(x.shape)
 
-    def transferred(operator: Any) -> Any:
-        return _ByNodes(operator)
-
     return Level(product, precondition, _largest(product, precondition, matrix.shape[0]),
-                 transferred(P), transferred(R))
+                 _ByNodes(P), _ByNodes(R))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,15 +147,15 @@ def _aggregated(matrix: Any, rigid: Array) -> tuple[list[Level], Any]:
     from scipy.linalg import cho_factor, cho_solve
 
     hierarchy = smoothed_aggregation_solver(
-        sp.bsr_matrix(matrix), B=rigid, symmetry="symmetric", strength=("symmetric", {"theta": 0.0}),
+        sp.bsr_matrix(matrix), B=rigid, strength=("symmetric", {"theta": 0.0}),
         improve_candidates=None, max_coarse=_COARSEST, presmoother=None, postsmoother=None)
     levels = []
     for number, level in enumerate(hierarchy.levels[:-1]):
         P = level.P.astype(np.float32)
-        R = P.T.tobsr() if number else P.T.tobsr()
+        R = P.T.tobsr()
         if number == 0:
-            nodal = _nodal_level(sp.bsr_array(level.A), sp.csr_array((1, 1)))
-            levels.append(Level(nodal.product, nodal.precondition, nodal.largest, P, R))
+            levels.append(replace(_nodal_level(sp.bsr_array(level.A), sp.csr_array((1, 1))),
+                                  prolongation=P, restriction=R))
             continue
         A = sp.bsr_array(level.A).astype(np.float32)
         inverse = np.linalg.inv(_diagonal_blocks(level.A)).astype(np.float32)
@@ -188,9 +185,6 @@ def _largest(product: Any, precondition: Any, size: int) -> float:
     value = 1.0
     for _ in range(15):
         x /= np.linalg.norm(x, axis=0)
-        forces = product(x)
-        y = precondition(forces)
-        # Rayleigh quotients in the energy of D, y = D^-1 A x.
-        value = float(np.linalg.norm(y, axis=0).max())
-        x = y
+        x = precondition(product(x))
+        value = float(np.linalg.norm(x, axis=0).max())
     return value

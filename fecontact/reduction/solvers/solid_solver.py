@@ -27,9 +27,8 @@ _FEW = 20_000
 _STRETCHED = 5.0
 _INCOMPRESSIBLE = 0.45
 
-# Largest energy norm of residuals, of modes and of deflections.
+# Largest energy norm of the residuals of modes.
 _MODES = 1e-6
-_DEFLECTIONS = 1e-9
 
 # Vectors that are solved at once.
 WIDTH = 32
@@ -120,8 +119,8 @@ class SolidSolver:
                             self._cycle(self._mass(start)), count, rigid, _MODES, np.abs(noise))
 
     def deflections(
-        self, forces: Array, without_rigid: Callable[[Array], Array],
-        tolerance: float = _DEFLECTIONS, most: int = 100,
+        self, forces: Array, without_rigid: Callable[[Array], Array], tolerance: float,
+        most: int = 100,
     ) -> tuple[Array, bool]:
         """Displacements (3 N, k) under balanced forces (3 N, k), and whether they converged.
 
