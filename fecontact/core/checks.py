@@ -99,12 +99,15 @@ def as_pair(values: Any, what: str) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
-def as_place(values: Any, what: str) -> Coordinates:
-    """Convert to two finite coordinates, or three of a solid; InputError otherwise."""
+def as_place(values: Any, what: str, dimension: int | None = None) -> Coordinates:
+    """Convert to finite coordinates, two or three, or as many as the dimension; InputError."""
+    if dimension == 2:
+        return as_pair(values, what)
     place = as_floats(values, what)
-    if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
-        raise InputError(f"{what} = {shown(values)} must be coordinates x, y, or x, y, z in a "
-                         f"solid [m].")
+    allowed = ((2,), (3,)) if dimension is None else ((3,),)
+    if place.shape not in allowed or not np.isfinite(place).all():
+        either = "x, y (in a solid x, y, z)" if dimension is None else "x, y, z"
+        raise InputError(f"{what} = {shown(values)} must be coordinates {either} [m].")
     return cast(Coordinates, tuple(place.tolist()))
 
 

@@ -22,7 +22,7 @@ from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.fem.assembly import assembled
 from fecontact.fem.elements.cell_kinds import numbered_rows
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.supports import Hinge, check_supports, expansion, fixed_dofs, hinges
+from fecontact.fem.supports import HingeSupport, check_supports, expansion, fixed_dofs, hinges
 
 # Memory per unknown for modes [bytes], by dimension and number of corners.
 _BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 8): 1.2e4}
@@ -291,7 +291,7 @@ class ElasticBody(Summarised):
         return expansion(self.nodes, self.fixed_dofs, self.hinges)
 
     @cached_property
-    def hinges(self) -> list[Hinge]:
+    def hinges(self) -> list[HingeSupport]:
         """Nodes, centre and axis of each boundary that rotates rigidly."""
         return hinges(self.mesh, self.nodes, self.fixed, self._supported)
 

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.checks import as_place
-from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity, span
 from fecontact.fem.elastic_body import ElasticBody
@@ -77,11 +76,9 @@ class BodyFields(Summarised):
 
         InputError for a place outside the body.
         """
-        where = as_place(place, "at: place")
-        if len(where) != self.nodes.shape[1]:
-            raise InputError(f"at: place = {shown(place)} must have {self.nodes.shape[1]} "
-                             f"coordinates [m].")
-        which, weights = interpolation(self.nodes, self.elements, where, "at: place")
+        which, weights = interpolation(
+            self.nodes, self.elements, as_place(place, "at: place", self.nodes.shape[1]),
+            "at: place")
         return weights[0] @ self.displacement[which], weights[0] @ self.stress[which]
 
 

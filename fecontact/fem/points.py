@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import as_place
-from fecontact.core.errors import InputError, MeshError, choices, nearest, require_positive, shown
+from fecontact.core.errors import InputError, MeshError, choices, nearest, require_positive
 from fecontact.core.types import Array, Coordinates, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
@@ -54,7 +55,7 @@ class Patch:
             object.__setattr__(self, "at", as_place(self.at, "Patch: at"))
 
 
-Place = str | Coordinates | Patch
+Place = TypeAliasType("Place", str | Coordinates | Patch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,11 +313,7 @@ def _centre(body: ElasticBody, at: str | Coordinates, name: str) -> Array:
                             f"{nearest(at, body.mesh.points)}; its points are: "
                             f"{choices(body.mesh.points)}.")
         return np.asarray(body.mesh.nodes[body.mesh.points[at]].mean(axis=0))
-    place = np.array(as_place(at, f"Point {name}"))
-    if len(place) != body.dimension:
-        wanted = "a pair of coordinates x, y" if body.dimension == 2 else "coordinates x, y, z"
-        raise InputError(f"Point {name} = {shown(at)} must be {wanted} [m].")
-    return place
+    return np.array(as_place(at, f"Point {name}", body.dimension))
 
 
 def _node_set_rows(body: ElasticBody, nodes: Integers) -> Rows:

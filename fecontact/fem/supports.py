@@ -14,7 +14,7 @@ KINDS = {2: ("x", "y", "xy", "hinge"),
 _ROUND = 1e-3  # normals of a round face along its axis, mean square
 
 
-class Hinge(NamedTuple):
+class HingeSupport(NamedTuple):
     """Nodes (k,) that rotate rigidly about an axis through a centre (d,) [m].
 
     The axis (3,) is a unit vector, in the plane that out of it; motion along it is held too.
@@ -57,18 +57,18 @@ def fixed_dofs(
 
 def hinges(
     mesh: Mesh, nodes: Array, fixed: Mapping[str, str], supported: Mapping[str, Integers]
-) -> list[Hinge]:
+) -> list[HingeSupport]:
     """Each boundary that rotates rigidly about an axis through its centre.
 
     ``nodes`` (N, d) are the places of the displacement nodes [m].
     """
-    return [Hinge(supported[name], _centre(mesh, nodes[supported[name]], name),
+    return [HingeSupport(supported[name], _centre(mesh, nodes[supported[name]], name),
                   _axis(mesh, nodes[supported[name]], name, kind))
             for name, kind in fixed.items()
             if kind.startswith("hinge") and len(supported[name]) > 1]
 
 
-def expansion(nodes: Array, fixed_dofs: Integers, turning: list[Hinge]) -> Any:
+def expansion(nodes: Array, fixed_dofs: Integers, turning: list[HingeSupport]) -> Any:
     """All degrees of freedom from the free ones, sparse (d N, f).
 
     The free ones are the displacements without a support, then one angle per hinge.

@@ -78,7 +78,7 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
         nodes = members[first : first + _AT_ONCE]
         places = body.nodes[nodes[:, : geometry.shape[1]]]
         jacobian = np.einsum("qkj,eki->eqij", geometry, places)
-        # Quadratures may have negative weights.
+        # scikit-fem may mirror cells; rules of tetrahedra have negative weights.
         volume = np.abs(np.linalg.det(jacobian)) * weights
         gradients = np.einsum("qkj,eqji->eqki", slopes, np.linalg.inv(jacobian))
         # Subtract a node: rigid displacements may be much larger than differences.

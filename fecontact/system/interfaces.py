@@ -131,7 +131,7 @@ def system_fields(
         friction[name] = ConstantFriction(0.0) if one.friction is None else one.friction
         with located(f"Interface '{name}':"):
             gaps.append(np.asarray(one.pairing.gaps, dtype=float)
-                        + np.asarray(gap_values(one.gap, basis.contact_x[nodes])))
+                        + np.asarray(gap_values(one.gap, basis.contact_places[nodes])))
     return {
         "basis": basis,
         "normal": {**{name: one.normal for name, one in given.items()},

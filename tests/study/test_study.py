@@ -371,8 +371,8 @@ def test_mesh_files_that_are_no_plane_meshes(tmp_path):
     (tmp_path / "text.msh").write_text("hello")
     (tmp_path / "solid.msh").write_text(
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
-        "$EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n")
-    for name, message in (("text.msh", "no complete section"), ("solid.msh", "solid|3-D|three"),
+        "$EndNodes\n$Elements\n1\n1 2 2 1 1 1 2 4\n$EndElements\n")
+    for name, message in (("text.msh", "no complete section"), ("solid.msh", "surfaces only"),
                           ("none.msh", "there is no such file")):
         study = Study.from_toml(f'[geometry]\nfile = "{name}"', tmp_path / "s.toml")
         with pytest.raises((MeshError, InputError), match=message):

@@ -7,8 +7,8 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import CellKind, shape_functions
 
 _FLAT = 1e-12  # volume of a degenerate cell, relative to the cube of its size
-# Gauss points from 0 to 1; with three, curved sides of second order are integrated exactly.
-_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+# Gauss points from 0 to 1, exact for determinants of second-order cells: degree 5 a direction.
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _GAUSS, _WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
 
 

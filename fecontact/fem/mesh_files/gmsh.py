@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.mesh_files.raw import NODES, RawMesh
+from fecontact.fem.mesh_files.raw import NODES, PLANE, RawMesh
 
 _KINDS = {15: "vertex", 1: "line", 8: "line3", 2: "triangle", 9: "triangle6",
-          3: "quad", 16: "quad8", 10: "quad9"}
-_SOLIDS = {4: 4, 5: 8, 6: 6, 7: 5, 11: 10, 12: 27, 13: 18, 14: 14, 17: 20, 18: 15, 19: 13}
+          3: "quad", 16: "quad8", 10: "quad9", 4: "tetra", 11: "tetra10", 5: "hexahedron",
+          17: "hexahedron20", 12: "hexahedron27"}
+# Solid elements that are not read, with their numbers of nodes.
+_SOLIDS = {6: 6, 7: 5, 13: 18, 14: 14, 18: 15, 19: 13}
 
 # Elements of one kind with their physical groups (2.2: one or none, 4.1: those of the entity).
 _Block = tuple[str, Integers, list[int]]
@@ -189,8 +191,10 @@ def _raw_mesh(
             raise MeshError("The elements name nodes that the file does not hold.")
         if kind not in ("vertex", "line", "line3"):
             cells.append((kind, index))
+            dimension = 2 if kind in PLANE else 3
             for number in physical:
-                bodies.setdefault(names.get((2, number), str(number)), []).append((kind, index))
+                bodies.setdefault(names.get((dimension, number), str(number)), []).append(
+                    (kind, index))
             continue
         dimension = 0 if kind == "vertex" else 1
         for number in physical:

@@ -1,4 +1,4 @@
-"""MED files (Salome, Code_Aster): one plane mesh and its groups of nodes and elements.
+"""MED files (Salome, Code_Aster): one mesh and its groups of nodes and elements.
 
 Unlike meshio this reads files in which a family has no group, or a kind of element no families.
 """
@@ -14,7 +14,8 @@ from fecontact.core.types import Integers
 from fecontact.fem.mesh_files.raw import RawMesh
 
 _KINDS = {"PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
-          "QU4": "quad", "QU8": "quad8", "QU9": "quad9"}
+          "QU4": "quad", "QU8": "quad8", "QU9": "quad9", "TE4": "tetra", "T10": "tetra10",
+          "HE8": "hexahedron", "H20": "hexahedron20", "H27": "hexahedron27"}
 
 
 def read_med(path: Path) -> RawMesh:

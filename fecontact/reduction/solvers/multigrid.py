@@ -34,7 +34,7 @@ class Level:
     product, precondition : callables
         A x and D^-1 x of vectors (n, k).
     largest : float
-        Upper bound of the eigenvalues of D^-1 A.
+        The largest eigenvalue of D^-1 A, as found from below.
     prolongation, restriction : sparse
         From the next level and to it.
     """
@@ -47,7 +47,7 @@ class Level:
 
     def smoothed(self, x: Any, right: Any) -> Any:
         """Chebyshev iteration for A x = right; ``x`` is None for zero."""
-        upper, lower = 1.05 * self.largest, _DAMPED * self.largest
+        upper, lower = 1.1 * self.largest, _DAMPED * self.largest
         centre, radius = 0.5 * (upper + lower), 0.5 * (upper - lower)
         residual = right.copy() if x is None else right - self.product(x)
         ratio = radius / centre
