@@ -60,6 +60,34 @@ def _diagonal_product(first, last, blocks, x, y):
                 y[i, p, c] = a * x[i, 0, c] + b * x[i, 1, c] + d * x[i, 2, c]
 
 
+def _smoothing(first, last, indptr, indices, blocks, inverse, step, factors, residual, x,
+               following):
+    """One Chebyshev step of A x = b over its block diagonal D, without temporary vectors.
+
+    ``residual -= A step``, ``following = factors[0] step + factors[1] D^-1 residual`` and
+    ``x += following``; ``inverse`` (N, 3, 3) are the blocks of D^-1.
+    """
+    width = x.shape[2]
+    for i in range(first, last):
+        for s in range(indptr[i], indptr[i + 1]):
+            j = indices[s]
+            a00, a01, a02 = blocks[s, 0, 0], blocks[s, 0, 1], blocks[s, 0, 2]
+            a10, a11, a12 = blocks[s, 1, 0], blocks[s, 1, 1], blocks[s, 1, 2]
+            a20, a21, a22 = blocks[s, 2, 0], blocks[s, 2, 1], blocks[s, 2, 2]
+            for c in range(width):
+                u, v, w = step[j, 0, c], step[j, 1, c], step[j, 2, c]
+                residual[i, 0, c] -= a00 * u + a01 * v + a02 * w
+                residual[i, 1, c] -= a10 * u + a11 * v + a12 * w
+                residual[i, 2, c] -= a20 * u + a21 * v + a22 * w
+        for p in range(3):
+            d0, d1, d2 = inverse[i, p, 0], inverse[i, p, 1], inverse[i, p, 2]
+            for c in range(width):
+                change = factors[0] * step[i, p, c] + factors[1] * (
+                    d0 * residual[i, 0, c] + d1 * residual[i, 1, c] + d2 * residual[i, 2, c])
+                following[i, p, c] = change
+                x[i, p, c] += change
+
+
 def _compiled(function: Any, *arrays: tuple[int, bool]) -> dict[Any, Any]:
     """One kernel for single and one for double precision; arrays are (dimensions, whole)."""
     found = {}
@@ -74,6 +102,8 @@ _products = _compiled(_product, (1, False), (1, False), (3, True), (3, True), (3
 _scalar_products = _compiled(_scalar_product, (1, False), (1, False), (1, True), (3, True),
                              (3, True))
 _diagonal_products = _compiled(_diagonal_product, (3, True), (3, True), (3, True))
+_smoothings = _compiled(_smoothing, (1, False), (1, False), (3, True), (3, True), (3, True),
+                        (1, True), (3, True), (3, True), (3, True))
 
 # Rows that one thread does at a time, and fewer than which are not worth threads.
 _ROWS = 4096
@@ -110,6 +140,19 @@ class BlockRows:
         _in_parts(kernels[self.blocks.dtype], len(self.indptr) - 1, self.indptr, self.indices,
                   self.blocks, x, y)
         return y
+
+    def smooth(
+        self, inverse: Any, step: Any, own: float, new: float, residual: Any, x: Any
+    ) -> Any:
+        """One Chebyshev step: residual -= A step, x += following, which is returned.
+
+        following = own step + new D^-1 residual, D^-1 by blocks (N, 3, 3).
+        """
+        following = np.empty_like(x)
+        factors = np.array([own, new], dtype=x.dtype)
+        _in_parts(_smoothings[self.blocks.dtype], len(self.indptr) - 1, self.indptr, self.indices,
+                  self.blocks, inverse, step, factors, residual, x, following)
+        return following
 
 
 def diagonal_product(blocks: Any, x: Any) -> Any:

@@ -12,6 +12,7 @@ and cells; the relative error of the frequency is about eta^2 / 2.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, solve_triangular
@@ -78,16 +79,17 @@ def lowest_modes(
     MX = mass(X)
     X, MX = _normalised(X, MX)
     KX = stiffness(X)
+    width = X.shape[1]
     squares, turn = eigh(X.T @ KX)
-    X, KX, MX = X @ turn, KX @ turn, MX @ turn
-    P = KP = MP = X[:, :0]
-    errors = np.full(X.shape[1], np.inf)
+    # Modes X and changes P side by side, orthonormal in mass, their images, and K between them.
+    S, KS, MS = X @ turn, KX @ turn, MX @ turn
+    energies = np.diag(squares)
+    errors = np.full(width, np.inf)
     step = 0
     for step in range(most + 1):
-        residual = KX - MX * squares
+        residual = KS[:, :width] - MS[:, :width] * squares
         W = precondition(residual)
-        energies = np.einsum("ij,ij->j", residual, W)
-        errors = np.sqrt(np.abs(energies) / squares)
+        errors = np.sqrt(np.abs(np.einsum("ij,ij->j", residual, W)) / squares)
         limit = np.maximum(tolerance, np.sqrt(floor / squares))
         # Guard vectors need no accuracy of their own, but help the last modes.
         active = errors > limit
@@ -96,46 +98,41 @@ def lowest_modes(
         W = np.ascontiguousarray(W[:, active])
         for _ in range(2):
             W = elastic(W)
-            W -= X @ (MX.T @ W)
+            W -= S @ (MS.T @ W)
         MW = mass(W)
         W, MW = _normalised(W, MW)
         KW = stiffness(W)
-        if P.shape[1]:
-            cross = MW.T @ P
-            P, KP, MP = P - W @ cross, KP - KW @ cross, MP - MW @ cross
-            P, MP, KP = _normalised(P, MP, KP)
-        squares, X, KX, MX, P, KP, MP = _best(squares, X, KX, MX, W, KW, MW, P, KP, MP, active)
+        squares, C, energies = _best(energies, S.T @ KW, W.T @ KW, width, active)
+        S, KS, MS = (one @ C[: one.shape[1]] + new @ C[one.shape[1] :]
+                     for one, new in ((S, W), (KS, KW), (MS, MW)))
     converged = bool((errors[:count] <= limit[:count]).all())
-    return Found(squares[:count], X[:, :count], errors[:count], converged, step)
+    return Found(squares[:count], S[:, :count], errors[:count], converged, step)
 
 
-def _best(squares, X, KX, MX, W, KW, MW, P, KP, MP, active):
-    """The lowest modes in the span of X, W and P, and the changes that lead to them."""
-    k, w = X.shape[1], W.shape[1]
-    size = k + w + P.shape[1]
-    K, M = np.empty((size, size)), np.eye(size)
-    parts = ((X, KX, MX), (W, KW, MW), (P, KP, MP))
-    starts = (0, k, k + w, size)
-    for i in range(3):
-        for j in range(i, 3):
-            rows, columns = slice(starts[i], starts[i + 1]), slice(starts[j], starts[j + 1])
-            K[rows, columns] = np.diag(squares) if i == j == 0 else parts[i][0].T @ parts[j][1]
-            if i != j:
-                M[rows, columns] = parts[i][0].T @ parts[j][2]
-    K, M = np.triu(K) + np.triu(K, 1).T, np.triu(M) + np.triu(M, 1).T
-    values, C = eigh(K, M, subset_by_index=[0, k - 1])
-    changes = C[k:, active]
-    following = []
-    for x, fresh, last in zip(*parts, strict=True):
-        change = fresh @ changes[:w]
-        best = x @ C[:k]
-        best += fresh @ C[k : k + w]
-        if last.shape[1]:
-            change += last @ changes[w:]
-            best += last @ C[k + w :]
-        following.append((best, change))
-    (X, P), (KX, KP), (MX, MP) = following
-    return values, X, KX, MX, P, KP, MP
+def _best(
+    known: Array, cross: Array, fresh: Array, width: int, active: Any
+) -> tuple[Array, Array, Array]:
+    """The lowest modes in an orthonormal span, and the changes that lead to them.
+
+    ``known`` (s, s), ``cross`` (s, w) and ``fresh`` (w, w) are the stiffness in the span of the
+    present modes and changes and of the new vectors. Returns squared frequencies (k,),
+    coefficients (s + w, k + p) of the next modes and changes, and the stiffness between them. The
+    changes, the parts of the active modes outside of the present ones, are made orthonormal to the
+    modes here, at no cost.
+    """
+    K = np.block([[known, cross], [cross.T, fresh]])
+    values, vectors = eigh(0.5 * (K + K.T))
+    C = vectors[:, :width]
+    changes = C[:, active].copy()
+    changes[:width] = 0.0
+    for _ in range(2):
+        changes -= C @ (C.T @ changes)
+    directions, sizes, _ = np.linalg.svd(changes, full_matrices=False)
+    changes = directions[:, sizes > 1e-10 * sizes[0]]
+    changes -= C @ (C.T @ changes)
+    changes = np.linalg.qr(changes)[0]
+    C = np.hstack([C, changes])
+    return values[:width], C, C.T @ K @ C
 
 
 def _normalised(X: Array, MX: Array, *others: Array) -> tuple[Array, ...]:

@@ -33,6 +33,8 @@ class Level:
     ----------
     product, precondition : callables
         A x and D^-1 x of vectors (n, k).
+    smooth : callable
+        (step, own, new, residual, x) -> following, see :meth:`BlockRows.smooth`.
     largest : float
         The largest eigenvalue of D^-1 A, as found from below.
     prolongation, restriction : sparse
@@ -41,27 +43,27 @@ class Level:
 
     product: Any
     precondition: Any
+    smooth: Any
     largest: float
     prolongation: Any
     restriction: Any
 
-    def smoothed(self, x: Any, right: Any) -> Any:
-        """Chebyshev iteration for A x = right; ``x`` is None for zero."""
+    def improve(self, x: Any, residual: Any) -> Any:
+        """Chebyshev iteration for A x = b in place of x and of b - A x.
+
+        The residual lacks the last step, which is returned.
+        """
         upper, lower = 1.1 * self.largest, _DAMPED * self.largest
         centre, radius = 0.5 * (upper + lower), 0.5 * (upper - lower)
-        residual = right.copy() if x is None else right - self.product(x)
         ratio = radius / centre
         step = self.precondition(residual)
         step *= np.float32(1.0 / centre)
-        x = step.copy() if x is None else x + step
+        x += step
         for _ in range(_STEPS - 1):
-            residual -= self.product(step)
             following = 1.0 / (2.0 * centre / radius - ratio)
-            step *= np.float32(following * ratio)
-            step += np.float32(2.0 * following / radius) * self.precondition(residual)
+            step = self.smooth(step, following * ratio, 2.0 * following / radius, residual, x)
             ratio = following
-            x += step
-        return x
+        return step
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,18 +76,24 @@ class Multigrid:
     def cycle(self, right: Array) -> Array:
         """One V-cycle for right-hand sides (n, k): a symmetric positive definite operator."""
         # Single precision has a smaller range than the forces on small and large bodies.
-        scale = np.abs(right).max(axis=0)
+        scale = np.maximum(right.max(axis=0), -right.min(axis=0))
         scale[scale == 0.0] = 1.0
-        return np.asarray(self._cycle(0, (right / scale).astype(np.float32)) * scale)
+        scaled = np.divide(right, scale, dtype=np.float32, casting="unsafe", order="C")
+        return np.asarray(self._cycle(0, scaled) * scale)
 
-    def _cycle(self, number: int, right: Any) -> Any:
+    def _cycle(self, number: int, residual: Any) -> Any:
+        """Solution of A x = residual, which is overwritten."""
         if number == len(self.levels):
-            return self.coarsest(right)
+            return self.coarsest(residual)
         level = self.levels[number]
-        x = level.smoothed(None, right)
-        residual = right - level.product(x)
-        x += level.prolongation @ self._cycle(number + 1, level.restriction @ residual)
-        return level.smoothed(x, right)
+        x = np.zeros_like(residual)
+        last = level.improve(x, residual)
+        residual -= level.product(last)
+        change = level.prolongation @ self._cycle(number + 1, level.restriction @ residual)
+        x += change
+        residual -= level.product(change)
+        level.improve(x, residual)
+        return x
 
 
 def multigrid(fine: Any, coarse: Any, interpolation: Any, rigid: Array) -> Multigrid:
@@ -125,8 +133,13 @@ def _nodal_level(matrix: Any, interpolation: Any) -> Level:
     def precondition(x: Any) -> Any:
         return diagonal_product(inverse, x.reshape(len(inverse), 3, -1)).reshape(x.shape)
 
-    return Level(product, precondition, _largest(product, precondition, matrix.shape[0]),
-                 _ByNodes(P), _ByNodes(R))
+    def smooth(step: Any, own: float, new: float, residual: Any, x: Any) -> Any:
+        shape = (len(inverse), 3, -1)
+        return rows.smooth(inverse, step.reshape(shape), own, new, residual.reshape(shape),
+                           x.reshape(shape)).reshape(x.shape)
+
+    return Level(product, precondition, smooth,
+                 _largest(product, precondition, matrix.shape[0]), _ByNodes(P), _ByNodes(R))
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +179,16 @@ def _aggregated(matrix: Any, rigid: Array) -> tuple[list[Level], Any]:
         def precondition(x: Any, inverse: Any = inverse) -> Any:
             return (inverse @ x.reshape(len(inverse), inverse.shape[1], -1)).reshape(x.shape)
 
-        levels.append(Level(product, precondition,
+        def smooth(
+            step: Any, own: float, new: float, residual: Any, x: Any, A: Any = A,
+            precondition: Any = precondition,
+        ) -> Any:
+            residual -= A @ step
+            following = np.float32(own) * step + np.float32(new) * precondition(residual)
+            x += following
+            return following
+
+        levels.append(Level(product, precondition, smooth,
                             _largest(product, precondition, A.shape[0]), P, R))
     last = hierarchy.levels[-1].A.toarray()
     factors = cho_factor(last)
