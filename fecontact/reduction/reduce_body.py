@@ -63,12 +63,10 @@ def modal_basis(
     modes : int
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground, facing -y, of solids -z; each of several is an interface.
-        Or none, ().
+        Boundary that touches the ground, facing -y, of solids -z; several interfaces; or none, ().
     contact_nodes : int or 'all', or one of them for each boundary
-        Number of equal segments of the boundary, each with a contact node at its centre that moves
-        with the segment's mean displacement; 'all' takes every displacement node. Of solids
-        patches of facets of about equal area, or every facet.
+        Number of equal segments of the boundary, each a contact node with the mean displacement;
+        'all' takes every displacement node. Of solids patches of about equal area, or every facet.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, coordinates, or a
         :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.
