@@ -173,7 +173,7 @@ def _kind(code: int) -> tuple[str, int]:
     if code in _SOLIDS:
         return "solid", _SOLIDS[code]
     raise MeshError(f"The mesh holds elements of Gmsh's type {code}, which are not read; mesh with "
-                    f"first-order triangles or quadrilaterals.")
+                    f"triangles, quadrilaterals, tetrahedra or hexahedra.")
 
 
 def _raw_mesh(
