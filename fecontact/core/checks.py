@@ -4,12 +4,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from fecontact.core.errors import InputError, require_positive, shown
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, Coordinates, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
 _LARGEST = 1e12  # factor of displacements, which are drawn in single precision
@@ -99,6 +99,18 @@ def as_pair(values: Any, what: str) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
+def as_place(values: Any, what: str, dimension: int | None = None) -> Coordinates:
+    """Convert to finite coordinates, two or three, or as many as the dimension; InputError."""
+    if dimension == 2:
+        return as_pair(values, what)
+    place = as_floats(values, what)
+    allowed = ((2,), (3,)) if dimension is None else ((3,),)
+    if place.shape not in allowed or not np.isfinite(place).all():
+        either = "x, y (in a solid x, y, z)" if dimension is None else "x, y, z"
+        raise InputError(f"{what} = {shown(values)} must be coordinates {either} [m].")
+    return cast(Coordinates, tuple(place.tolist()))
+
+
 def as_unit_pair(values: Any, what: str) -> tuple[float, float]:
     """A direction (x, y) of length one; InputError for one of length zero."""
     direction = np.array(as_pair(values, what))
@@ -108,6 +120,18 @@ def as_unit_pair(values: Any, what: str) -> tuple[float, float]:
     # What has length one stays the same when it is written to a file and read back.
     x, y = direction if abs(length - 1.0) <= 1e-12 else direction / length
     return float(x), float(y)
+
+
+def as_direction(values: Any, what: str) -> Coordinates:
+    """A direction (x, y) or (x, y, z) of length one; InputError for one of length zero."""
+    if np.ndim(values) != 1 or len(values) != 3:
+        return as_unit_pair(values, what)
+    direction = np.array(as_place(values, what, 3))
+    length = float(np.linalg.norm(direction))
+    if not 0.0 < length < np.inf:
+        raise InputError(f"{what} = {shown(values)} must be longer than zero.")
+    x, y, z = (direction if abs(length - 1.0) <= 1e-12 else direction / length).tolist()
+    return x, y, z
 
 
 def as_integers(values: Any, what: str) -> Integers:

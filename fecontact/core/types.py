@@ -9,5 +9,8 @@ Array = TypeAliasType("Array", NDArray[np.float64])
 Integers = TypeAliasType("Integers", NDArray[np.int64])
 ComplexArray = TypeAliasType("ComplexArray", NDArray[np.complex128])
 
+# A place in the plane, or in space [m].
+Coordinates = tuple[float, float] | tuple[float, float, float]
+
 # What NumPy makes an array of.
 ArrayLike = TypeAliasType("ArrayLike", npt.ArrayLike)

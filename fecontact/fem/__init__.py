@@ -1,4 +1,4 @@
-"""Faces of elastic bodies that may touch: contact nodes, their partners, gaps."""
+"""Elastic bodies: shapes of solids, fields, faces that may touch, their partners and gaps."""
 
 from fecontact.core.namespace import namespace
 

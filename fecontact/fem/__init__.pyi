@@ -1,13 +1,24 @@
+from .elements.cell_kinds import CellKind
 from .fields import BodyFields
 from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
 from .rotation import Rotation
+from .solids.shapes import Cylinder, LapStrip, Plate, Ring, SolidBlock, SphereSegment
+from .supports import HingeSupport
 
 __all__ = [
     "BodyFields",
+    "CellKind",
+    "Cylinder",
+    "HingeSupport",
+    "LapStrip",
     "Pairing",
     "PairingReport",
+    "Plate",
+    "Ring",
     "Rotation",
+    "SolidBlock",
+    "SphereSegment",
     "TwoPassPairing",
     "finer_face",
     "pair_both_faces",

@@ -4,37 +4,63 @@ import numpy as np
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.faces.frames import tangents_of
+from fecontact.fem.faces.surface import Surface
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.points import edge_weights
+from fecontact.fem.points import edge_weights, sampled_edges
 
 
 def inertia_forces(body: ElasticBody) -> Array:
-    """Nodal forces (2 N, 2) of unit accelerations in x and y, ``M 1`` [kg]."""
-    translations = np.eye(2)[np.arange(2 * len(body.nodes)) % 2]
+    """Nodal forces (d N, d) of unit accelerations in x, y (, z), ``M 1`` [kg]."""
+    d = body.dimension
+    translations = np.eye(d)[np.arange(d * len(body.nodes)) % d]
     return np.asarray(body.mass @ translations)
 
 
 def boundary_forces(body: ElasticBody, boundary: str) -> Array:
-    """Nodal forces (2 N, 2) of unit pressure and of unit shear on a boundary [m^2].
+    """Nodal forces of unit pressure and of unit shear on a boundary [m^2].
 
-    Pressure acts along the inward normal. Shear acts along the boundary with the body on the left,
-    so that it points to +x where the body lies above.
+    Pressure acts along the inward normal n. In the plane (2 N, 2) shear acts along the boundary
+    with the body on the left, so that it points to +x where the body lies above. On a solid
+    (3 N, 3) there are two shears: along t, the projection of global x on the tangent plane (of y
+    where n is within 10 degrees of x), and along t2 = n x t.
 
     Raises
     ------
     MeshError
         If the mesh has no such boundary.
     """
+    if body.dimension == 3:
+        return _face_forces(body, body.mesh.boundary(boundary))
     edges = along_outline(body.mesh, body.mesh.boundary(boundary))
     nodes = body.edge_nodes(edges)
+    forces = np.zeros((len(body.nodes), 2, 2))
+    if body.curved:
+        values, tangents, lengths = sampled_edges(body.nodes[nodes])
+        normals = np.stack([-tangents[..., 1], tangents[..., 0]], axis=-1)
+        for load, direction in enumerate((normals, tangents)):
+            each = np.einsum("kg,gn,kgx->knx", body.thickness * lengths, values, direction)
+            np.add.at(forces[:, :, load], nodes, each)
+        return forces.reshape(-1, 2)
     tangent = np.diff(body.mesh.nodes[edges], axis=1)[:, 0]
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     weights = body.thickness * edge_weights(body, nodes)
-    forces = np.zeros((len(body.nodes), 2, 2))
     for load, direction in enumerate((normal, tangent)):
         np.add.at(forces[:, :, load], nodes, weights[:, :, None] * direction[:, None, :])
     return forces.reshape(-1, 2)
+
+
+def _face_forces(body: ElasticBody, facets: Integers) -> Array:
+    surface = Surface(body.nodes, body.facet_nodes(facets))
+    values, _, outward, weights = surface.sampled
+    normals = -outward
+    tangents = tangents_of(normals.reshape(-1, 3)).reshape(*normals.shape[:2], 2, 3)
+    forces = np.zeros((len(body.nodes), 3, 3))
+    for load, direction in enumerate((normals, tangents[:, :, 0], tangents[:, :, 1])):
+        np.add.at(forces[:, :, load], surface.facets,
+                  np.einsum("kg,gn,kgx->knx", weights, values, direction))
+    return forces.reshape(-1, 3)
 
 
 def along_outline(mesh: Mesh, edges: Integers) -> Integers:

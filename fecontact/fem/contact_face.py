@@ -1,8 +1,8 @@
-"""Contact nodes on a boundary: equal segments, or every displacement node."""
+"""Contact nodes on a boundary: equal segments or patches, or every displacement node or facet."""
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +12,11 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import along_outline
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.faces.contact_patches import (
+    check_facets_down,
+    contact_patches,
+    face_surface,
+)
 from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, whole
 
 
@@ -19,13 +24,17 @@ from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, 
 class ContactNodes:
     """Rows (3 n, 2 N), places (n, 2) [m] and tributary lengths (n,) [m] of the contact nodes.
 
-    ``groups`` holds the name of each boundary and its number of nodes.
+    Of a solid rows (6 n, 3 N), places (n, 3), areas (n,) [m^2] and outward normals (n, 3).
+    ``groups`` holds the name of each boundary and its number of nodes, ``owner`` the contact node
+    of each facet of a solid's boundaries, one boundary after the other.
     """
 
     matrix: Any
     positions: Array
     tributary: Array
     groups: tuple[tuple[str, int], ...]
+    normals: Array | None = None
+    owner: Integers | None = None
 
 
 def contact_groups(
@@ -52,7 +61,7 @@ def contact_groups(
     each: tuple[Any, ...] = (tuple(counts) if isinstance(counts, list | tuple)
                              else (counts,) * len(names))
     if not names:
-        return ContactNodes(sp.csr_array((0, 2 * len(body.nodes))), np.zeros((0, 2)),
+        return ContactNodes(sp.csr_array((0, body.nodes.size)), np.zeros((0, body.dimension)),
                             np.zeros(0), ())
     if len(set(names)) < len(names):
         raise InputError(f"contact = {boundaries!r} must name boundaries, each once.")
@@ -61,16 +70,23 @@ def contact_groups(
                          f"one for each of the {len(names)}.")
     edges = np.concatenate([np.sort(body.mesh.boundary(name), axis=1) for name in names])
     if len(np.unique(edges, axis=0)) < len(edges):
-        raise InputError(f"The contact boundaries {choices(names)} share edges; an edge can "
+        one, many = ("an edge", "edges") if body.dimension == 2 else ("a facet", "facets")
+        raise InputError(f"The contact boundaries {choices(names)} share {many}; {one} can "
                          f"belong to only one interface.")
     faces = [contact_nodes(body, name, count)
              for name, count in zip(names, each, strict=True)]
-    return ContactNodes(
+    whole = ContactNodes(
         sp.csr_array(sp.vstack([face.matrix for face in faces])),
         np.concatenate([face.positions for face in faces]),
         np.concatenate([face.tributary for face in faces]),
         tuple(group for face in faces for group in face.groups),
     )
+    if body.dimension == 2:
+        return whole
+    first = np.cumsum([0, *(len(face.tributary) for face in faces)])
+    return replace(whole, normals=np.concatenate([face.normals for face in faces]),
+                   owner=np.concatenate([start + face.owner for start, face in zip(
+                       first, faces, strict=False)]))
 
 
 def contact_nodes(
@@ -84,16 +100,24 @@ def contact_nodes(
     displacement node of the boundary is a contact node, with the integral of its shape function as
     tributary length.
 
+    The face of a solid is cut into patches of facets of nearly equal area, which move and are
+    loaded likewise; with 'all', every facet is one. (The integrals of shape functions over
+    quadratic facets are zero or negative at corners.)
+
     Raises
     ------
     MeshError
         If the mesh has no such boundary.
     InputError
-        If the boundary faces up, or has fewer nodes than requested.
+        If the boundary faces up, or has fewer nodes, or facets, than requested.
     """
     import scipy.sparse as sp
 
     check_faces_down(body, boundary)
+    if body.dimension == 3:
+        patches = contact_patches(face_surface(body, boundary), boundary, count)
+        return ContactNodes(patches.rows(), patches.centres, patches.areas,
+                            ((boundary, patches.count),), patches.normals, patches.owner)
     if count == "all":
         nodes = face_nodes(body, boundary)
         tributary = np.zeros(len(body.nodes))
@@ -153,7 +177,10 @@ def face_chains(body: ElasticBody, boundary: str) -> list[Integers]:
 
 
 def check_faces_down(body: ElasticBody, boundary: str) -> None:
-    """Raise :class:`InputError` unless all edges of a boundary face the ground below."""
+    """Raise :class:`InputError` unless all edges or facets of a boundary face the ground below."""
+    if body.dimension == 3:
+        check_facets_down(face_surface(body, boundary), boundary)
+        return
     edges = along_outline(body.mesh, body.mesh.boundary(boundary))
     # The body lies on the left of its edges: a face that looks down runs to +x.
     runs = body.mesh.nodes[edges[:, 1], 0] - body.mesh.nodes[edges[:, 0], 0]

@@ -19,12 +19,19 @@ from fecontact.core.errors import (
 from fecontact.core.memory import require_memory
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, quantity, span
+from fecontact.fem.assembly import assembled
+from fecontact.fem.elements.cell_kinds import numbered_rows
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.supports import check_supports, expansion, fixed_dofs, hinges
+from fecontact.fem.supports import HingeSupport, check_supports, expansion, fixed_dofs, hinges
 
-# Unknowns of a cell by number of corners and degree, and memory per unknown for modes [bytes].
-_UNKNOWNS = {(3, 1): 1, (3, 2): 4, (4, 1): 2, (4, 2): 8}
-_BYTES = {3: 7e3, 4: 9.5e3}
+# Memory per unknown for modes [bytes], by dimension and number of corners.
+_BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 8): 1.2e4}
+# Order of quadrature by dimension, number of corners and degree: exact for the mass of straight
+# triangles and tetrahedra, parallelograms and parallelepipeds; for trilinear cells of degree 1 too.
+_ORDER = {(2, 3, 1): 4, (2, 3, 2): 4, (2, 4, 1): 4, (2, 4, 2): 4,
+          (3, 4, 1): 2, (3, 4, 2): 4, (3, 8, 1): 5, (3, 8, 2): 5}
+# With curved cells the products of shape functions meet determinants of higher order.
+_CURVED_ORDER = {(2, 3): 6, (2, 4): 6, (3, 4): 6, (3, 8): 6}
 
 
 @dataclass(frozen=True)
@@ -74,24 +81,28 @@ _MATERIALS = {"steel": (2.1e11, 0.3, 7850.0), "aluminium": (7.0e10, 0.33, 2700.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ElasticBody(Summarised):
-    """A plane linear elastic body of quadratic (or linear) finite elements.
+    """A linear elastic body, plane or solid, of quadratic (or linear) finite elements.
 
-    Displacement nodes are the mesh nodes, then the mid-points of the edges, then the centres of the
-    quadrilaterals; degree of freedom 2 k is the displacement of node k in x, 2 k + 1 that in y.
+    Displacement nodes are the mesh nodes, then the middles of the edges, then those of four-sided
+    faces of solids, then the centres of quadrilaterals and hexahedra; the degrees of freedom d k,
+    d k + 1, ... are the displacements of node k in x, y, ..., d = 2 or 3 being the dimension.
+    Quadratic elements follow curved edges of the mesh (isoparametric); linear ones are straight.
 
     Parameters
     ----------
     mesh : Mesh
-        Straight-sided triangles or quadrilaterals.
+        Triangles or quadrilaterals; tetrahedra or hexahedra for a solid.
     material : Material
     thickness : float
-        Out-of-plane thickness, positive [m].
+        Out-of-plane thickness of a plane body, positive [m].
     plane : 'stress' or 'strain'
+        Of a plane body; solids have neither thickness nor plane.
     degree : 2 or 1
         Quadratic (P2, Q2) or linear (P1, Q1) displacements.
-    fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
+    fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or a hinge
         Supports on named boundaries or points of the mesh: displacements fixed at zero, or a
-        hinge, whose nodes (such as the boundary of a hole) rotate rigidly about their centre.
+        hinge, whose nodes (such as the boundary of a hole) rotate rigidly about their centre. In
+        space 'hinge_x', 'hinge_y', 'hinge_z' name the axis; 'hinge' takes that of a round face.
 
     Raises
     ------
@@ -119,10 +130,14 @@ class ElasticBody(Summarised):
             raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")
         if self.degree not in (1, 2) or type(self.degree) is not int:
             raise InputError(f"ElasticBody: degree = {self.degree!r} must be 1 or 2.")
-        corners, degree = self.mesh.cells.shape[1], int(self.degree)
+        if self.dimension == 3 and (self.thickness, self.plane) != (1.0, "stress"):
+            raise InputError("ElasticBody: thickness and plane are those of plane bodies; leave "
+                             "them out for a solid.")
+        kind, degree = self.mesh.kind, int(self.degree)
+        plain = "triangles" if self.dimension == 2 else "tetrahedra"
         require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
-                       _UNKNOWNS[corners, degree] * _BYTES[corners],
-                       ", by a larger element_size, or triangles or degree = 1")
+                       kind.unknowns(degree) * _BYTES[kind.dimension, kind.corners],
+                       f", by a larger element_size, or {plain} or degree = 1")
         check_supports(self.mesh, self.fixed)
         pieces = _pieces(self.mesh)
         if pieces > 1:
@@ -131,43 +146,79 @@ class ElasticBody(Summarised):
 
     def summary(self) -> list[tuple[str, str]]:
         """Mesh, material, kind of elements and supports."""
-        kind = "triangles" if self.mesh.cells.shape[1] == 3 else "quadrilaterals"
-        x, y = self.mesh.nodes.T
-        material = self.material
+        material, mesh = self.material, self.mesh
+        curved = f", {len(mesh.curved_cells)} curved" if len(mesh.curved_cells) else ""
         return [
-            ("mesh", f"{len(self.mesh.cells)} {kind}, {len(self.mesh.nodes)} nodes, degree "
+            ("mesh", f"{len(mesh.cells)} {mesh.kind.name}{curved}, {len(mesh.nodes)} nodes, degree "
              f"{self.degree}"),
-            ("x", span(x, "m")), ("y", span(y, "m")),
-            ("thickness", f"{self.thickness:.4g} m, plane {self.plane}"),
+            *((axis, span(values, "m")) for axis, values in zip("xyz", mesh.nodes.T, strict=False)),
+            ("thickness", f"{self.thickness:.4g} m, plane {self.plane}") if self.dimension == 2
+            else ("volume", f"{mesh.volume:.4g} m³"),
             ("material", f"{quantity(material.youngs_modulus, 'Pa')}, Poisson ratio "
              f"{material.poisson_ratio:.4g}, {material.density:.4g} kg/m³"),
             ("fixed", listed([f"{name} in {way}" for name, way in self.fixed.items()])),
         ]
+
+    @property
+    def dimension(self) -> int:
+        """2 for a plane body, 3 for a solid."""
+        return self.mesh.dimension
+
+    @property
+    def curved(self) -> bool:
+        """Whether the elements follow curved edges of the mesh."""
+        return self.degree == 2 and len(self.mesh.curved_edges) > 0
+
+    @cached_property
+    def total_mass(self) -> float:
+        """Mass of the body with the edges of its mesh [kg]."""
+        size = self.mesh.area * self.thickness if self.dimension == 2 else self.mesh.volume
+        return float(size * self.material.density)
 
     @cached_property
     def basis(self) -> Any:
         """Scalar scikit-fem basis of one displacement component."""
         import skfem
 
-        kind = skfem.MeshTri1 if self.mesh.cells.shape[1] == 3 else skfem.MeshQuad1
-        elements = {(3, 1): skfem.ElementTriP1, (3, 2): skfem.ElementTriP2,
-                    (4, 1): skfem.ElementQuad1, (4, 2): skfem.ElementQuad2}
-        element = elements[self.mesh.cells.shape[1], self.degree]()
-        # Fourth order is exact for the mass of straight-sided triangles and parallelograms.
-        return skfem.Basis(kind(self.mesh.nodes.T.copy(), self.mesh.cells.T.copy()), element,
-                           intorder=4)
+        kind = self.mesh.kind
+        which = kind.dimension, kind.corners
+        meshes = {(2, 3): (skfem.MeshTri1, skfem.MeshTri2), (2, 4): (skfem.MeshQuad1,
+                                                                     skfem.MeshQuad2),
+                  (3, 4): (skfem.MeshTet1, skfem.MeshTet2), (3, 8): (skfem.MeshHex1,
+                                                                     skfem.MeshHex2)}
+        elements = {(2, 3): (skfem.ElementTriP1, skfem.ElementTriP2),
+                    (2, 4): (skfem.ElementQuad1, skfem.ElementQuad2),
+                    (3, 4): (skfem.ElementTetP1, skfem.ElementTetP2),
+                    (3, 8): (skfem.ElementHex1, skfem.ElementHex2)}
+        element = elements[which][self.degree - 1]()
+        cells = self.mesh.cells if kind.corners < 8 else self.mesh.cells[:, list(kind.order)]
+        straight = meshes[which][0](self.mesh.nodes.T.copy(), cells.T.copy())
+        if not self.curved:
+            return skfem.Basis(straight, element, intorder=_ORDER[(*which, self.degree)])
+        # The straight mesh numbers the nodes; its triangles may start at another corner.
+        members = skfem.Dofs(straight, element).element_dofs.T
+        places = self.mesh.second_order_places()
+        if kind.corners == 3:
+            places = _turned(places, self.mesh.cells, straight.t.T)
+        doflocs = np.empty((self.mesh.dimension, members.max() + 1))
+        doflocs[:, members] = np.moveaxis(places, 2, 0)
+        curved = meshes[which][1](doflocs, straight.t)
+        return skfem.Basis(curved, element, intorder=_CURVED_ORDER[which])
 
     @cached_property
     def nodes(self) -> Array:
-        """Reference places (N, 2) of the displacement nodes [m]."""
+        """Reference places (N, d) of the displacement nodes [m]."""
         return np.ascontiguousarray(self.basis.doflocs.T)
 
     @cached_property
     def stiffness(self) -> Any:
-        """Stiffness K, sparse (2 N, 2 N), without supports [N/m]."""
+        """Stiffness K, sparse (d N, d N), without supports [N/m]."""
         import scipy.sparse as sp
         from skfem import BilinearForm
 
+        if self.dimension == 3:
+            rows = self.stiffness_blocks.tocsr()
+            return sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
         # Three scalar forms of 9 x 9 pairs are much faster than one vector form of 18 x 18 pairs,
         # most of whose products are zero.
         gradients = [
@@ -182,33 +233,49 @@ class ElasticBody(Summarised):
                 for i in range(2) for j in range(2))
         return sp.csc_array(0.5 * self.thickness * (K + K.T))
 
+    @property
+    def stiffness_blocks(self) -> Any:
+        """Stiffness of a solid without supports, sparse (3 N, 3 N) of 3 x 3 blocks [N/m]."""
+        return self._assembled[0]
+
+    @cached_property
+    def _assembled(self) -> tuple[Any, Any]:
+        """Stiffness and mass of one component of a solid."""
+        _, lateral, shear = self.elasticity
+        return assembled(self.basis, lateral, shear, self.material.density)
+
     @cached_property
     def component_mass(self) -> Any:
         """Mass of one displacement component, sparse (N, N) by rows, without supports [kg]."""
         import scipy.sparse as sp
         from skfem import BilinearForm
 
+        if self.dimension == 3:
+            return self._assembled[1]
         scalar = BilinearForm(lambda u, v, w: u * v).assemble(self.basis)
         return sp.csr_array(0.5 * self.material.density * self.thickness * (scalar + scalar.T))
 
     @cached_property
     def mass(self) -> Any:
-        """Mass M, sparse (2 N, 2 N), without supports [kg]."""
+        """Mass M, sparse (d N, d N), without supports [kg]."""
         import scipy.sparse as sp
 
-        return sp.csc_array(sp.kron(self.component_mass, sp.eye_array(2)))
+        return sp.csc_array(sp.kron(self.component_mass, sp.eye_array(self.dimension)))
 
     @cached_property
-    def gradients(self) -> tuple[Any, Any]:
-        """Derivatives in x and y at the nodes, sparse (N, N): means of the adjacent elements."""
+    def gradients(self) -> tuple[Any, ...]:
+        """Derivatives in x, y (, z) at the nodes, sparse (N, N): means of the adjacent elements."""
         return _nodal_gradients(self.basis)
 
     @property
     def elasticity(self) -> tuple[float, float, float]:
-        """Plane elastic constants [Pa]: s_xx = first e_xx + second e_yy, s_xy = third g_xy."""
+        """Elastic constants [Pa]: s_xx = first e_xx + second (e_yy + e_zz), s_xy = third g_xy.
+
+        Those of a plane body hold without e_zz.
+        """
         E, nu = self.material.youngs_modulus, self.material.poisson_ratio
         shear = E / (2.0 * (1.0 + nu))
-        if self.plane == "stress":
+        if self.dimension == 2 and self.plane == "stress":
             return E / (1.0 - nu**2), nu * E / (1.0 - nu**2), shear
         lateral = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
         return lateral + 2.0 * shear, lateral, shear
@@ -216,30 +283,65 @@ class ElasticBody(Summarised):
     @cached_property
     def fixed_dofs(self) -> Integers:
         """Degrees of freedom fixed at zero by the supports, ascending."""
-        return fixed_dofs(self.fixed, self._supported)
+        return fixed_dofs(self.dimension, self.fixed, self._supported)
 
     @cached_property
     def expansion(self) -> Any:
-        """All degrees of freedom from the free ones, sparse (2 N, f); see the supports."""
+        """All degrees of freedom from the free ones, sparse (d N, f); see the supports."""
         return expansion(self.nodes, self.fixed_dofs, self.hinges)
 
     @cached_property
-    def hinges(self) -> list[tuple[Integers, Array]]:
-        """Nodes and centre (2,) [m] of each boundary that rotates rigidly about its centre."""
+    def hinges(self) -> list[HingeSupport]:
+        """Nodes, centre and axis of each boundary that rotates rigidly."""
         return hinges(self.mesh, self.nodes, self.fixed, self._supported)
 
     @cached_property
     def _supported(self) -> dict[str, Integers]:
         # A group may be both points and a boundary; only the boundary has mid-side nodes.
         boundaries, points = self.mesh.boundaries, self.mesh.points
-        return {name: np.unique(self.edge_nodes(boundaries[name])) if name in boundaries
-                else np.asarray(points[name]) for name in self.fixed}
+        return {name: np.unique(self.facet_nodes(boundaries[name])) if name in boundaries
+                else self._along(np.asarray(points[name])) for name in self.fixed}
+
+    def _along(self, points: Integers) -> Integers:
+        """Nodes of a solid's points, with the middles of edges of the outline between them.
+
+        Points that hold such edges are lines, such as the edge of a face.
+        """
+        if self.dimension == 2 or self.degree == 1 or len(points) < 2:
+            return points
+        faces = self.mesh.outline
+        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+        ends = np.unique(np.sort(ends[np.isin(ends, points).all(axis=1)], axis=1), axis=0)
+        return np.unique(np.concatenate([points, self.edge_nodes(ends)[:, 1]]))
+
+    def facet_nodes(self, facets: Integers) -> Integers:
+        """Displacement nodes (k, n) of mesh edges (k, 2) or of faces (k, 3) or (k, 4).
+
+        Edges: start, (middle,) end. Faces: corners, then of quadratic elements the middles between
+        successive corners, then the centre of four-sided ones: 3 or 6 of triangles, 4 or 9 of
+        quadrilaterals.
+        """
+        if self.dimension == 2 or self.degree == 1:
+            return self.edge_nodes(facets) if self.dimension == 2 else np.asarray(facets)
+        count = facets.shape[1]
+        parts = [facets, *(self.edge_nodes(facets[:, [i, (i + 1) % count]])[:, 1:2]
+                           for i in range(count))]
+        if count == 4:
+            known = np.sort(self.basis.mesh.facets.T.astype(np.int64), axis=1)
+            _, number, _ = numbered_rows(np.concatenate([known, np.sort(facets, axis=1)]))
+            row = np.empty(number.max() + 1, np.int64)
+            row[number[:len(known)]] = np.arange(len(known))
+            before = len(self.mesh.nodes) + self.basis.mesh.edges.shape[1]
+            parts.append(before + row[number[len(known):], None])
+        return np.concatenate(parts, axis=1)
 
     def edge_nodes(self, edges: Integers) -> Integers:
         """Displacement nodes (k, degree + 1) of mesh edges (k, 2): start, (middle,) end."""
         if self.degree == 1:
             return np.asarray(edges)
-        facets = self.basis.mesh.facets.T
+        mesh = self.basis.mesh
+        facets = (mesh.facets if self.dimension == 2 else np.sort(mesh.edges, axis=0)).T
+        facets = facets.astype(np.int64)
         size = len(self.mesh.nodes)
         order = np.argsort(facets[:, 0] * size + facets[:, 1])
         keys = (facets[:, 0] * size + facets[:, 1])[order]
@@ -258,8 +360,17 @@ def _pieces(mesh: Mesh) -> int:
     return int(connected_components(graph, directed=False, return_labels=False))
 
 
-def _nodal_gradients(basis: Any) -> tuple[Any, Any]:
-    """Derivatives in x and y at the nodes, sparse (N, N).
+def _turned(places: Array, cells: Integers, corners: Integers) -> Array:
+    """Second-order places (M, 6, 2) of triangles whose corners are taken in another order."""
+    at = (cells[:, None, :] == corners[:, :, None]).argmax(axis=2)
+    # Edges 0-1, 1-2, 0-2 lie opposite the corners 2, 0, 1.
+    opposite = np.array([2, 0, 1])
+    edge = np.argsort(opposite)[at[:, opposite]]
+    return np.take_along_axis(places, np.concatenate([at, 3 + edge], axis=1)[:, :, None], axis=1)
+
+
+def _nodal_gradients(basis: Any) -> tuple[Any, ...]:
+    """Derivatives in x, y (, z) at the nodes, sparse (N, N).
 
     Each is the area-weighted mean of the gradients of the adjacent elements at the node.
     """
@@ -275,9 +386,8 @@ def _nodal_gradients(basis: Any) -> tuple[Any, Any]:
     row = np.broadcast_to(dofs[:, :, None], slopes.shape[1:]).ravel()
     column = np.broadcast_to(dofs[:, None, :], slopes.shape[1:]).ravel()
     around = np.bincount(dofs.ravel(), np.repeat(area, size), minlength=count)
-    dx, dy = (
+    return tuple(
         sp.csr_array(sp.coo_array((slope.ravel() / around[row], (row, column)),
                                   shape=(count, count)))
         for slope in slopes
     )
-    return dx, dy

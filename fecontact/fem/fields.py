@@ -6,11 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from fecontact.core.checks import as_pair
+from fecontact.core.checks import as_place
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity, span
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.interpolation import interpolation
+from fecontact.fem.elements.cell_geometry import facets_of, oriented_solids
+from fecontact.fem.elements.cell_kinds import CELL_KINDS, numbered_rows
+from fecontact.fem.elements.refinement import PARTS
+from fecontact.fem.interpolation import element_kind, interpolation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -19,14 +22,14 @@ class BodyFields(Summarised):
 
     Attributes
     ----------
-    nodes : (N, 2) array
+    nodes : (N, 2) array, of a solid (N, 3)
         Reference places of the displacement nodes [m].
     elements : (E, k) integer array
-        Nodes of each element: corners, mid-sides, centre.
-    displacement : (N, 2) array
-        In x and y [m].
-    stress : (N, 4) array
-        Stresses xx, yy, zz, xy, means over the adjacent elements [Pa].
+        Nodes of each element: corners, then middles of edges, of faces, of the element.
+    displacement : (N, 2) array, of a solid (N, 3)
+        In x, y (, z) [m].
+    stress : (N, 4) array, of a solid (N, 6)
+        Stresses xx, yy, zz, xy (, yz, xz), means over the adjacent elements [Pa].
     """
 
     nodes: Array
@@ -45,13 +48,17 @@ class BodyFields(Summarised):
 
     @cached_property
     def cells(self) -> Integers:
-        """First-order cells (M, 3) or (M, 4) between the nodes."""
+        """First-order cells (M, 3) or (M, 4), of a solid (M, 4) or (M, 8), between the nodes."""
         return linear_cells(self.nodes, self.elements)
 
     @cached_property
     def outline(self) -> Integers:
-        """Edges (k, 2) of these cells on the outline."""
+        """Edges (k, 2) or faces (k, 3) or (k, 4) of these cells on the outline."""
         cells = self.cells
+        if self.nodes.shape[1] == 3:
+            faces = facets_of(cells, CELL_KINDS[3, cells.shape[1]])
+            _, number, count = numbered_rows(np.sort(faces, axis=1))
+            return np.asarray(faces[count[number] == 1])
         sides = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2))
         edges, count = np.unique(sides, axis=0, return_counts=True)
         return np.asarray(edges[count == 1])
@@ -59,28 +66,35 @@ class BodyFields(Summarised):
     @property
     def von_mises(self) -> Array:
         """Von Mises stress (N,) [Pa]."""
-        xx, yy, zz, xy = self.stress.T
+        xx, yy, zz, xy = self.stress.T[:4]
+        shears = xy**2 if self.stress.shape[1] == 4 else (self.stress[:, 3:] ** 2).sum(axis=1)
         return np.asarray(np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
-                                  + 3.0 * xy**2))
+                                  + 3.0 * shears))
 
     def at(self, place: Sequence[float]) -> tuple[Array, Array]:
-        """Displacement (2,) [m] and stress (4,) [Pa] at a place, interpolated within its element.
+        """Displacement (d,) [m] and stress [Pa] at a place, interpolated within its element.
 
         InputError for a place outside the body.
         """
-        which, weights = interpolation(self.nodes, self.elements, as_pair(place, "at: place"),
-                                       "at: place")
+        which, weights = interpolation(
+            self.nodes, self.elements, as_place(place, "at: place", self.nodes.shape[1]),
+            "at: place")
         return weights[0] @ self.displacement[which], weights[0] @ self.stress[which]
 
 
 def body_elements(body: ElasticBody) -> Integers:
-    """Nodes (E, k) of each element of a body: corners, mid-sides, centre."""
+    """Nodes (E, k) of each element of a body, in the order of ``CellKind.places``."""
     # 64-bit indices, as in files.
     return np.ascontiguousarray(body.basis.element_dofs.T.astype(np.int64))
 
 
 def linear_cells(nodes: Array, elements: Integers) -> Integers:
-    """First-order cells between all nodes of elements, counter-clockwise."""
+    """First-order cells between all nodes of elements, with positive orientation.
+
+    Cells of solids have their corners in the order of meshes, those of elements in scikit-fem's.
+    """
+    if nodes.shape[1] == 3:
+        return _solid_cells(nodes, elements)
     if elements.shape[1] < 6:
         cells = elements
     elif elements.shape[1] == 6:
@@ -96,8 +110,22 @@ def linear_cells(nodes: Array, elements: Integers) -> Integers:
     return np.where((ux * vy - uy * vx < 0.0)[:, None], cells[:, ::-1], cells)
 
 
+def _solid_cells(nodes: Array, elements: Integers) -> Integers:
+    kind = element_kind(3, elements.shape[1])
+    if elements.shape[1] == kind.corners:
+        inverse = np.argsort(kind.order)
+        return np.ascontiguousarray(elements[:, inverse])
+    cells = np.concatenate([elements[:, list(part)] for part in PARTS[3, kind.corners]])
+    return oriented_solids(nodes, cells, kind)
+
+
 def stress_of(body: ElasticBody, displacements: Array) -> Array:
-    """Stresses xx, yy, zz, xy (N, 4, m) of displacements (2 N, m), means at the nodes [Pa]."""
+    """Stresses (N, 4, m) of displacements (2 N, m), or (N, 6, m) of (3 N, m), at the nodes [Pa].
+
+    In the order xx, yy, zz, xy (, yz, xz); means over the adjacent elements.
+    """
+    if body.dimension == 3:
+        return _stress_in_space(body, displacements)
     dx, dy = body.gradients
     direct, lateral, shear = body.elasticity
     u, v = displacements[0::2], displacements[1::2]
@@ -105,3 +133,15 @@ def stress_of(body: ElasticBody, displacements: Array) -> Array:
     sxx, syy = direct * xx + lateral * yy, lateral * xx + direct * yy
     szz = body.material.poisson_ratio * (sxx + syy) * (body.plane == "strain")
     return np.stack([sxx, syy, szz, shear * slide], axis=1)
+
+
+def _stress_in_space(body: ElasticBody, displacements: Array) -> Array:
+    dx, dy, dz = body.gradients
+    direct, lateral, shear = body.elasticity
+    u, v, w = (displacements[axis::3] for axis in range(3))
+    xx, yy, zz = dx @ u, dy @ v, dz @ w
+    all_round = lateral * (xx + yy + zz)
+    own = direct - lateral
+    return np.stack([all_round + own * xx, all_round + own * yy, all_round + own * zz,
+                     shear * (dy @ u + dx @ v), shear * (dz @ v + dy @ w),
+                     shear * (dz @ u + dx @ w)], axis=1)

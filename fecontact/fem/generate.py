@@ -18,6 +18,8 @@ from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.core.memory import available_memory
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.shapes import Beam, Block, Grid, Hole, Pendulum, Shape, grid_of, nearest_line
+from fecontact.fem.solids.generate import generate_solid
+from fecontact.fem.solids.shapes import SolidShape
 
 
 class Rim:
@@ -98,13 +100,14 @@ _GMSH_OPTIONS: dict[str, float] = {
 }
 
 
-def generate(shape: Shape) -> Mesh:
-    """Mesh a body with Gmsh: rows and columns of rectangles, or of right-angled triangles.
+def generate(shape: Shape | SolidShape) -> Mesh:
+    """Mesh a plane body with Gmsh, in rows and columns of rectangles or triangles, or a solid.
 
     Parameters
     ----------
-    shape : Beam, Block or Pendulum
-        The body, with size and kind of its elements.
+    shape : Beam, Block, Pendulum, or a solid
+        The body, with size and kind of its elements. Solids are those of ``fecontact.fem``:
+        SolidBlock, Plate, Ring, Cylinder, SphereSegment, LapStrip.
 
     Returns
     -------
@@ -116,15 +119,18 @@ def generate(shape: Shape) -> Mesh:
     InputError
         For another shape, or an element size that makes more than two million elements.
     MissingLibraryError
-        If a library that Gmsh needs is not installed.
+        If a library that Gmsh needs is not installed; solids are meshed without Gmsh.
 
     Notes
     -----
     May be called from any thread, and while Gmsh is in use: models, options and signal handlers of
     the caller are restored.
     """
+    if isinstance(shape, SolidShape):
+        return generate_solid(shape)
     if not isinstance(shape, Shape):
-        raise InputError(f"generate: {shape!r} is not a shape; give a Beam, a Block or a Pendulum.")
+        raise InputError(f"generate: {shape!r} is not a shape; give a Beam, a Block or a Pendulum, "
+                         f"or a solid of fecontact.fem, such as a SolidBlock.")
     grid = grid_of(shape)
     _require_few_cells(shape, grid)
     gmsh = _import_gmsh()

@@ -1,6 +1,6 @@
-"""Plane meshes of triangles or quadrilaterals with named boundaries and points."""
+"""Meshes of plane bodies and of solids, with named boundaries and points."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -11,46 +11,73 @@ from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, MeshError, choices, nearest
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
+from fecontact.fem.elements.cell_geometry import (
+    curved_volumes,
+    facets_of,
+    oriented_solids,
+    require_apart,
+    second_order_places,
+    solid_volumes,
+)
+from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
+from fecontact.fem.elements.refinement import refined
 
 _FLAT = 1e-12  # area of a degenerate cell, relative to its squared sides
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Summarised):
-    """A plane mesh of first-order triangles or quadrilaterals with named boundaries and points.
+    """A mesh of a plane body or of a solid, with named boundaries and points.
+
+    Plane cells are triangles or quadrilaterals, counter-clockwise; cells of solids are tetrahedra
+    or hexahedra, their corners as Gmsh, VTK and Abaqus number them. Cells of the opposite
+    orientation are turned.
 
     Parameters
     ----------
-    nodes : (N, 2) array
-        Coordinates x (tangential to the ground) and y (normal to it, into the body) [m].
-    cells : (M, 3) or (M, 4) integer array
-        Corner nodes of each cell, counter-clockwise; clockwise cells are reversed.
-    boundaries : mapping of name to (k, 2) integer array
-        Edges, as pairs of nodes; each must be an edge of exactly one cell.
+    nodes : (N, 2) or (N, 3) array
+        Corners of the cells [m]. In the plane x is tangential to the ground and y normal to it,
+        into the body; in space z is normal to it.
+    cells : (M, 3) or (M, 4), of solids (M, 4) or (M, 8) integer array
+        Corner nodes of each cell.
+    boundaries : mapping of name to (k, 2), of solids (k, 3) or (k, 4) integer array
+        Edges or faces by their nodes; each must be that of exactly one cell. Faces of solids are
+        turned such that their nodes run counter-clockwise seen from outside.
     points : mapping of name to integer or (k,) integer array
         Nodes.
+    curved_edges : (k, 2) integer array
+        Nodes of the edges of cells that are curved, each edge once; none by default.
+    curved_middles : (k, 2) or (k, 3) array
+        Their middles [m]: an edge is the parabola through its ends and this place.
 
     Raises
     ------
     MeshError
-        For arrays of wrong shape, unknown nodes, degenerate or overlapping cells, nodes without a
-        cell, an empty group, or a boundary edge that is not on the outline or is named twice.
+        For arrays of wrong shape, unknown nodes, degenerate, folded or overlapping cells, nodes
+        without a cell, an empty group, or a boundary edge or face that is not on the outline or is
+        named twice.
     """
 
     nodes: Array
     cells: Integers
     boundaries: Mapping[str, Integers] = field(default_factory=dict)
     points: Mapping[str, Integers] = field(default_factory=dict)
+    curved_edges: Integers = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    curved_middles: Array | None = None
 
     def __post_init__(self) -> None:
         nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
         cells = np.array(as_integers(self.cells, "Mesh cells"))
-        if nodes.ndim != 2 or nodes.shape[1] != 2:
-            raise MeshError(f"Mesh nodes must have shape (N, 2), not {nodes.shape}.")
-        if cells.ndim != 2 or cells.shape[1] not in (3, 4) or not len(cells):
+        if nodes.ndim != 2 or nodes.shape[1] not in (2, 3):
+            raise MeshError(f"Mesh nodes must have shape (N, 2), or (N, 3) for a solid, not "
+                            f"{nodes.shape}.")
+        dimension = nodes.shape[1]
+        if cells.ndim != 2 or (dimension, cells.shape[1]) not in CELL_KINDS or not len(cells):
             raise MeshError(
                 f"Mesh cells must have shape (M, 3) for triangles or (M, 4) for quadrilaterals "
-                f"with M > 0, not {cells.shape}."
+                f"with M > 0, not {cells.shape}." if dimension == 2 else
+                f"Mesh cells of a solid must have shape (M, 4) for tetrahedra or (M, 8) for "
+                f"hexahedra with M > 0, not {cells.shape}."
             )
         if not np.isfinite(nodes).all():
             raise MeshError("Mesh nodes hold values that are not finite.")
@@ -60,150 +87,236 @@ class Mesh(Summarised):
             raise MeshError(
                 f"{len(nodes) - len(np.unique(cells))} mesh nodes belong to no cell; remove them."
             )
-        area = _signed_area(nodes, cells)
-        cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)
-        area = _smallest_corner_jacobian(nodes, cells) if cells.shape[1] == 4 else np.abs(area)
-        side = nodes[cells] - np.roll(nodes[cells], 1, axis=1)
-        bad = area <= _FLAT * (side**2).sum(axis=(1, 2))
-        if bad.any():
-            raise MeshError(
-                f"{np.count_nonzero(bad)} mesh cells have no area or are folded, the first is cell "
-                f"{np.flatnonzero(bad)[0]}."
-            )
+        kind = CELL_KINDS[dimension, cells.shape[1]]
+        cells = _oriented(nodes, cells) if dimension == 2 else oriented_solids(nodes, cells, kind)
         require_kind("Mesh", Mapping, boundaries=self.boundaries, points=self.points)
         for name in (*self.boundaries, *self.points):
             require_kind("Mesh: boundaries and points", str, name=name)
-        boundaries = {name: _edges(name, edges) for name, edges in self.boundaries.items()}
+        boundaries = {name: _facets(name, facets, kind)
+                      for name, facets in self.boundaries.items()}
         points = {name: np.unique(as_integers(which, f"The nodes of mesh point '{name}'"))
                   for name, which in self.points.items()}
+        curved = np.array(as_integers(self.curved_edges, "Mesh curved_edges")).reshape(-1, 2)
+        middles = np.array(np.zeros((0, dimension)) if self.curved_middles is None
+                           else as_floats(self.curved_middles, "Mesh curved_middles"))
+        if middles.shape != (len(curved), dimension) or not np.isfinite(middles).all():
+            raise MeshError(f"Mesh curved_middles must be finite and of shape ({len(curved)}, "
+                            f"{dimension}), a place for each curved edge, not {middles.shape}.")
         for name, group in (*boundaries.items(), *points.items()):
             if not group.size:
                 raise MeshError(f"Mesh group '{name}' is empty.")
             if group.min() < 0 or group.max() >= len(nodes):
                 raise MeshError(f"Mesh group '{name}' names nodes outside 0 ... {len(nodes) - 1}.")
-        for array in (nodes, cells, *boundaries.values(), *points.values()):
-            array.setflags(write=False)
-        for name, value in (("nodes", nodes), ("cells", cells), ("boundaries", boundaries),
-                            ("points", points)):
+        for name, value in (("nodes", nodes), ("cells", cells), ("points", points),
+                            ("curved_edges", curved), ("curved_middles", middles)):
             object.__setattr__(self, name, value)
-        crowded = self._sides[self._cells_at_edges > 2]
+        count = self._cells_at_facets
+        crowded = self._facets[count[self._facet_number] > 2]
         if len(crowded):
+            what = ("edge between mesh nodes" if dimension == 2 else "face of mesh nodes")
             raise MeshError(
-                f"The edge between mesh nodes {crowded[0][0]} and {crowded[0][1]} belongs to more "
-                f"than two cells; remove overlapping cells."
+                f"The {what} {' and '.join(map(str, crowded[0]))} belongs to more than two cells; "
+                f"remove overlapping cells."
             )
-        outline = {tuple(edge) for edge in np.sort(self.outline, axis=1).tolist()}
-        for name, edges in boundaries.items():
-            inner = [edge for edge in np.sort(edges, axis=1).tolist() if tuple(edge) not in outline]
-            if inner:
-                raise MeshError(
-                    f"Boundary '{name}' has {len(inner)} edges that are not on the outline of the "
-                    f"mesh, the first joins nodes {inner[0][0]} and {inner[0][1]}."
-                )
-            if len(np.unique(np.sort(edges, axis=1), axis=0)) < len(edges):
-                raise MeshError(f"Boundary '{name}' names an edge twice.")
+        if dimension == 3:
+            require_apart(self._facets, self._facet_number, count, nodes)
+        boundaries = {name: self._on_outline(name, facets) for name, facets in boundaries.items()}
+        object.__setattr__(self, "boundaries", boundaries)
+        for array in (nodes, cells, curved, middles, *boundaries.values(), *points.values()):
+            array.setflags(write=False)
+        if len(curved):
+            self._edges_between(curved, "curved_edges")
+            curved_volumes(self.second_order_places(self.curved_cells), kind)
+
+    @property
+    def dimension(self) -> int:
+        """2 for a plane body, 3 for a solid."""
+        return int(self.nodes.shape[1])
+
+    @property
+    def kind(self) -> CellKind:
+        """Kind of the cells, with the numbering of their sides and edges."""
+        return CELL_KINDS[self.dimension, self.cells.shape[1]]
 
     @cached_property
     def outline(self) -> Integers:
-        """Edges (k, 2) that belong to one cell only, the body on their left-hand side."""
-        return self._sides[self._cells_at_edges == 1]
+        """Sides (k, n) that belong to one cell only.
+
+        Edges of a plane body have the body on their left-hand side; faces of a solid run
+        counter-clockwise seen from outside.
+        """
+        return self._facets[self._cells_at_facets[self._facet_number] == 1]
 
     @cached_property
-    def _sides(self) -> Integers:
-        """Edges of each cell in turn, so that inner ones occur twice."""
-        return np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2).reshape(-1, 2)
+    def _facets(self) -> Integers:
+        """Sides of each cell in turn, so that inner ones occur twice."""
+        return facets_of(self.cells, self.kind)
 
     @cached_property
-    def _cells_at_edges(self) -> Integers:
-        """Number of cells at the edge of each row of ``_sides``."""
-        _, edge, count = np.unique(
-            np.sort(self._sides, axis=1), axis=0, return_inverse=True, return_counts=True
-        )
-        cells: Integers = count[edge.ravel()]
-        return cells
+    def _numbered_facets(self) -> tuple[Integers, Integers, Integers]:
+        return numbered_rows(np.sort(self._facets, axis=1))
+
+    @property
+    def _facet_number(self) -> Integers:
+        """Number of each of ``_facets`` without its orientation."""
+        return self._numbered_facets[1]
+
+    @property
+    def _cells_at_facets(self) -> Integers:
+        """Number of cells at each distinct side."""
+        return self._numbered_facets[2]
+
+    def _on_outline(self, name: str, facets: Integers) -> Integers:
+        """The sides of a boundary, those of a solid as in the outline."""
+        outline = np.sort(self.outline, axis=1)
+        _, number, _ = numbered_rows(np.concatenate([outline, np.sort(facets, axis=1)]))
+        row = np.full(number.max() + 1, -1)
+        row[number[:len(outline)]] = np.arange(len(outline))
+        rows = row[number[len(outline):]]
+        what = "edges" if self.dimension == 2 else "faces"
+        if (rows < 0).any():
+            inner = np.sort(facets[rows < 0], axis=1)
+            first = (f"joins nodes {inner[0][0]} and {inner[0][1]}" if self.dimension == 2
+                     else f"has the nodes {', '.join(map(str, inner[0]))}")
+            raise MeshError(
+                f"Boundary '{name}' has {len(inner)} {what} that are not on the outline of the "
+                f"mesh, the first {first}."
+            )
+        if len(np.unique(rows)) < len(rows):
+            one = "an edge" if self.dimension == 2 else "a face"
+            raise MeshError(f"Boundary '{name}' names {one} twice.")
+        return facets if self.dimension == 2 else self.outline[rows]
+
+    @cached_property
+    def edges(self) -> tuple[Integers, Integers]:
+        """Distinct edges (E, 2), and the edges (M, e) of each cell in the order of its kind."""
+        ends = np.sort(self.cells[:, np.array(self.kind.edges)].reshape(-1, 2), axis=1)
+        distinct, number, _ = numbered_rows(ends)
+        return distinct, number.reshape(len(self.cells), -1)
+
+    def _edges_between(self, ends: Integers, name: str) -> Integers:
+        """Numbers in ``edges`` of pairs of nodes."""
+        known, pairs = self.edges[0], np.sort(ends, axis=1)
+        keys, wanted = (rows[:, 0] * len(self.nodes) + rows[:, 1] for rows in (known, pairs))
+        found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        bad = keys[found] != wanted
+        if bad.any() or len(np.unique(found)) < len(found):
+            raise MeshError(f"Mesh {name} must be edges of cells, each once; these are not: "
+                            f"{pairs[bad][0].tolist() if bad.any() else 'the repeated ones'}.")
+        return found
+
+    @cached_property
+    def edge_middles(self) -> Array:
+        """Places (E, d) of the middles of ``edges`` [m]."""
+        middles = self.nodes[self.edges[0]].mean(axis=1)
+        if len(self.curved_edges):
+            middles[self._edges_between(self.curved_edges, "curved_edges")] = self.curved_middles
+        return middles
+
+    @cached_property
+    def curved_cells(self) -> Integers:
+        """Numbers (k,) of the cells that have a curved edge."""
+        if not len(self.curved_edges):
+            return np.empty(0, np.int64)
+        curved = np.zeros(len(self.edges[0]), bool)
+        curved[self._edges_between(self.curved_edges, "curved_edges")] = True
+        return np.flatnonzero(curved[self.edges[1]].any(axis=1))
+
+    def second_order_places(self, cells: Integers | None = None) -> Array:
+        """Second-order nodes (M, k, d) of all or the given cells [m], in the order of the kind."""
+        chosen = np.arange(len(self.cells)) if cells is None else cells
+        return second_order_places(self.nodes, self.cells[chosen], self.kind,
+                                   self.edge_middles[self.edges[1][chosen]])
 
     def refined(self) -> "Mesh":
-        """The mesh with every cell cut into four, and the same named boundaries and points.
+        """The mesh with every plane cell cut into four, or every solid cell into eight.
 
-        Nodes keep their numbers; the mid-points of the edges follow, then the centres of
-        quadrilaterals.
+        Named boundaries and points are kept. Nodes keep their numbers; the middles of the edges
+        follow, then those of four-sided faces and the centres of quadrilaterals and hexahedra.
+        Curved edges stay on their parabolas.
         """
-        count, corners = len(self.nodes), self.cells.shape[1]
-        edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2)
-        ends, number = np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0,
-                                 return_inverse=True)
-        middles = count + number.reshape(-1, corners)
-        nodes = [self.nodes, self.nodes[ends].mean(axis=1)]
-        parts = [np.column_stack([self.cells[:, i], middles[:, i], middles[:, i - 1]])
-                 for i in range(corners)]
-        if corners == 3:
-            cells = np.concatenate([*parts, middles])
-        else:
-            centres = count + len(ends) + np.arange(len(self.cells))
-            nodes.append(self.nodes[self.cells].mean(axis=1))
-            cells = np.concatenate([np.column_stack([part[:, :2], centres, part[:, 2]])
-                                    for part in parts])
-        keys = ends[:, 0] * count + ends[:, 1]
-
-        def halves(boundary: Integers) -> Integers:
-            ordered = np.sort(boundary, axis=1)
-            middle = count + np.searchsorted(keys, ordered[:, 0] * count + ordered[:, 1])
-            return np.stack([boundary[:, 0], middle, middle, boundary[:, 1]],
-                            axis=1).reshape(-1, 2)
-
-        return Mesh(np.concatenate(nodes), cells,
-                    {name: halves(group) for name, group in self.boundaries.items()}, self.points)
+        nodes, cells, boundaries, curved, middles = refined(self)
+        return Mesh(nodes, cells, boundaries, self.points, curved, middles)
 
     def placed(
         self,
-        shift: tuple[float, float] = (0.0, 0.0),
-        rotation: float = 0.0,
-        mirror: Literal["x", "y"] | None = None,
+        shift: Sequence[float] | None = None,
+        rotation: float | Sequence[float] = 0.0,
+        mirror: Literal["x", "y", "z"] | None = None,
     ) -> "Mesh":
         """The mesh mirrored, then turned about the origin, then shifted, with all named groups.
 
         Parameters
         ----------
-        shift : (float, float)
-            Displacement along x and y [m].
-        rotation : float
-            Angle [degrees], counter-clockwise; multiples of 90 are exact.
-        mirror : 'x' or 'y', optional
-            The coordinate that changes its sign; cells stay counter-clockwise.
+        shift : (float, float), of solids three floats
+            Displacement along the axes [m]; zero by default.
+        rotation : float, of solids also three floats
+            Angle [degrees], counter-clockwise (of solids about z); or angles about x, then the
+            fixed y, then the fixed z. Multiples of 90 are exact.
+        mirror : 'x', 'y' or 'z', optional
+            The coordinate that changes its sign; cells keep their orientation.
 
         Raises
         ------
         InputError
             For an unknown mirror, or a shift or rotation that is not finite.
         """
-        if mirror not in (None, "x", "y"):
-            raise InputError(f"Mesh: mirror = {mirror!r} must be 'x' or 'y', the coordinate that "
+        axes = "xyz"[:self.dimension]
+        if mirror is not None and mirror not in tuple(axes):
+            allowed = "'x' or 'y'" if self.dimension == 2 else "'x', 'y' or 'z'"
+            raise InputError(f"Mesh: mirror = {mirror!r} must be {allowed}, the coordinate that "
                              f"changes its sign.")
-        by, angle = as_floats(shift, "Mesh: shift"), as_floats(rotation, "Mesh: rotation")
-        if by.shape != (2,) or not np.isfinite(by).all():
-            raise InputError(f"Mesh: shift = {shift!r} must be two finite numbers in m.")
-        if angle.shape or not np.isfinite(angle):
-            raise InputError(f"Mesh: rotation = {rotation!r} must be a finite angle in degrees.")
-        signs = [-1.0 if mirror == axis else 1.0 for axis in ("x", "y")]
-        turned = self.nodes * signs @ _turn(float(angle)).T + by
-        return Mesh(turned, self.cells, self.boundaries, self.points)
+        by = as_floats((0.0,) * self.dimension if shift is None else shift, "Mesh: shift")
+        angles = as_floats(rotation, "Mesh: rotation")
+        if by.shape != (self.dimension,) or not np.isfinite(by).all():
+            raise InputError(f"Mesh: shift = {shift!r} must be "
+                             f"{'two' if self.dimension == 2 else 'three'} finite numbers in m.")
+        if self.dimension == 3 and angles.shape == ():
+            angles = np.array([0.0, 0.0, float(angles)])
+        if angles.shape != ((), (3,))[self.dimension - 2] or not np.isfinite(angles).all():
+            raise InputError(f"Mesh: rotation = {rotation!r} must be a finite angle in degrees"
+                             f"{'' if self.dimension == 2 else ', or three about x, y, z'}.")
+        signs = [-1.0 if mirror == axis else 1.0 for axis in axes]
+        turn = _turn(float(angles)) if self.dimension == 2 else _turn_in_space(angles)
+        nodes, middles = (places * signs @ turn.T + by
+                          for places in (self.nodes, np.asarray(self.curved_middles)))
+        return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles)
 
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""
-        x, y = self.nodes.T
+        solid = self.dimension == 3
         return [
-            ("nodes", f"{len(self.nodes)}"),
-            ("triangles" if self.cells.shape[1] == 3 else "quadrilaterals", f"{len(self.cells)}"),
-            ("x", span(x, "m")), ("y", span(y, "m")), ("area", f"{self.area:.4g} m²"),
-            *((f"boundary {name}", count(len(edges), "edge"))
-              for name, edges in self.boundaries.items()),
+            ("nodes", f"{len(self.nodes)}"), (self.kind.name, f"{len(self.cells)}"),
+            *((axis, span(values, "m")) for axis, values in zip("xyz", self.nodes.T,
+                                                                strict=False)),
+            ("volume", f"{self.volume:.4g} m³") if solid else ("area", f"{self.area:.4g} m²"),
+            *([("curved edges", f"{len(self.curved_edges)}")] if len(self.curved_edges) else []),
+            *((f"boundary {name}", count(len(group), "face" if solid else "edge"))
+              for name, group in self.boundaries.items()),
             *((f"point {name}", count(len(nodes), "node")) for name, nodes in self.points.items()),
         ]
 
     @property
     def area(self) -> float:
-        """Area of the meshed region [m^2]."""
-        return float(_signed_area(self.nodes, self.cells).sum())
+        """Area of the meshed region of a plane body [m^2]; MeshError for a solid."""
+        if self.dimension == 3:
+            raise MeshError("A solid has a volume; area is that of a plane body.")
+        area = _signed_area(self.nodes, self.cells)
+        if len(self.curved_cells):
+            area[self.curved_cells] = curved_volumes(
+                self.second_order_places(self.curved_cells), self.kind)
+        return float(area.sum())
+
+    @property
+    def volume(self) -> float:
+        """Volume of a solid [m^3]; MeshError for a plane body."""
+        if self.dimension == 2:
+            raise MeshError("A plane body has an area; volume is that of a solid.")
+        volume = solid_volumes(self.nodes, self.cells, self.kind)
+        if len(self.curved_cells):
+            volume[self.curved_cells] = curved_volumes(
+                self.second_order_places(self.curved_cells), self.kind)
+        return float(volume.sum())
 
     @property
     def extent(self) -> float:
@@ -211,7 +324,7 @@ class Mesh(Summarised):
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
     def boundary(self, name: str) -> Integers:
-        """Edges (k, 2) of a named boundary; MeshError for an unknown name."""
+        """Edges (k, 2) or faces (k, n) of a named boundary; MeshError for an unknown name."""
         if name not in self.boundaries:
             raise MeshError(
                 f"The mesh has no boundary named '{name}'{nearest(name, self.boundaries)}; "
@@ -229,12 +342,39 @@ def _turn(degrees: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-def _edges(name: str, edges: ArrayLike) -> Integers:
-    array = np.array(as_integers(edges, f"The edges of mesh boundary '{name}'"))
-    if array.size and (array.ndim != 2 or array.shape[1] != 2):
-        raise MeshError(f"Boundary '{name}' must have shape (k, 2), pairs of nodes, not "
-                        f"{array.shape}.")
-    return array.reshape(-1, 2)
+def _turn_in_space(degrees: Array) -> Array:
+    """Matrix (3, 3) of rotations about x, then y, then z."""
+    turn = np.eye(3)
+    for axis, angle in enumerate(degrees.tolist()):
+        one, plane = np.eye(3), [(axis + 1) % 3, (axis + 2) % 3]
+        one[np.ix_(plane, plane)] = _turn(angle)
+        turn = one @ turn
+    return turn
+
+
+def _facets(name: str, facets: ArrayLike, kind: CellKind) -> Integers:
+    what, corners = (("edges", "pairs") if kind.dimension == 2 else ("faces", "rows"),
+                     len(kind.facets[0]))
+    array = np.array(as_integers(facets, f"The {what[0]} of mesh boundary '{name}'"))
+    if array.size and (array.ndim != 2 or array.shape[1] != corners):
+        raise MeshError(f"Boundary '{name}' must have shape (k, {corners}), {what[1]} of nodes, "
+                        f"not {array.shape}.")
+    return array.reshape(-1, corners)
+
+
+def _oriented(nodes: Array, cells: Integers) -> Integers:
+    """Plane cells counter-clockwise; MeshError for degenerate and folded ones."""
+    area = _signed_area(nodes, cells)
+    cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)
+    area = _smallest_corner_jacobian(nodes, cells) if cells.shape[1] == 4 else np.abs(area)
+    side = nodes[cells] - np.roll(nodes[cells], 1, axis=1)
+    bad = area <= _FLAT * (side**2).sum(axis=(1, 2))
+    if bad.any():
+        raise MeshError(
+            f"{np.count_nonzero(bad)} mesh cells have no area or are folded, the first is cell "
+            f"{np.flatnonzero(bad)[0]}."
+        )
+    return cells
 
 
 def _signed_area(nodes: Array, cells: Integers) -> Array:

@@ -1,22 +1,29 @@
 """Points of interest: rows that map nodal displacements to a point's displacement and rotation.
 
 Every function returns sparse rows (3, 2 N): displacement x, y and rotation phi of the point as
-linear functions of the nodal displacements. Their transpose distributes a force at the point over
-the nodes, with the same virtual work.
+linear functions of the nodal displacements; in a solid (6, 3 N): displacements x, y, z and
+rotations about x, y, z. Their transpose distributes a force at the point over the nodes, with the
+same virtual work.
 """
 
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
-from fecontact.core.checks import as_pair
+from fecontact.core.checks import as_place
 from fecontact.core.errors import InputError, MeshError, choices, nearest, require_positive
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, Coordinates, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.faces.surface import Surface
 from fecontact.fem.interpolation import interpolation
 
+# Axes with the two that follow them.
+_TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+_CURVED = 1e-9  # distance of the middle of an edge from its chord, per length
+_FINE = 24  # parts of a facet along each of its sides
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
@@ -24,9 +31,11 @@ _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 class Patch:
     """The part of the outline within a distance of a place, with its mean motion.
 
+    Faces of a solid that lie only partly within are cut to about 1/24 of their size.
+
     Parameters
     ----------
-    at : str or (x, y)
+    at : str, (x, y) or (x, y, z)
         Name of a point of the mesh, or a place [m].
     radius : float
         Distance, positive [m].
@@ -34,24 +43,24 @@ class Patch:
     Raises
     ------
     InputError
-        For a radius that is not positive, or a place that is not a pair of finite numbers.
+        For a radius that is not positive, or a place that is not of finite numbers.
     """
 
-    at: Annotated[str | tuple[float, float], Unit("m")]
+    at: Annotated[str | Coordinates, Unit("m")]
     radius: Annotated[float, Unit("m")]
 
     def __post_init__(self) -> None:
         require_positive("Patch", radius=self.radius)
         if not isinstance(self.at, str):
-            object.__setattr__(self, "at", as_pair(self.at, "Patch: at"))
+            object.__setattr__(self, "at", as_place(self.at, "Patch: at"))
 
 
-Place = str | tuple[float, float] | Patch
+Place = TypeAliasType("Place", str | Coordinates | Patch)
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows of one point: sparse (3, 2 N) matrix, and the point's reference place (2,) [m]."""
+    """Rows of one point: sparse (3, 2 N) or (6, 3 N), and its reference place (2,) or (3,) [m]."""
 
     matrix: Any
     position: Array
@@ -77,13 +86,17 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
     mesh = body.mesh
     if isinstance(place, Patch):
         centre = _centre(body, place.at, name)
-        pieces = _within(body, centre, place.radius)
-        if not len(pieces.nodes):
+        found = (_patch_in_space(body, centre, place.radius) if mesh.dimension == 3
+                 else _patch_in_plane(body, centre, place.radius))
+        if found is None:
+            where = ", ".join(f"{x:g}" for x in centre)
             raise InputError(f"Point {name}: no part of the outline lies within "
-                             f"{place.radius:g} m of ({centre[0]:g}, {centre[1]:g}); choose a "
-                             f"place on the outline or a larger radius.")
-        return patch_rows(body, pieces)
+                             f"{place.radius:g} m of ({where}); choose a place on the outline or "
+                             f"a larger radius.")
+        return found
     if isinstance(place, str):
+        if place in mesh.boundaries and mesh.dimension == 3:
+            return face_rows(body, mesh.boundaries[place])
         if place in mesh.boundaries:
             return patch_rows(body, whole(body.edge_nodes(mesh.boundaries[place])))
         if place in mesh.points:
@@ -102,14 +115,26 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
 
 
 def rotating_rows(count: int, nodes: Integers, weights: Array) -> Any:
-    """Sparse rows (3, 2 N) from weights (3, k) of the value and its derivatives at k of N nodes."""
+    """Sparse rows from weights (1 + d, k) of the value and its derivatives at k of N nodes.
+
+    The rotation is half the curl: (3, 2 N) in the plane, (6, 3 N) in space.
+    """
     import scipy.sparse as sp
 
-    value, slope_x, slope_y = weights
-    data = np.concatenate([value, value, -0.5 * slope_y, 0.5 * slope_x])
-    row = np.repeat([0, 1, 2, 2], len(nodes))
-    column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
-    return sp.csr_array(sp.coo_array((data, (row, column)), shape=(3, 2 * count)))
+    if len(weights) == 3:
+        value, slope_x, slope_y = weights
+        data = np.concatenate([value, value, -0.5 * slope_y, 0.5 * slope_x])
+        row = np.repeat([0, 1, 2, 2], len(nodes))
+        column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
+        return sp.csr_array(sp.coo_array((data, (row, column)), shape=(3, 2 * count)))
+    entries = [(axis, axis, weights[0]) for axis in range(3)]
+    for axis, ahead, last in _TURNS:
+        entries += [(3 + axis, last, 0.5 * weights[1 + ahead]),
+                    (3 + axis, ahead, -0.5 * weights[1 + last])]
+    data = np.concatenate([part for *_, part in entries])
+    row = np.repeat([row for row, *_ in entries], len(nodes))
+    column = np.concatenate([3 * nodes + axis for _, axis, _ in entries])
+    return sp.csr_array(sp.coo_array((data, (row, column)), shape=(6, 3 * count)))
 
 
 def node_rows(body: ElasticBody, node: int) -> Rows:
@@ -118,16 +143,34 @@ def node_rows(body: ElasticBody, node: int) -> Rows:
 
 
 def node_matrix(body: ElasticBody, nodes: Integers) -> Any:
-    """Rows (3 k, 2 N) of k displacement nodes, one after the other."""
+    """Rows (3 k, 2 N), or (6 k, 3 N), of k displacement nodes, one after the other."""
     import scipy.sparse as sp
 
-    dx, dy = body.gradients
     chosen = sp.csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), nodes)),
                           shape=(len(nodes), len(body.nodes)))
-    parts = [(chosen, [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]),
-             (0.5 * dx[nodes], [[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]),
-             (-0.5 * dy[nodes], [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])]
+    if body.dimension == 2:
+        dx, dy = body.gradients
+        parts = [(chosen, [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]),
+                 (0.5 * dx[nodes], [[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]),
+                 (-0.5 * dy[nodes], [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])]
+    else:
+        parts = [(chosen, np.eye(6, 3).tolist())]
+        for direction, slope in enumerate(body.gradients):
+            curl = np.zeros((6, 3))
+            for axis, ahead, last in _TURNS:
+                if direction in (ahead, last):
+                    # phi_axis = (d u_last / d x_ahead - d u_ahead / d x_last) / 2
+                    curl[3 + axis, last if direction == ahead else ahead] = (
+                        0.5 if direction == ahead else -0.5)
+            parts.append((slope[nodes], curl.tolist()))
     return sp.csr_array(sum(sp.kron(matrix, pattern) for matrix, pattern in parts))
+
+
+def face_rows(body: ElasticBody, facets: Integers) -> Rows:
+    """Rows of faces (k, 3) or (k, 4) of a solid: their area-weighted best-fitting rigid motion."""
+    surface = Surface(body.nodes, body.facet_nodes(facets))
+    patch = surface.patches(np.zeros(len(facets), np.int64))
+    return Rows(patch.rows(), patch.centres[0])
 
 
 def patch_rows(body: ElasticBody, pieces: Pieces) -> Rows:
@@ -185,8 +228,66 @@ def _sampled(
     else:
         values = np.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)],
                           axis=-1)
-    length = np.linalg.norm(places[pieces.nodes[:, -1]] - places[pieces.nodes[:, 0]], axis=1)
-    return pieces.nodes, values, (length * half)[:, None] * _WEIGHTS
+    ends = places[pieces.nodes[:, [0, -1]]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    weights = (length * half)[:, None] * _WEIGHTS
+    if pieces.nodes.shape[1] == 3:
+        off = places[pieces.nodes[:, 1]] - ends.mean(axis=1)
+        curved = np.linalg.norm(off, axis=1) > _CURVED * length
+        # x = start + s (end - start) + 4 s (1 - s) off
+        along = (ends[:, 1] - ends[:, 0])[:, None] + (4.0 - 8.0 * s)[..., None] * off[:, None]
+        weights[curved] = (np.linalg.norm(along, axis=2) * half[:, None] * _WEIGHTS)[curved]
+    return pieces.nodes, values, weights
+
+
+def sampled_edges(places: Array) -> tuple[Array, Array, Array]:
+    """Shape functions (g, 3), unit tangents (k, g, 2), weights (k, g) [m] of edges (k, 3, 2)."""
+    s = 0.5 * (1.0 + _GAUSS)
+    values = np.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], -1)
+    slopes = np.stack([4.0 * s - 3.0, 4.0 - 8.0 * s, 4.0 * s - 1.0], axis=-1)
+    along = np.einsum("gn,knx->kgx", slopes, places)
+    lengths = np.linalg.norm(along, axis=2)
+    return values, along / lengths[..., None], 0.5 * lengths * _WEIGHTS
+
+
+def _patch_in_plane(body: ElasticBody, centre: Array, radius: float) -> Rows | None:
+    pieces = _within(body, centre, radius)
+    return patch_rows(body, pieces) if len(pieces.nodes) else None
+
+
+def _patch_in_space(body: ElasticBody, centre: Array, radius: float) -> Rows | None:
+    """Rows of the part of the outline within a sphere, cut along fine parts of the facets."""
+    surface = Surface(body.nodes, body.facet_nodes(body.mesh.outline))
+    corners = body.nodes[surface.facets]
+    # Only facets whose surrounding box reaches into the sphere.
+    reach = np.ptp(corners, axis=1).max(axis=1)[:, None]
+    away = np.maximum(corners.min(axis=1) - 0.25 * reach - centre,
+                      centre - corners.max(axis=1) - 0.25 * reach)
+    surface = surface.only((np.maximum(away, 0.0)**2).sum(axis=1) < radius**2)
+    if not len(surface.facets):
+        return None
+    local, share = _fine_parts(surface.facets.shape[1])
+    values, places, _, areas = surface.at(local)
+    weights = areas * share
+    inside = ((places - centre) ** 2).sum(axis=2) <= radius**2
+    if not inside.any():
+        return None
+    which, sample = np.nonzero(inside)
+    return Rows(*sampled_rows(len(body.nodes), surface.facets[which], values[sample],
+                              places[which, sample], weights[which, sample]))
+
+
+def _fine_parts(count: int) -> tuple[Array, Array]:
+    """Centres (g, 2) in local coordinates, and weights (g,), of equal parts of a facet."""
+    n = _FINE
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    if count in (4, 9):
+        return np.stack([i + 0.5, j + 0.5], axis=1) / n, np.full(n * n, 1.0 / n**2)
+    upright, turned = i + j < n, i + j < n - 1
+    third = 1.0 / 3.0
+    local = np.concatenate([np.stack([i + third, j + third], axis=1)[upright],
+                            np.stack([i + 2 * third, j + 2 * third], axis=1)[turned]]) / n
+    return local, np.full(n * n, 0.5 / n**2)
 
 
 def _within(body: ElasticBody, centre: Array, radius: float) -> Pieces:
@@ -205,25 +306,58 @@ def _within(body: ElasticBody, centre: Array, radius: float) -> Pieces:
     return Pieces(nodes[kept], start[kept], end[kept])
 
 
-def _centre(body: ElasticBody, at: str | tuple[float, float], name: str) -> Array:
+def _centre(body: ElasticBody, at: str | Coordinates, name: str) -> Array:
     if isinstance(at, str):
         if at not in body.mesh.points:
             raise MeshError(f"Point {name}: the mesh has no point '{at}'"
                             f"{nearest(at, body.mesh.points)}; its points are: "
                             f"{choices(body.mesh.points)}.")
         return np.asarray(body.mesh.nodes[body.mesh.points[at]].mean(axis=0))
-    return np.array(as_pair(at, f"Point {name}"))
+    return np.array(as_place(at, f"Point {name}", body.dimension))
 
 
 def _node_set_rows(body: ElasticBody, nodes: Integers) -> Rows:
     """Rows of several nodes: their best-fitting rigid motion, with equal weights."""
     import scipy.sparse as sp
 
-    centre = body.nodes[nodes].mean(axis=0)
-    arm = (body.nodes[nodes] - centre) / ((body.nodes[nodes] - centre) ** 2).sum()
-    count = len(nodes)
+    places, count = body.nodes[nodes], len(nodes)
+    if body.dimension == 3:
+        return Rows(*sampled_rows(len(body.nodes), nodes[:, None], np.ones((count, 1)), places,
+                                  np.ones(count)))
+    centre = places.mean(axis=0)
+    arm = (places - centre) / ((places - centre) ** 2).sum()
     data = np.concatenate([np.full(2 * count, 1.0 / count), -arm[:, 1], arm[:, 0]])
     row = np.repeat([0, 1, 2, 2], count)
     column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
     shape = (3, 2 * len(body.nodes))
     return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), centre)
+
+
+def sampled_rows(
+    count: int, nodes: Integers, values: Array, places: Array, weights: Array
+) -> tuple[Any, Array]:
+    """Rows (6, 3 N) of samples' best-fitting rigid motion, and their centre (3,).
+
+    Sample q is at ``places`` (q, 3), moves as ``values`` (q, n) times the displacements of its
+    ``nodes`` (q, n), and counts with ``weights`` (q,). Samples on a line give no rotation about it.
+    """
+    import scipy.sparse as sp
+
+    share = weights / weights.sum()
+    centre = share @ places
+    arm = places - centre
+    spread = (share[:, None] * arm).T @ arm
+    # [arm]_x turns a displacement into its moment.
+    cross = np.zeros((len(arm), 3, 3))
+    for axis, ahead, last in _TURNS:
+        cross[:, axis, last], cross[:, axis, ahead] = arm[:, ahead], -arm[:, last]
+    turning = np.linalg.pinv(np.trace(spread) * np.eye(3) - spread, rcond=1e-9,
+                             hermitian=True) @ cross
+    each = np.concatenate([np.broadcast_to(np.eye(3), cross.shape), turning], axis=1)
+    data = (share[:, None] * values)[:, :, None, None] * each[:, None]
+    row = np.broadcast_to(np.arange(6)[:, None], data.shape)
+    column = np.broadcast_to(3 * nodes[:, :, None, None] + np.arange(3), data.shape)
+    matrix = sp.csr_array(sp.coo_array((data.ravel(), (row.ravel(), column.ravel())),
+                                       shape=(6, 3 * count)))
+    matrix.eliminate_zeros()
+    return matrix, centre

@@ -1,7 +1,7 @@
 """Supports: constraints of nodal displacements, and their elimination."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,7 +9,20 @@ from fecontact.core.errors import InputError, MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
 
-KINDS = ("x", "y", "xy", "hinge")
+KINDS = {2: ("x", "y", "xy", "hinge"),
+         3: ("x", "y", "z", "xy", "xz", "yz", "xyz", "hinge", "hinge_x", "hinge_y", "hinge_z")}
+_ROUND = 1e-3  # normals of a round face along its axis, mean square
+
+
+class HingeSupport(NamedTuple):
+    """Nodes (k,) that rotate rigidly about an axis through a centre (d,) [m].
+
+    The axis (3,) is a unit vector, in the plane that out of it; motion along it is held too.
+    """
+
+    nodes: Integers
+    centre: Array
+    axis: Array
 
 
 def check_supports(mesh: Mesh, fixed: Mapping[str, str]) -> None:
@@ -19,12 +32,14 @@ def check_supports(mesh: Mesh, fixed: Mapping[str, str]) -> None:
         if name not in known:
             raise MeshError(f"The mesh has no boundary or point '{name}' to be fixed"
                             f"{nearest(name, known)}; it has: {choices(known)}.")
-        if kind not in KINDS:
+        if kind not in KINDS[mesh.dimension]:
             raise InputError(f"ElasticBody: fixed['{name}'] = {kind!r} must be one of "
-                             f"{choices(KINDS)}.")
+                             f"{choices(KINDS[mesh.dimension])}.")
 
 
-def fixed_dofs(fixed: Mapping[str, str], supported: Mapping[str, Integers]) -> Integers:
+def fixed_dofs(
+    dimension: int, fixed: Mapping[str, str], supported: Mapping[str, Integers]
+) -> Integers:
     """Degrees of freedom fixed at zero, ascending.
 
     ``fixed`` maps the name of each support to its kind, ``supported`` to its displacement nodes.
@@ -32,42 +47,51 @@ def fixed_dofs(fixed: Mapping[str, str], supported: Mapping[str, Integers]) -> I
     held: list[Integers] = [np.empty(0, np.int64)]
     for name, kind in fixed.items():
         nodes = supported[name]
-        if kind == "hinge" and len(nodes) > 1:
+        hinge = kind.startswith("hinge")
+        if hinge and len(nodes) > 1:
             continue
-        held += [2 * nodes + axis for axis in range(2) if "xy"[axis] in kind or kind == "hinge"]
+        held += [dimension * nodes + axis for axis in range(dimension)
+                 if hinge or "xyz"[axis] in kind]
     return np.unique(np.concatenate(held))
 
 
 def hinges(
     mesh: Mesh, nodes: Array, fixed: Mapping[str, str], supported: Mapping[str, Integers]
-) -> list[tuple[Integers, Array]]:
-    """Nodes and centre (2,) [m] of each boundary that rotates rigidly about its centre.
+) -> list[HingeSupport]:
+    """Each boundary that rotates rigidly about an axis through its centre.
 
-    ``nodes`` (N, 2) are the places of the displacement nodes [m].
+    ``nodes`` (N, d) are the places of the displacement nodes [m].
     """
-    return [(supported[name], _centre(mesh, nodes[supported[name]], name))
-            for name, kind in fixed.items() if kind == "hinge" and len(supported[name]) > 1]
+    return [HingeSupport(supported[name], _centre(mesh, nodes[supported[name]], name),
+                  _axis(mesh, nodes[supported[name]], name, kind))
+            for name, kind in fixed.items()
+            if kind.startswith("hinge") and len(supported[name]) > 1]
 
 
-def expansion(nodes: Array, fixed_dofs: Integers, turning: list[tuple[Integers, Array]]) -> Any:
-    """All degrees of freedom from the free ones, sparse (2 N, f).
+def expansion(nodes: Array, fixed_dofs: Integers, turning: list[HingeSupport]) -> Any:
+    """All degrees of freedom from the free ones, sparse (d N, f).
 
     The free ones are the displacements without a support, then one angle per hinge.
     """
     import scipy.sparse as sp
 
-    size = 2 * len(nodes)
-    taken = [np.concatenate([2 * held, 2 * held + 1]) for held, _ in turning]
+    dimension = nodes.shape[1]
+    size = nodes.size
+    taken = [np.concatenate([dimension * held + axis for axis in range(dimension)])
+             for held, *_ in turning]
     held = np.concatenate([fixed_dofs, *taken]).astype(np.int64)
     if len(np.unique(held)) < len(held):
         raise InputError("Two supports share a node, and one of them is a hinge; separate them.")
     free = np.setdiff1d(np.arange(size), held)
     rows, columns, values = [free], [np.arange(len(free))], [np.ones(len(free))]
-    for index, (around, centre) in enumerate(turning):
+    for index, (around, centre, axis) in enumerate(turning):
         arm = nodes[around] - centre
-        rows += [2 * around, 2 * around + 1]
-        columns.append(np.full(2 * len(around), len(free) + index))
-        values += [-arm[:, 1], arm[:, 0]]
+        swept = (np.column_stack([-arm[:, 1], arm[:, 0]]) if dimension == 2
+                 else np.cross(axis, arm))
+        for direction in range(dimension):
+            rows.append(dimension * around + direction)
+            values.append(swept[:, direction])
+        columns.append(np.full(dimension * len(around), len(free) + index))
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     return sp.csc_array(sp.coo_array(entries, shape=(size, len(free) + len(turning))))
 
@@ -76,5 +100,39 @@ def _centre(mesh: Mesh, places: Array, name: str) -> Array:
     if name not in mesh.boundaries:
         return np.asarray(places.mean(axis=0))
     ends = mesh.nodes[mesh.boundaries[name]]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return np.asarray((lengths @ ends.mean(axis=1)) / lengths.sum())
+    if mesh.dimension == 3:
+        weights = np.linalg.norm(_area_vectors(ends), axis=1)
+    else:
+        weights = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return np.asarray((weights @ ends.mean(axis=1)) / weights.sum())
+
+
+def _area_vectors(corners: Array) -> Array:
+    """Outward normals times areas (k, 3) of faces (k, n, 3)."""
+    diagonal = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
+    if corners.shape[1] == 3:
+        diagonal = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(0.5 * np.cross(*diagonal))
+
+
+def _axis(mesh: Mesh, places: Array, name: str, kind: str) -> Array:
+    """Unit vector (3,) of a hinge's axis."""
+    if mesh.dimension == 2:
+        return np.array([0.0, 0.0, 1.0])
+    if kind != "hinge":
+        return np.eye(3)["xyz".index(kind[-1])]
+    if name in mesh.boundaries:
+        # Normals of a round face are perpendicular to its axis.
+        normals = _area_vectors(mesh.nodes[mesh.boundaries[name]])
+        weights = np.linalg.norm(normals, axis=1)
+        strength, axes = np.linalg.eigh((normals.T / weights) @ normals / weights.sum())
+        if strength[0] < _ROUND and strength[1] > 0.1:
+            return np.asarray(axes[:, 0])
+    else:
+        arm = places - places.mean(axis=0)
+        strength, axes = np.linalg.eigh(arm.T @ arm)
+        if strength[1] < _ROUND * strength[2]:
+            return np.asarray(axes[:, 2])
+    raise InputError(f"ElasticBody: fixed['{name}'] = 'hinge' finds no axis, since '{name}' is "
+                     f"neither a round face nor a straight line of points; give 'hinge_x', "
+                     f"'hinge_y' or 'hinge_z'.")

@@ -20,16 +20,17 @@ class ModeConvergence:
     Attributes
     ----------
     unknowns : (L,) array
-        Degrees of freedom of each mesh; each refinement cuts every cell into four.
+        Degrees of freedom of each mesh; each refinement cuts every cell into four, of solids into
+        eight.
     frequencies_hz : (L, k) array
         The lowest elastic frequencies on each mesh [Hz].
-    compliance : (L, 2) array
-        Elastic displacement in x and y per unit force at the same node, mean over the contact nodes
-        of the full finite-element body, on each mesh [m/N].
+    compliance : (L, d) array
+        Elastic displacement along each axis per unit force at the same node, mean over the contact
+        nodes of the full finite-element body, on each mesh [m/N].
     modes : (K,) array
         Numbers of modes, on the given mesh.
-    missing : (K, 2) array
-        Largest fraction of a contact node's compliance in x and y that is missing with these
+    missing : (K, d) array
+        Largest fraction of a contact node's compliance along each axis that is missing with these
         numbers of modes.
     """
 
@@ -40,9 +41,9 @@ class ModeConvergence:
     missing: Array
 
     def __str__(self) -> str:
-        shown = self.frequencies_hz.shape[1]
+        shown, axes = self.frequencies_hz.shape[1], "xyz"[: self.compliance.shape[1]]
         lines = [" ".join([f"{'unknowns':>9s}", *(f"{f'f{i + 1} [Hz]':>11s}" for i in range(shown)),
-                           f"{'x [m/N]':>11s}", f"{'y [m/N]':>11s}"])]
+                           *(f"{f'{axis} [m/N]':>11s}" for axis in axes)])]
         lines += [" ".join([f"{unknowns:9d}", *(f"{f:11.6g}" for f in frequencies),
                             *(f"{c:11.5g}" for c in compliance)])
                   for unknowns, frequencies, compliance in zip(
@@ -51,8 +52,8 @@ class ModeConvergence:
         if shown:
             lines.append(f"On the given mesh these frequencies are off by up to "
                          f"{change[0].max():.1e}, against the finest.")
-        lines += ["", f"{'modes':>9s} {'missing x':>11s} {'missing y':>11s}"]
-        lines += [f"{modes:9d} {missing[0]:11.2%} {missing[1]:11.2%}"
+        lines += ["", " ".join([f"{'modes':>9s}", *(f"{f'missing {axis}':>11s}" for axis in axes)])]
+        lines += [" ".join([f"{modes:9d}", *(f"{one:11.2%}" for one in missing)])
                   for modes, missing in zip(self.modes, self.missing, strict=True)]
         return "\n".join(lines)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,8 @@ def basis_from_matrices(
     tributary: ArrayLike | None = None,
     thickness: float | None = None,
     translations: ArrayLike | None = None,
+    dimension: Literal[2, 3] = 2,
+    contact_places: ArrayLike | None = None,
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
@@ -80,30 +82,30 @@ def basis_from_matrices(
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
         groups a mapping of their names to such rows; none for a body that touches nothing. ``B``,
         ``C`` and further named points: dense or sparse (3, d); B and C default to zero. Two rows,
-        x and y, instead of three mean no rotation. See :func:`fecontact.reduction.rows_from_dofs`.
+        x and y, instead of three mean no rotation; in space six, or three. See
+        :func:`fecontact.reduction.rows_from_dofs`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
         Ratios of the modes, factors, or the damping matrix in the given degrees of freedom [N s/m],
         whose skew part is gyroscopic.
     modes : int, optional
         Number m of modes, lowest first, rigid ones included; by default all, up to d = 2000.
     rigid : int, optional
-        Number of rigid modes, for stiffness matrices with few digits or after condensation; by
-        default determined from the stiffness.
-    contact_x, tributary : (n,) arrays, optional
-        Abscissae (default zero) and lengths (default equal, of sum one) of the contact nodes
-        [m].
+        Number of rigid modes; by default determined from the stiffness.
+    contact_x, contact_places, tributary : (n,), (n, 2 or 3), (n,) arrays, optional
+        Abscissae or places (default zero) and lengths (default equal, of sum one; in space areas)
+        of the contact nodes [m, m^2].
     thickness : float, optional
-        Out-of-plane thickness of the contact face [m], for pressures.
-    translations : (2, d) array, optional
-        The degrees of freedom in unit translations of the whole body in x and in y, fixed ones
-        too; needed for gravity and base acceleration.
+        Out-of-plane thickness of the contact face [m], for pressures; not in space.
+    translations : (2, d) array, in space (3, d), optional
+        The degrees of freedom in unit translations of the whole body, fixed ones too; needed for
+        gravity and base acceleration.
+    dimension : 2 or 3
+        3 for space.
 
     Raises
     ------
     InputError
-        For matrices that are not square, of equal size and finite, a mass that is not symmetric and
-        positive definite, a symmetric part of the stiffness that is not positive semi-definite,
-        and for rows of wrong width.
+        For matrices of other kinds than these, or of different sizes, and rows of wrong width.
     AnalysisError
         If the modes cannot be computed accurately.
     """
@@ -111,8 +113,8 @@ def basis_from_matrices(
     same_dofs(M, K)
     d = M.matrix.shape[0]
     C = _damping_matrix(damping, M)
-    given = stack_restriction(rows, d)
-    inertia = inertia_of(M.matrix, translations)
+    given = stack_restriction(rows, d, dimension)
+    inertia = inertia_of(M.matrix, translations, dimension)
     held = K.matrix.diagonal() >= _HELD
     if held.all():
         raise InputError(f"{K.name} holds every degree of freedom (entries of 1e35 or more).")
@@ -126,8 +128,8 @@ def basis_from_matrices(
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
     return basis_of_modes(
-        w, shapes, given, contact_x=contact_x, tributary=tributary, thickness=thickness,
-        inertia=inertia,
+        w, shapes, given, contact_x=contact_x, contact_places=contact_places,
+        tributary=tributary, thickness=thickness, inertia=inertia,
         stiffness=None if skew is None else np.diag(w**2) + shapes.T @ (skew @ shapes),
         damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
 
@@ -135,16 +137,20 @@ def basis_from_matrices(
 def basis_of_modes(
     w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
     tributary: ArrayLike | None, thickness: float | None, inertia: Array | None = None,
-    stiffness: Array | None = None,
+    stiffness: Array | None = None, contact_places: ArrayLike | None = None,
 ) -> ModalBasis:
     """Modal basis of modes (d, m) without geometry, from rows of the points.
 
-    ``inertia`` (d, 2) are forces of unit accelerations in x and y, see :func:`inertia_of`.
+    ``inertia`` (d, 2) are forces of unit accelerations in x and y, in space (d, 3), see
+    :func:`inertia_of`.
     """
-    n = rows.contact_nodes
-    T = np.asarray(rows.restriction @ shapes).reshape(-1, 3, len(w))
-    positions = np.zeros((len(T), 2))
-    positions[2 : 2 + n, 0] = _per_node("contact_x", 0.0 if contact_x is None else contact_x, n)
+    n, dimension = rows.contact_nodes, rows.dimension
+    T = np.asarray(rows.restriction @ shapes).reshape(-1, 3 * (dimension - 1), len(w))
+    positions = np.zeros((len(T), dimension))
+    if contact_places is None:
+        positions[2 : 2 + n, 0] = _per_node("contact_x", 0.0 if contact_x is None else contact_x, n)
+    else:
+        positions[2 : 2 + n] = _places(contact_places, contact_x, n, dimension)
     return ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),
@@ -159,17 +165,18 @@ def basis_of_modes(
     )
 
 
-def inertia_of(mass: Any, translations: ArrayLike | None) -> Array | None:
+def inertia_of(mass: Any, translations: ArrayLike | None, dimension: int = 2) -> Array | None:
     """Forces (d, 2) of unit accelerations in x and y, from unit translations (2, d), if given.
 
-    InputError for another shape, or values that are not finite.
+    In space (d, 3) from (3, d). InputError for another shape, or values that are not finite.
     """
     if translations is None:
         return None
     given, d = as_floats(translations, "translations"), mass.shape[0]
-    if given.shape != (2, d) or not np.isfinite(given).all():
-        raise InputError(f"translations must be (2, {d}) finite numbers, the degrees of freedom in "
-                         f"unit translations in x and in y, not of shape {given.shape}.")
+    if given.shape != (dimension, d) or not np.isfinite(given).all():
+        axes = "in x and in y" if dimension == 2 else "in x, y and z"
+        raise InputError(f"translations must be ({dimension}, {d}) finite numbers, the degrees of "
+                         f"freedom in unit translations {axes}, not of shape {given.shape}.")
     return np.asarray(mass @ given.T)
 
 
@@ -353,6 +360,18 @@ def _dense_elastic(K: Any, M: Any, R: Array, count: int) -> tuple[Array, Array]:
     squares = (shapes * (K @ shapes)).sum(axis=0)
     order = np.argsort(squares)
     return squares[order], shapes[:, order]
+
+
+def _places(given: ArrayLike, abscissae: ArrayLike | None, n: int, dimension: int) -> Array:
+    """Reference places (n, dimension) of the contact nodes as given."""
+    if abscissae is not None:
+        raise InputError("Give either contact_x, the abscissae of the contact nodes, or "
+                         "contact_places, all their coordinates.")
+    places = as_floats(given, "contact_places")
+    if places.shape != (n, dimension):
+        raise InputError(f"contact_places must have shape ({n}, {dimension}), a place for each "
+                         f"contact node, not {places.shape}.")
+    return places
 
 
 def _per_node(name: str, values: ArrayLike, n: int) -> Array:

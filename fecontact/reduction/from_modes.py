@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -93,6 +93,8 @@ def basis_from_modes(
     tributary: ArrayLike | None = None,
     thickness: float | None = None,
     translations: ArrayLike | None = None,
+    dimension: Literal[2, 3] = 2,
+    contact_places: ArrayLike | None = None,
 ) -> ModalBasis:
     """Modal basis from computed or measured mode shapes.
 
@@ -116,11 +118,9 @@ def basis_from_modes(
         damping matrix of the mass-normalised shapes [1/s].
     orthogonality : float
         Largest accepted product ``|s_i^T M s_j|`` of two mass-normalised shapes.
-    contact_x, tributary : (n,) arrays, optional
+    contact_x, tributary, thickness, dimension, contact_places : optional
         As for :func:`~fecontact.basis_from_matrices`.
-    thickness : float, optional
-        Likewise.
-    translations : (2, d) array, optional
+    translations : (2, d) array, in space (3, d), optional
         Likewise; needs the mass matrix.
 
     Raises
@@ -137,7 +137,8 @@ def basis_from_modes(
     if translations is not None and mass is None:
         raise InputError("translations need mass, the mass matrix, for the inertia of the body; "
                          "give it instead of modal_mass.")
-    inertia = None if mass is None else inertia_of(given_matrix("mass", mass).matrix, translations)
+    inertia = None if mass is None else inertia_of(
+        given_matrix("mass", mass).matrix, translations, dimension)
     if mass is not None:
         found = normalisation(S, mass)
         masses = found.modal_masses
@@ -158,9 +159,9 @@ def basis_from_modes(
     signs = fixed_signs(S)
     order = np.argsort(w, kind="stable")
     return basis_of_modes(
-        w[order], (S * signs)[:, order], stack_restriction(rows, d), contact_x=contact_x,
-        tributary=tributary, thickness=thickness, damping=_reordered(damping, order, signs),
-        inertia=inertia)
+        w[order], (S * signs)[:, order], stack_restriction(rows, d, dimension),
+        contact_x=contact_x, contact_places=contact_places, tributary=tributary,
+        thickness=thickness, damping=_reordered(damping, order, signs), inertia=inertia)
 
 
 def _shapes(shapes: ArrayLike) -> Array:

@@ -7,10 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
-from fecontact.core.errors import InputError, choices, nearest, require_finite, require_positive
+from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Summarised, count, listed, quantity, span
+from fecontact.fem.faces.frames import tangents_of
 from fecontact.fem.fields import BodyFields
+from fecontact.reduction.basis_checks import (
+    check_groups,
+    check_shapes,
+    check_sides,
+    frozen_arrays,
+)
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
 
@@ -22,7 +29,9 @@ class ModalBasis(Summarised):
     The equations of motion are ``q'' + damping q' + stiffness_matrix q = T^T f + centrifugal_load
     + link_load`` (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless
     ``stiffness`` is given; the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for
-    each, x tangential to the ground, y away from it, phi counter-clockwise.
+    each, x tangential to the ground, y away from it, phi counter-clockwise. In space
+    [x, y, z, phi_x, phi_y, phi_z], x and y tangential, z away from the ground; shapes below are
+    those of the plane with d = 2, in space d = 3.
 
     Attributes
     ----------
@@ -32,14 +41,14 @@ class ModalBasis(Summarised):
     damping : (m, m) array
         Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D. Its skew part is
         gyroscopic and does no work.
-    T : (P, 3, m) array
+    T : (P, 3, m) or (P, 6, m) array
         Rows of excitation point B, load point C, the n contact nodes and further named points;
-        those of a contact node are its motion relative to the other side along its tangent and
-        normal, and its relative rotation.
-    positions : (P, 2) array
+        those of a contact node are its motion relative to the other side along its tangent (in
+        space two) and normal, and its relative rotation (in space about these three).
+    positions : (P, d) array
         Reference places of these points [m].
     tributary : (n,) array
-        Length of the contact face represented by each contact node [m].
+        Length of the contact face represented by each contact node [m], in space area [m^2].
     extra : tuple of str
         Names of the points after the contact nodes.
     mode_shapes : ModeShapes or None
@@ -51,22 +60,23 @@ class ModalBasis(Summarised):
         default one group 'contact'.
     thickness : float or None
         Out-of-plane thickness of the body [m], which makes pressures of line loads; None where it
-        is not known.
-    inertia_rows : (2, m) array or None
-        ``1^T M s`` of the modes s for translations in x and in y [kg^(1/2)]: the modal forces of a
-        unit acceleration; its squares are the effective masses. None if the mass is not known.
+        is not known, and in space.
+    inertia_rows : (d, m) array or None
+        ``1^T M s`` of the modes s for translations along the axes [kg^(1/2)]: the modal forces of
+        a unit acceleration; its squares are the effective masses. None if the mass is not known.
     boundaries : tuple of str
         Named boundaries on which loads can act.
-    boundary_rows : (b, 2, m) array
-        Modal forces of a pressure of 1 Pa on each of them, and of a shear of 1 Pa.
+    boundary_rows : (b, d, m) array
+        Modal forces of a pressure of 1 Pa on each of them, and of a shear of 1 Pa (in space two,
+        along t and t2).
     stiffness : (m, m) array or None
         Full modal stiffness [1/s^2] where it is not ``diag(angular_frequencies^2)``: modes coupled
         by circulatory forces, its skew part, or by rotation.
     rotation : ModalRotation or None
         Rotation of the body, whose Coriolis and stiffening terms damping and stiffness include.
-    contact_normals : (n, 2) array or None
-        Unit normal (n_x, n_y) at each contact node, out of the other side; its tangent is
-        (n_y, -n_x). None means (0, 1) everywhere.
+    contact_normals : (n, d) array or None
+        Unit normal at each contact node, out of the other side; see :attr:`tangents`. None means
+        that of the ground everywhere: (0, 1), in space (0, 0, 1).
     on_ground : (n,) bool array or None
         Whether the other side of each contact node is the ground, not a body; None means all.
     parts : tuple of BodyPart
@@ -110,73 +120,15 @@ class ModalBasis(Summarised):
     first_passes: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
-        m = len(self.angular_frequencies)
+        if np.ndim(self.T) != 3 or np.shape(self.T)[1] not in (3, 6):
+            raise InputError(f"Modal basis: T must have shape (P, 3, m) in the plane or (P, 6, m) "
+                             f"in space, not {np.shape(self.T)}.")
         if not self.boundaries and not np.size(self.boundary_rows):
-            object.__setattr__(self, "boundary_rows", np.zeros((0, 2, m)))
-        arrays = ["angular_frequencies", "damping", "T", "positions", "tributary", "boundary_rows"]
-        arrays += [name for name in ("inertia_rows", "stiffness", "contact_normals", "link_load")
-                   if getattr(self, name) is not None]
-        for name in arrays:
-            array = np.array(getattr(self, name), dtype=float, order="C")
-            if not np.isfinite(array).all():
-                raise InputError(f"Modal basis: {name} holds values that are not finite.")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-        if not (self.tributary > 0.0).all():
-            raise InputError(f"Modal basis: tributary lengths must be above zero, not "
-                             f"{self.tributary.min()}.")
-        if self.thickness is not None:
-            require_positive("Modal basis", thickness=self.thickness)
-            object.__setattr__(self, "thickness", float(self.thickness))
-        groups = tuple((str(name), int(count)) for name, count in self.groups)
-        if not groups and len(self.tributary):
-            groups = (("contact", len(self.tributary)),)
-        if sum(count for _, count in groups) != len(self.tributary):
-            raise InputError(f"Modal basis: the interfaces {groups} do not add up to the "
-                             f"{len(self.tributary)} contact nodes.")
-        object.__setattr__(self, "groups", groups)
-        object.__setattr__(self, "springs", tuple(map(str, self.springs)))
-        if unknown := set(self.springs) - {name for name, _ in groups}:
-            raise InputError(f"Modal basis: springs names {choices(sorted(unknown))}, but the "
-                             f"groups are {choices([name for name, _ in groups])}.")
-        points = 2 + len(self.tributary) + len(self.extra)
-        for name, shape in (("damping", (m, m)), ("T", (points, 3, m)), ("positions", (points, 2)),
-                            ("inertia_rows", (2, m)),
-                            ("boundary_rows", (len(self.boundaries), 2, m)),
-                            ("stiffness", (m, m)), ("link_load", (m,)),
-                            ("contact_normals", (len(self.tributary), 2))):
-            given = getattr(self, name)
-            if given is not None and given.shape != shape:
-                raise InputError(f"Modal basis: {name} must have shape {shape}, not "
-                                 f"{given.shape}.")
-        self._check_sides()
-
-    def _check_sides(self) -> None:
-        """Check normals, other sides and bodies."""
-        if self.contact_normals is not None:
-            lengths = np.linalg.norm(self.contact_normals, axis=1)
-            if (np.abs(lengths - 1.0) > 1e-9).any():
-                worst = int(np.argmax(np.abs(lengths - 1.0)))
-                raise InputError(f"Modal basis: the normal of contact node {worst} has the length "
-                                 f"{lengths[worst]:.6g}; contact_normals must be of length one.")
-        if self.on_ground is not None:
-            given = np.array(self.on_ground)
-            if given.shape != self.tributary.shape or given.dtype != bool:
-                raise InputError(f"Modal basis: on_ground must be {self.contact_nodes} flags, true "
-                                 f"or false, not an array of shape {given.shape} of {given.dtype}.")
-            given.setflags(write=False)
-            object.__setattr__(self, "on_ground", given)
-        object.__setattr__(self, "parts", tuple(self.parts))
-        names = [part.name for part in self.parts]
-        if len(set(names)) < len(names):
-            raise InputError(f"Modal basis: the bodies {listed(names)} must have different names.")
-        nodes = 0 if self.mode_shapes is None else len(self.mode_shapes.nodes)
-        for part in self.parts:
-            for what, (first, size), total in (("modes", part.modes, self.modes),
-                                               ("nodes", part.nodes, nodes)):
-                if not 0 <= first <= first + size <= total:
-                    raise InputError(f"Modal basis: body '{part.name}' has {size} {what} from "
-                                     f"{first}, but there are {total}.")
+            object.__setattr__(self, "boundary_rows", np.zeros((0, self.dimension, self.modes)))
+        frozen_arrays(self)
+        check_groups(self)
+        check_shapes(self)
+        check_sides(self)
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes, frequencies, damping, contact nodes and points."""
@@ -207,6 +159,11 @@ class ModalBasis(Summarised):
         ]
 
     @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return 2 if np.shape(self.T)[1] == 3 else 3
+
+    @property
     def modes(self) -> int:
         """Number of modes m."""
         return len(self.angular_frequencies)
@@ -223,10 +180,21 @@ class ModalBasis(Summarised):
 
     @property
     def normals(self) -> Array:
-        """Unit normal (n, 2) at each contact node, out of the other side."""
+        """Unit normal (n, d) at each contact node, out of the other side."""
         if self.contact_normals is None:
-            return np.tile([0.0, 1.0], (self.contact_nodes, 1))
+            return np.eye(self.dimension)[[-1] * self.contact_nodes]
         return self.contact_normals
+
+    @property
+    def tangents(self) -> Array:
+        """Unit tangents at each contact node: (n, 2), ``(n_y, -n_x)``; in space (n, 2, 3), t, t2.
+
+        There t is the projection of global x on the tangent plane (of y where the normal is within
+        10 degrees of x), ``t2 = n x t``.
+        """
+        if self.dimension == 2:
+            return self.normals[:, ::-1] * [1.0, -1.0]
+        return tangents_of(self.normals)
 
     @property
     def ground_nodes(self) -> NDArray[np.bool_]:
@@ -281,12 +249,12 @@ class ModalBasis(Summarised):
 
     @property
     def T_matrix(self) -> Array:
-        """T (3 (2 + n), m) in the order of (4.1-13): B, C, contact nodes."""
+        """T (3 (2 + n), m), in space (6 (2 + n), m), in the order of (4.1-13): B, C, contact."""
         return self.T[: 2 + self.contact_nodes].reshape(-1, self.modes)
 
     @property
     def contact_T(self) -> Array:
-        """Rows (n, 3, m) of the contact nodes."""
+        """Rows (n, 3, m), in space (n, 6, m), of the contact nodes."""
         return self.T[2 : 2 + self.contact_nodes]
 
     @property
@@ -295,11 +263,18 @@ class ModalBasis(Summarised):
         return self.positions[2 : 2 + self.contact_nodes, 0]
 
     @property
+    def contact_places(self) -> Array:
+        """Reference places (n, d) of the contact nodes [m]."""
+        return self.positions[2 : 2 + self.contact_nodes]
+
+    @property
     def contact_areas(self) -> Array:
         """Area (n,) of the contact face represented by each contact node [m^2].
 
-        InputError for a basis without thickness.
+        InputError for a basis of the plane without thickness.
         """
+        if self.dimension == 3:
+            return self.tributary
         if self.thickness is None:
             raise InputError("There are no areas and pressures: the modal basis has no thickness; "
                              "give thickness=... [m] where the basis is made, or use the "
@@ -328,28 +303,28 @@ class ModalBasis(Summarised):
 
     @property
     def elastic_compliance(self) -> Array:
-        """Displacement (P, 2) of each point in x and y per unit force there, in elastic modes.
+        """Displacement (P, d) of each point along each axis per unit force there, in elastic modes.
 
         That of uncoupled modes: of the body without circulatory forces and rotation.
         """
         elastic = self.angular_frequencies > 0.0
-        rows = self.T[:, :2, elastic] / self.angular_frequencies[elastic]
+        rows = self.T[:, : self.dimension, elastic] / self.angular_frequencies[elastic]
         return np.asarray((rows**2).sum(axis=2))
 
     @property
     def elastic_load_compliance(self) -> Array:
         """``f^T u`` of gravity and of the boundary loads as in ReductionQuality, in elastic modes.
 
-        (1 + b, 2); NaN for gravity without rows of inertia.
+        (1 + b, d); NaN for gravity without rows of inertia.
         """
-        gravity = np.full((2, self.modes), np.nan) if self.inertia_rows is None else (
+        gravity = np.full((self.dimension, self.modes), np.nan) if self.inertia_rows is None else (
             self.inertia_rows)
         elastic = self.angular_frequencies > 0.0
         rows = np.concatenate([gravity[None], self.boundary_rows])[..., elastic]
         return np.asarray(((rows / self.angular_frequencies[elastic]) ** 2).sum(axis=2))
 
     def boundary_row(self, boundary: str) -> Array:
-        """Rows (2, m) of :attr:`boundary_rows` by name; InputError for an unknown boundary."""
+        """Rows (d, m) of :attr:`boundary_rows` by name; InputError for an unknown boundary."""
         if boundary not in self.boundaries:
             raise InputError(f"The basis has no boundary '{boundary}'"
                              f"{nearest(boundary, self.boundaries)}; its boundaries are: "
@@ -377,13 +352,13 @@ class ModalBasis(Summarised):
         return BodyFields(shapes.nodes, shapes.cells if shapes.elements is None
                           else shapes.elements, shapes.shapes @ values, shapes.stress @ values)
 
-    def with_dashpots(self, dashpots: Mapping[str | int, tuple[float, float]]) -> "ModalBasis":
+    def with_dashpots(self, dashpots: Mapping[str | int, Sequence[float]]) -> "ModalBasis":
         """A copy with dashpots between points of the body and the inertial frame.
 
         Parameters
         ----------
-        dashpots : mapping of point to (b_x, b_y)
-            Points by name, contact nodes by number; damping in x and in y, zero or above
+        dashpots : mapping of point to (b_x, b_y), in space (b_x, b_y, b_z)
+            Points by name, contact nodes by number; damping along the axes, zero or above
             [N s/m]. ``b row^T row`` is added to the modal damping matrix, which becomes full.
 
         Raises
@@ -395,9 +370,11 @@ class ModalBasis(Summarised):
         require_kind("with_dashpots", Mapping, dashpots=dashpots)
         for point, given in dashpots.items():
             values = as_floats(given, f"Dashpot at {point!r}: damping")
-            if values.shape != (2,):
-                raise InputError(f"Dashpot at {point!r}: damping must be two numbers, b_x and b_y, "
-                                 f"not an array of shape {values.shape}.")
+            if values.shape != (self.dimension,):
+                number = ("two numbers, b_x and b_y" if self.dimension == 2 else
+                          "three numbers, b_x, b_y and b_z")
+                raise InputError(f"Dashpot at {point!r}: damping must be {number}, not an array of "
+                                 f"shape {values.shape}.")
             for row, b in zip(self.T[self.point_index(point)], values.tolist(), strict=False):
                 if not 0.0 <= b < np.inf:
                     raise InputError(f"Dashpot at {point!r}: damping {b!r} must be finite and "

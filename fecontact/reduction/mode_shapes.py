@@ -17,22 +17,25 @@ class ModeShapes:
 
     Attributes
     ----------
-    nodes : (N, 2) array
-        Reference places of the displacement nodes [m].
-    cells : (M, 3) or (M, 4) integer array
-        First-order cells between these nodes (four per finite element).
-    outline : (k, 2) integer array
-        Edges on the outline, as pairs of nodes.
-    shapes : (N, 2, m) array
-        Mass-normalised mode shapes, x and y.
-    stress : (N, 4, m) array
-        Stresses xx, yy, zz, xy of the modes, averaged at the nodes [Pa per unit coordinate].
-    restriction : sparse (3 P, 2 N) array
-        Displacements and rotation of the P points from those of the nodes (node by node, x then y),
-        so that ``T = restriction @ shapes``; its transpose distributes a force at a point over the
-        nodes.
+    nodes : (N, d) array
+        Reference places of the displacement nodes [m], d = 2 in the plane, 3 in space.
+    cells : (M, 3) or (M, 4), of solids (M, 4) or (M, 8) integer array
+        First-order cells between these nodes (four per finite element, of solids eight).
+    outline : (k, 2), of solids (k, 3) or (k, 4) integer array
+        Edges on the outline, as pairs of nodes; first-order facets of the surface, their nodes
+        counter-clockwise seen from outside.
+    shapes : (N, d, m) array
+        Mass-normalised mode shapes along the axes.
+    stress : (N, 4, m), of solids (N, 6, m) array
+        Stresses xx, yy, zz, xy, of solids also yz, zx, of the modes, averaged at the nodes [Pa per
+        unit coordinate].
+    restriction : sparse (3 P, 2 N), of solids (6 P, 3 N) array
+        Displacements and rotations of the P points from those of the nodes (node by node), so that
+        ``T = restriction @ shapes``; its transpose distributes a force at a point over the nodes.
     elements : (E, k) integer array, optional
         Nodes of each finite element: corners, mid-sides, centre; by default the cells.
+    outline_nodes : (k,) integer array, optional
+        Contact node to whose patch each facet of a solid's outline belongs, -1 for none.
     """
 
     nodes: Array
@@ -42,15 +45,16 @@ class ModeShapes:
     stress: Array
     restriction: Any
     elements: Integers | None = None
+    outline_nodes: Integers | None = None
 
     def rows_at(self, place: Sequence[float], name: str) -> Array:
-        """Displacement x, y and rotation (3, m) of the modes at a place within an element.
+        """Displacements and rotations (3, m) of the modes at a place within an element, or (6, m).
 
         InputError, with ``name`` in front, for a place outside the body.
         """
         elements = self.cells if self.elements is None else self.elements
         rows = rotating_rows(len(self.nodes), *interpolation(self.nodes, elements, place, name))
-        return np.asarray(rows @ self.shapes.reshape(2 * len(self.nodes), -1))
+        return np.asarray(rows @ self.shapes.reshape(self.nodes.size, -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +71,13 @@ class ReductionQuality:
         ``|K s - w^2 M s| / (|K| |s|)`` of each mode s; small for eigenmodes only.
     orthogonality : float
         Largest entry of ``shapes^T M shapes - 1``.
-    compliance : (P, 2) array
-        Elastic displacement of each point in x and y per unit force there, of the full body (loads
-        are balanced by supports and inertia) [m/N].
-    load_compliance : (1 + b, 2) array
+    compliance : (P, d) array
+        Elastic displacement of each point along each axis per unit force there, of the full body
+        (loads are balanced by supports and inertia) [m/N].
+    load_compliance : (1 + b, d) array
         Work ``f^T u`` of the loads in the elastic displacement under them, of the full body:
-        gravity of 1 m/s^2 in x and y [N m], then for each of the b boundaries pressure and
-        shear of 1 Pa.
+        gravity of 1 m/s^2 along each axis [N m], then for each of the b boundaries pressure and
+        shear (in space shears) of 1 Pa.
     """
 
     mass: float

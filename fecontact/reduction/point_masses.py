@@ -1,7 +1,7 @@
 """Bases of point masses with springs and dashpots, without a mesh."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,8 +36,8 @@ def point_masses(
         components or one for each, zero or above [N/m].
     dashpots : mapping of (name, name) to damping, optional
         Likewise [N s/m].
-    components : 'x', 'y' or 'xy'
-        Directions in which the masses move; springs in x and in y are independent.
+    components : 'x', 'y' or 'xy', in space 'z', 'xz', 'yz' or 'xyz'
+        Directions in which the masses move; springs along them are independent.
     contact : str or sequence of str
         Masses that are contact nodes on the ground, in the order of the nodes.
 
@@ -47,8 +47,10 @@ def point_masses(
         For masses that are not positive, unknown names, and values of wrong number or sign.
     """
     require_kind("point_masses", Mapping, masses=masses)
-    if components not in ("x", "y", "xy"):
-        raise InputError(f"point_masses: components = {components!r} must be 'x', 'y' or 'xy'.")
+    if components not in ("x", "y", "xy", "z", "xz", "yz", "xyz"):
+        raise InputError(f"point_masses: components = {components!r} must be 'x', 'y' or 'xy', in "
+                         f"space 'z', 'xz', 'yz' or 'xyz'.")
+    dimension: Literal[2, 3] = 3 if "z" in components else 2
     if not masses:
         raise InputError("point_masses: masses is empty; give at least one.")
     for name, value in masses.items():
@@ -61,19 +63,20 @@ def point_masses(
         _require_mass("contact", name, masses)
     rows = {}
     for name, i in numbers.items():
-        rows[name] = np.zeros((3, d))
+        rows[name] = np.zeros((3 * (dimension - 1), d))
         for k, axis in enumerate(components):
-            rows[name]["xy".index(axis), axes * i + k] = 1.0
+            rows[name]["xyz".index(axis), axes * i + k] = 1.0
     given: dict[str, Any] = dict(rows)
     if touching:
         given["contact"] = np.array([rows[name] for name in touching])
-    along = np.zeros((2, d))
+    along = np.zeros((dimension, d))
     for k, axis in enumerate(components):
-        along["xy".index(axis), k::axes] = 1.0
+        along["xyz".index(axis), k::axes] = 1.0
     return basis_from_matrices(
         np.diag(np.repeat([float(value) for value in masses.values()], axes)),
         _between("springs", springs, numbers, axes), given,
-        damping=_between("dashpots", dashpots, numbers, axes), translations=along)
+        damping=_between("dashpots", dashpots, numbers, axes), translations=along,
+        dimension=dimension)
 
 
 def _between(

@@ -11,8 +11,10 @@ from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.tables import located
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
-from fecontact.fem.contact_face import contact_groups
+from fecontact.fem.contact_face import ContactNodes, contact_groups
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.elements.cell_kinds import numbered_rows
+from fecontact.fem.faces.surface import linear_facets
 from fecontact.fem.fields import body_elements, linear_cells, stress_of
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.fem.points import Place, Rows, place_rows
@@ -24,8 +26,13 @@ from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_mode
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import modal_rotation
+from fecontact.reduction.solvers.solid_solver import Eigensolver
 from fecontact.reduction.static_modes.craig_bampton import craig_bampton
-from fecontact.reduction.static_modes.residual_vectors import Flexibility, residual_modes
+from fecontact.reduction.static_modes.residual_vectors import (
+    Flexibility,
+    flexibility_of,
+    residual_modes,
+)
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
@@ -45,8 +52,9 @@ def modal_basis(
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
     rows: Any = (),
+    eigensolver: Eigensolver = "auto",
 ) -> ModalBasis:
-    """Mass-normalised modes, and T at B, C and the contact nodes.
+    """Mass-normalised modes of a plane body or solid, and T at B, C and the contact nodes.
 
     Parameters
     ----------
@@ -55,12 +63,12 @@ def modal_basis(
     modes : int
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground, facing -y; each of several is an interface. Or none, ().
+        Boundary that touches the ground, facing -y, of solids -z; several interfaces; or none, ().
     contact_nodes : int or 'all', or one of them for each boundary
-        Number of equal segments of the boundary, each with a contact node at its centre that moves
-        with the segment's mean displacement; 'all' takes every displacement node of the boundary.
+        Number of equal segments of the boundary, each a contact node with the mean displacement;
+        'all' takes every displacement node. Of solids patches of about equal area, or every facet.
     B, C : place, optional
-        Excitation and load point: the name of a point or boundary of the mesh, (x, y), or a
+        Excitation and load point: the name of a point or boundary of the mesh, coordinates, or a
         :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.
     points : mapping of name to place, optional
         Further points to observe.
@@ -71,13 +79,15 @@ def modal_basis(
         static deflections there; or fixed-interface and constraint modes.
     tolerance : float
         For 'residual': largest fraction of its static compliance that may be missing at any of
-        these points, in x or y, or for one of the loads. Zero keeps all residual vectors.
+        these points along an axis, or for one of the loads. Zero keeps all residual vectors.
     loads : sequence of 'gravity' or place
         Adds static responses, if not for 'vibration': 'gravity', loads on boundaries, at points.
     rotation : Rotation, optional
-        The body rotates; displacements are those in its frame, modes those at rest.
-    rows : sequence of sparse (k, 2 N) arrays
+        The plane body rotates; displacements are those in its frame, modes those at rest.
+    rows : sequence of sparse (k, d N) arrays
         Further motions on which forces act; see :func:`fecontact.reduction.reduce_bodies`.
+    eigensolver : 'auto', 'direct' or 'iterative'
+        Of solids, see :func:`fecontact.reduction.eigenmodes.eigenmodes`.
 
     Raises
     ------
@@ -100,6 +110,9 @@ def modal_basis(
                          f"{nearest(str(reduction), get_args(Reduction))}.")
     if not 0.0 <= tolerance < 1.0:
         raise InputError(f"tolerance = {tolerance!r} must be zero or above, and below one.")
+    d = body.dimension
+    if rotation is not None and d == 3:
+        raise InputError("rotation is that of plane bodies; leave it out for a solid.")
     face = contact_groups(body, contact, contact_nodes)
     named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
     further = [place_rows(body, place, name) for name, place in points.items()]
@@ -108,16 +121,16 @@ def modal_basis(
     if loads and reduction == "vibration":
         raise InputError("loads complete the modes only with reduction = 'residual' or "
                          "'craig-bampton'; choose one of these, or leave loads out.")
-    system = FreeSystem.of(body)
+    system = FreeSystem.of(body, eigensolver)
     completing = loading(body, system, loads, points)
-    # At B, C and the contact nodes there are forces in x and y, but no moments.
-    at_points = sp.csr_array(restriction[np.arange(restriction.shape[0]) % 3 < 2])
+    # At B, C and the contact nodes there are forces, but no moments.
+    at_points = sp.csr_array(displacement_rows(restriction, d))
     further_rows = [_given_rows(body, given) for given in rows]
-    flexibility = Flexibility(system, sp.csr_array(
+    flexibility = flexibility_of(system, sp.csr_array(
         sp.vstack([at_points, *further_rows]) @ body.expansion))
     row = np.arange(len(flexibility.rows.indptr) - 1)
     is_point = row < at_points.shape[0]
-    used = (row < 2 * (2 + len(face.tributary))) | ~is_point
+    used = (row < d * (2 + len(face.tributary))) | ~is_point
     w, free_shapes, vibration = _modes(system, flexibility.of_rows(used), modes, reduction,
                                        tolerance, completing)
     shapes = body.expansion @ free_shapes
@@ -135,7 +148,7 @@ def modal_basis(
     basis = ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),
-        T=(restriction @ shapes).reshape(-1, 3, len(w)),
+        T=(restriction @ shapes).reshape(-1, 3 * (d - 1), len(w)),
         positions=np.array([*(row.position for row in named), *face.positions,
                             *(row.position for row in further)]),
         tributary=face.tributary,
@@ -143,16 +156,17 @@ def modal_basis(
         mode_shapes=ModeShapes(
             nodes=body.nodes,
             cells=linear_cells(body.nodes, elements),
-            outline=_halved(body.edge_nodes(body.mesh.outline)),
-            shapes=shapes.reshape(-1, 2, len(w)),
+            outline=_outline(body),
+            shapes=shapes.reshape(-1, d, len(w)),
             stress=stress_of(body, shapes),
             restriction=restriction,
             elements=elements,
+            outline_nodes=None if d == 2 else _nodes_of_outline(body, face),
         ),
         quality=_quality(body, system, flexibility.of_rows(is_point), w, free_shapes, vibration,
                          forces),
         groups=face.groups,
-        thickness=body.thickness,
+        thickness=body.thickness if d == 2 else None,
         inertia_rows=rows[0],
         boundaries=names,
         boundary_rows=rows[1:],
@@ -230,7 +244,7 @@ def reduce_bodies(
             if seams:
                 # Faces that lack some of their motions could not follow each other.
                 given["tolerance"] = 0.0
-            rows = [one[np.arange(one.shape[0]) % 3 < 2] for one in rows] + ending + seams
+            rows = [displacement_rows(one, body.dimension) for one in rows] + ending + seams
             found[name] = modal_basis(body, counts[name], rows=rows, **given)
     return found
 
@@ -254,6 +268,11 @@ def ends_of_bodies(
     return found
 
 
+def displacement_rows(rows: Any, dimension: int) -> Any:
+    """Of rows of points, those of displacements, without those of rotations."""
+    return rows[np.arange(rows.shape[0]) % (3 * (dimension - 1)) < dimension]
+
+
 def _nowhere(place: Place) -> bool:
     return isinstance(place, str) and not place
 
@@ -266,9 +285,9 @@ def _given_rows(body: ElasticBody, given: Any) -> Any:
     import scipy.sparse as sp
 
     rows = sp.csr_array(given)
-    if rows.shape[1] != 2 * len(body.nodes):
+    if rows.shape[1] != body.nodes.size:
         raise InputError(f"modal_basis: rows of shape {rows.shape} must be (k, "
-                         f"{2 * len(body.nodes)}), motions from the displacements of the nodes of "
+                         f"{body.nodes.size}), motions from the displacements of the nodes of "
                          f"this body; pair the faces of the same bodies.")
     return rows
 
@@ -293,7 +312,8 @@ def _joints(
                                      f"'{name}.end'.")
                 where = point if place is None or _nowhere(place) else place
                 matrix = place_rows(body, where, point).matrix
-                rows.append(matrix if isinstance(link, Weld | Bushing) else matrix[:2])
+                rows.append(matrix if isinstance(link, Weld | Bushing)
+                            else matrix[: body.dimension])
     return known, rows
 
 
@@ -319,17 +339,18 @@ def _quality(
     body: ElasticBody, system: FreeSystem, flexibility: Flexibility, w: Array, shapes: Array,
     vibration: int, forces: Array,
 ) -> ReductionQuality:
-    """``forces`` (1 + b, 2 N, 2) are those of gravity and of the boundary loads."""
+    """``forces`` (1 + b, d N, d) are those of gravity and of the boundary loads."""
+    d = body.dimension
     inertia = system.mass @ shapes
     free = np.hstack([body.expansion.T @ one for one in forces])
     return ReductionQuality(
-        mass=float(body.mesh.area * body.thickness * body.material.density),
+        mass=body.total_mass,
         vibration_modes=vibration,
         residuals=backward_error(system.stiffness, system.mass, w**2, shapes),
         orthogonality=float(np.abs(shapes.T @ inertia - np.eye(len(w))).max()),
-        compliance=np.maximum(np.diag(flexibility.compliance), 0.0).reshape(-1, 2),
-        load_compliance=(free * system.deflection(free)).sum(axis=0).reshape(-1, 2)
-        * _deforms(system, free).reshape(-1, 2),
+        compliance=np.maximum(np.diag(flexibility.compliance), 0.0).reshape(-1, d),
+        load_compliance=(free * system.deflection(free)).sum(axis=0).reshape(-1, d)
+        * _deforms(system, free).reshape(-1, d),
     )
 
 
@@ -342,9 +363,9 @@ def _deforms(system: FreeSystem, forces: Array) -> Array:
 def loading(
     body: ElasticBody, system: FreeSystem, loads: Sequence[Place], points: Mapping[str, Place]
 ) -> Array:
-    """Forces (f, k) on the free degrees of freedom of named loads, two for each."""
+    """Forces (f, k) on the free degrees of freedom of named loads, one along each axis."""
     require_kind("modal_basis", (list, tuple), loads=loads)
-    found = [np.zeros((2 * len(body.nodes), 0))]
+    found = [np.zeros((body.nodes.size, 0))]
     for load in loads:
         if str(load) == "gravity":
             found.append(inertia_forces(body))
@@ -352,7 +373,8 @@ def loading(
             found.append(boundary_forces(body, load))
         else:
             place = points.get(load, load) if isinstance(load, str) else load
-            found.append(place_rows(body, place, f"of loads ({load})").matrix[:2].T.toarray())
+            rows = place_rows(body, place, f"of loads ({load})").matrix[: body.dimension]
+            found.append(rows.T.toarray())
     forces = np.asarray(body.expansion.T @ np.hstack(found))
     return forces[:, _deforms(system, forces)] if forces.shape[1] else forces
 
@@ -363,9 +385,27 @@ def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
     if place is None and _has(body, name):
         return place_rows(body, name, name)
     if place is None or _nowhere(place):
-        return Rows(sp.csr_array((3, 2 * len(body.nodes))), np.zeros(2))
+        return Rows(sp.csr_array((3 * (body.dimension - 1), body.nodes.size)),
+                    np.zeros(body.dimension))
     return place_rows(body, place, name)
 
 
-def _halved(edges: Integers) -> Integers:
-    return np.concatenate([edges[:, i : i + 2] for i in range(edges.shape[1] - 1)])
+def _outline(body: ElasticBody) -> Integers:
+    """First-order edges (k, 2), or facets of a solid, between the nodes of the outline."""
+    sides = body.facet_nodes(body.mesh.outline)
+    if body.dimension == 3:
+        return linear_facets(sides)
+    return np.concatenate([sides[:, i : i + 2] for i in range(sides.shape[1] - 1)])
+
+
+def _nodes_of_outline(body: ElasticBody, face: ContactNodes) -> Integers:
+    """Contact node of each first-order facet of the outline, -1 for none."""
+    sides = body.mesh.outline
+    groups = [body.mesh.boundaries[name] for name, _ in face.groups]
+    number = numbered_rows(np.sort(np.concatenate([sides, *groups]), axis=1))[1]
+    row = np.empty(int(number.max()) + 1, dtype=np.int64)
+    row[number[: len(sides)]] = np.arange(len(sides))
+    found = np.full(len(sides), -1)
+    if face.owner is not None:
+        found[row[number[len(sides) :]]] = face.owner
+    return np.tile(found, len(linear_facets(body.facet_nodes(sides[:1]))))

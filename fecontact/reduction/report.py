@@ -33,29 +33,29 @@ class BasisReport:
 
     @property
     def effective_mass(self) -> Array:
-        """Share (2, m) of the body's mass that moves with each mode, in x and in y."""
+        """Share (d, m) of the body's mass that moves with each mode, along each axis."""
         quality, rows = self.basis.quality, self.basis.inertia_rows
         if quality is None or rows is None:
-            return np.full((2, self.basis.modes), np.nan)
+            return np.full((self.basis.dimension, self.basis.modes), np.nan)
         return np.asarray(rows**2 / quality.mass)
 
     @cached_property
     def compliance_error(self) -> Array:
-        """Fraction (P, 2) of each point's elastic compliance in x and y missing in the basis.
+        """Fraction (P, d) of each point's elastic compliance along each axis that is missing.
 
         Zero for points and directions that do not deflect.
         """
         quality = self.basis.quality
         if quality is None:
-            return np.full((len(self.basis.T), 2), np.nan)
+            return np.full((len(self.basis.T), self.basis.dimension), np.nan)
         return _missing(self.basis.elastic_compliance, quality.compliance)
 
     @cached_property
     def load_error(self) -> Array:
-        """Fraction (1 + b, 2) of the elastic response to loads that is missing in the basis.
+        """Fraction (1 + b, d) of the elastic response to loads that is missing in the basis.
 
-        Gravity in x and y, then pressure and shear on each of ``basis.boundaries``; zero for loads
-        that do not deform the body.
+        Gravity along each axis, then pressure and shear (in space two) on each of
+        ``basis.boundaries``; zero for loads that do not deform the body.
         """
         quality, kept = self.basis.quality, self.basis.elastic_load_compliance
         if quality is None:
@@ -65,7 +65,7 @@ class BasisReport:
 
     @property
     def contact_error(self) -> Array:
-        """:attr:`compliance_error` (n, 2) of the contact nodes."""
+        """:attr:`compliance_error` (n, d) of the contact nodes."""
         return self.compliance_error[2 : 2 + self.basis.contact_nodes]
 
     @property
@@ -117,7 +117,7 @@ class BasisReport:
             return (f"Static deflections of the contact nodes are right to {100 * worst:.2g} %; "
                     f"the basis can be used up to about {self._valid_hz:.4g} Hz.")
         return (f"Contact node {node} is too stiff: {100 * worst:.0f} % of its elastic compliance "
-                f"in {'xy'[axis]} is missing. Complete the modes with reduction = \"residual\" "
+                f"in {'xyz'[axis]} is missing. Complete the modes with reduction = \"residual\" "
                 f"(tolerance {_GOOD:g} or less), or keep more modes.")
 
     @property
@@ -132,18 +132,21 @@ class BasisReport:
         return float(above[len(above) // 2]) / 1.5 if above.size else 0.0
 
     def _loaded_points(self) -> list[tuple[str, str, float]]:
-        """B in x and y, C in y, where they have rows."""
-        rows = np.asarray(np.abs(self.basis.T[:2, :2]).max(axis=2)) > 0.0
-        return [("BC"[point], "xy"[axis], float(self.compliance_error[point, axis]))
-                for point, axis in ((0, 0), (0, 1), (1, 1)) if rows[point, axis]]
+        """B along each axis, C along the normal, where they have rows."""
+        d = self.basis.dimension
+        rows = np.asarray(np.abs(self.basis.T[:2, :d]).max(axis=2)) > 0.0
+        return [("BC"[point], "xyz"[axis], float(self.compliance_error[point, axis]))
+                for point, axis in (*((0, axis) for axis in range(d)), (1, d - 1))
+                if rows[point, axis]]
 
     def _load_lines(self) -> list[str]:
         assert self.basis.quality is not None
         gravity, *boundaries = self.load_error
         whole = self.basis.quality.load_compliance[1:]
-        return [f"missing static response to gravity: x {gravity[0]:.2%}, y {gravity[1]:.2%}",
+        return [f"missing static response to gravity: {_along_axes(gravity)}",
                 *(f"missing static response to loads on '{name}': pressure {pressure:.2%}, shear "
-                  f"{shear:.2%}" for name, (pressure, shear), work in zip(
+                  f"{' and '.join(f'{shear:.2%}' for shear in shears)}"
+                  for name, (pressure, *shears), work in zip(
                       self.basis.boundaries, boundaries, whole, strict=True) if work.any())]
 
     @property
@@ -157,8 +160,8 @@ class BasisReport:
 
     def __str__(self) -> str:
         basis, mass = self.basis, self.effective_mass
-        lines = [f"{'mode':>4s} {'frequency [Hz]':>15s} {'damping':>9s} {'mass x':>8s} "
-                 f"{'mass y':>8s}  kind"]
+        masses = " ".join(f"{f'mass {axis}':>8s}" for axis in "xyz"[: basis.dimension])
+        lines = [f"{'mode':>4s} {'frequency [Hz]':>15s} {'damping':>9s} {masses}  kind"]
         diagonal = np.diag(basis.damping)
         first = {part.modes[0]: part.name for part in basis.parts if part.modes[1]}
         number = 0
@@ -175,12 +178,12 @@ class BasisReport:
         error = self.contact_error
         if np.isfinite(error).all() and error.size and basis.rigid_modes < basis.modes:
             lines += ["", "missing static compliance at the contact nodes: "
-                      f"x {error[:, 0].max():.2%}, y {error[:, 1].max():.2%} at most, "
-                      f"x {error[:, 0].mean():.2%}, y {error[:, 1].mean():.2%} on average",
+                      f"{_along_axes(error.max(axis=0))} at most, "
+                      f"{_along_axes(error.mean(axis=0))} on average",
                       *(f"missing static compliance at {name}: {axis} {error:.2%}"
                         for name, axis, error in self._loaded_points()),
                       *self._load_lines(),
-                      f"effective mass kept: x {mass[0].sum():.2%}, y {mass[1].sum():.2%}",
+                      f"effective mass kept: {_along_axes(mass.sum(axis=1))}",
                       f"mass-orthogonality: {self.orthogonality:.1e}"]
         if self.highest_frequency_hz > 0.0:
             lines.append(f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by "
@@ -190,6 +193,10 @@ class BasisReport:
                          f"{quantity(basis.rotation.speed, 'rad/s')}")
         lines.append(self.recommendation)
         return "\n".join(lines)
+
+
+def _along_axes(fractions: Array) -> str:
+    return ", ".join(f"{axis} {value:.2%}" for axis, value in zip("xyz", fractions, strict=False))
 
 
 def _missing(kept: Array, whole: Array) -> Array:

@@ -71,7 +71,7 @@ def _stress_stiffening(
     stiffening = np.asarray(0.5 * (geometric + geometric.T))
     rigid = E @ (system.rigid @ (system.rigid.T @ (E.T @ force)))
     reaction = (body.stiffness @ stretched - force + body.mass @ rigid).reshape(-1, 2)
-    for nodes, centre in body.hinges:
+    for nodes, centre, *_ in body.hinges:
         # Nodes at r run on circles: turned by an angle a they also move by -a^2 r / 2.
         arm = body.nodes[nodes] - centre
         motion = shapes.reshape(-1, 2, shapes.shape[1])[nodes]

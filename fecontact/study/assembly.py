@@ -98,7 +98,7 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         gap = _gaps(study, reduced, title)
     else:
         with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
-            gap = gap_values(study.gap, basis.contact_x)
+            gap = gap_values(study.gap, basis.contact_places)
     parts: dict[str, Any] = {part: getattr(study, part) for part in PART_CLASSES}
     for part in LAWS:
         own = _own(study, part)
@@ -137,7 +137,7 @@ def _gaps(study: Described, reduced: Reduced, title: str) -> Any:
             continue
         with located(f"{title}: [interfaces.{name}]:", "Crown"):
             gaps[nodes] += np.asarray(gap_values(study.interfaces[name].gap,
-                                                 reduced.basis.contact_x[nodes]))
+                                                 reduced.basis.contact_places[nodes]))
     return gaps
 
 

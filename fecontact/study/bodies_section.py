@@ -10,7 +10,7 @@ import numpy as np
 from fecontact.core.docstrings import inherit_documentation
 from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.tables import from_table, located, plain, require_known, shown, to_table
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
@@ -43,24 +43,29 @@ class Placement:
 
     Parameters
     ----------
-    shift : (float, float)
-        Displacement along x and y [m].
-    rotation : float
-        Angle about the origin [degrees], counter-clockwise.
-    mirror : 'x' or 'y', optional
+    shift : (float, float), of solids three floats
+        Displacement along x, y (, z) [m].
+    rotation : float, of solids also three floats
+        Angle about the origin [degrees], counter-clockwise (of solids about z); or angles about
+        x, then y, then z.
+    mirror : 'x', 'y' or, of solids, 'z', optional
         The coordinate that changes its sign.
     """
 
-    shift: Annotated[tuple[float, float], Unit("m")] = (0.0, 0.0)
-    rotation: Annotated[float, Unit("degrees")] = 0.0
-    mirror: Literal["x", "y"] | None = None
+    shift: Annotated[Coordinates, Unit("m")] = (0.0, 0.0)
+    rotation: Annotated[float | tuple[float, float, float], Unit("degrees")] = 0.0
+    mirror: Literal["x", "y", "z"] | None = None
 
     def __post_init__(self) -> None:
-        require_finite("Placement", rotation=self.rotation, x=self.shift[0], y=self.shift[1])
+        angles = self.rotation if isinstance(self.rotation, tuple) else (self.rotation,)
+        require_finite("Placement", **dict(zip("xyz", self.shift, strict=False)))
+        for angle in angles:
+            require_finite("Placement", rotation=angle)
 
     def placed(self, mesh: Mesh) -> Mesh:
         """The mesh in its place."""
-        return mesh if self == Placement() else mesh.placed(self.shift, self.rotation, self.mirror)
+        shift = self.shift if any(self.shift) else None
+        return mesh if self == Placement() else mesh.placed(shift, self.rotation, self.mirror)
 
 
 @dataclass(frozen=True)
@@ -75,8 +80,8 @@ class BodyBasisSettings(BasisSettings):
         Not for several bodies, of which interfaces name the faces.
     B, C : place, optional
         Excitation and load point, which one body alone can have: name of a point or boundary,
-        [x, y], or a patch ``{at = name or [x, y], radius = r}``. By default the points of these
-        names of the only mesh that has them.
+        [x, y], of solids [x, y, z], or a patch ``{at = name or place, radius = r}``. By default
+        the points of these names of the only mesh that has them.
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Static shapes added to the vibration modes; by default those of forces at the interfaces.
     """
@@ -101,7 +106,7 @@ class BodySections:
 
     Parameters
     ----------
-    geometry : Beam, Pendulum, Block or MeshFile
+    geometry : Beam, Pendulum, Block, a solid or MeshFile
         ``[bodies.NAME.geometry]``: as ``[geometry]`` of a single body, in its own coordinates.
     placement : Placement
         ``[bodies.NAME.placement]``: shift, rotation and mirror.

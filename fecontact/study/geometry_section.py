@@ -7,10 +7,24 @@ from typing import Any, cast
 
 from fecontact.core.errors import InputError, choices, nearest, require_positive
 from fecontact.core.tables import from_table, located, shown, to_table
+from fecontact.core.types import Coordinates
 from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files.groups import Box
 from fecontact.fem.shapes import Beam, Block, Pendulum
+from fecontact.fem.solids.shapes import (
+    Cylinder,
+    LapStrip,
+    Plate,
+    Ring,
+    SolidBlock,
+    SolidShape,
+    SphereSegment,
+)
 
-SHAPES: Mapping[str, type] = {"beam": Beam, "pendulum": Pendulum, "block": Block}
+SHAPES: Mapping[str, type] = {
+    "beam": Beam, "pendulum": Pendulum, "block": Block, "solid-block": SolidBlock, "plate": Plate,
+    "ring": Ring, "cylinder": Cylinder, "sphere-segment": SphereSegment, "lap-strip": LapStrip,
+}
 
 
 @dataclass(frozen=True)
@@ -24,18 +38,18 @@ class MeshFile:
     scale : float
         Factor from the file's unit of length to m.
     boundaries : mapping of name to name or box
-        Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1] [m].
+        Boundaries to name: a group of the file, or the outline within [x0, y0, x1, y1], of solids
+        [x0, y0, z0, x1, y1, z1] [m].
     points : mapping of name to name or place
-        Points to name: a group of the file, or the node nearest to [x, y] [m].
+        Points to name: a group of the file, or the node nearest to [x, y], of solids [x, y, z] [m].
     part : str, optional
         One of several bodies in the file: the name of a group of its cells.
     """
 
     file: str
     scale: float = 1.0
-    boundaries: Mapping[str, str | tuple[float, float, float, float]] = field(
-        default_factory=dict)
-    points: Mapping[str, str | tuple[float, float]] = field(default_factory=dict)
+    boundaries: Mapping[str, str | Box] = field(default_factory=dict)
+    points: Mapping[str, str | Coordinates] = field(default_factory=dict)
 
     part: str | None = None
 
@@ -51,7 +65,7 @@ class MeshFile:
                          part=self.part)
 
 
-Geometry = Beam | Pendulum | Block | MeshFile
+Geometry = Beam | Pendulum | Block | SolidShape | MeshFile
 
 
 def geometry_from_table(table: Any, where: str) -> Geometry:

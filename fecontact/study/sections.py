@@ -14,6 +14,7 @@ from fecontact.core.errors import (
     require_positive,
 )
 from fecontact.core.tables import located
+from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.fem.mesh import Mesh
@@ -26,8 +27,8 @@ from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
 
-Place = str | tuple[float, float] | Patch
-Support = Literal["x", "y", "xy", "hinge"]
+Place = str | Coordinates | Patch
+Support = Literal["x", "y", "xy", "z", "xz", "yz", "xyz", "hinge", "hinge_x", "hinge_y", "hinge_z"]
 
 
 @dataclass(frozen=True)
@@ -43,14 +44,14 @@ class BodySettings:
     youngs_modulus, poisson_ratio, density : float, optional
         [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
     thickness : float
-        Out-of-plane thickness [m].
+        Out-of-plane thickness of a plane body [m]; not of a solid.
     plane : 'stress' or 'strain'
-        Plane stress for thin bodies, plane strain for long ones.
+        Plane stress for thin bodies, plane strain for long ones; not for a solid.
     degree : 1 or 2
         Polynomial degree of the finite elements.
-    fixed : mapping of name to 'x', 'y', 'xy' or 'hinge'
+    fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or 'hinge'
         Supports on boundaries and points of the mesh: the directions that are held, or a hole
-        that turns about its centre.
+        that turns about its centre; 'hinge_x', 'hinge_y', 'hinge_z' name the axis in a solid.
     rotation : Rotation, optional
         ``[body.rotation]``: the body rotates at a constant speed about a point of its plane.
     """
@@ -102,8 +103,8 @@ class BasisSettings:
         Number of contact nodes, or 'all' for every mesh node of the boundary; a list has one entry
         for each boundary.
     B, C : place, optional
-        Excitation and load point: name of a point or boundary, [x, y], or a patch
-        ``{at = name or [x, y], radius = r}``.
+        Excitation and load point: name of a point or boundary, [x, y], of solids [x, y, z], or a
+        patch ``{at = name or place, radius = r}``.
     points : mapping of name to place
         Further points to observe.
     damping : float, list, Rayleigh or LossFactor
@@ -122,6 +123,8 @@ class BasisSettings:
         [N s/m].
     select : list, optional
         Indices of the modes to keep, counted from 0; all by default.
+    eigensolver : 'auto', 'direct' or 'iterative'
+        Solver for the modes of solids; 'auto' takes the iterative one for large, compact bodies.
     """
 
     modes: int = 20
@@ -137,6 +140,7 @@ class BasisSettings:
     dashpots: Annotated[Mapping[str, tuple[float, float]], Unit("N s/m")] = field(
         default_factory=dict)
     select: tuple[int, ...] | None = None
+    eigensolver: Literal["auto", "direct", "iterative"] = "auto"
 
     def __post_init__(self) -> None:
         if self.modes < 1:
@@ -154,7 +158,7 @@ class BasisSettings:
     @property
     def options(self) -> dict[str, Any]:
         """Options of :func:`fecontact.modal_basis` that concern neither contact nor modes."""
-        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads")
+        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads", "eigensolver")
         return {name: getattr(self, name) for name in names}
 
     def modal_basis(self, body: ElasticBody, rotation: Rotation | None = None) -> ModalBasis:

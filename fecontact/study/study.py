@@ -69,7 +69,7 @@ class Study(Summarised, StudyModels):
 
     Attributes
     ----------
-    geometry : Beam, Pendulum, Block or MeshFile
+    geometry : Beam, Pendulum, Block, a solid or MeshFile
         ``[geometry]``: a shape and its dimensions, ``shape = "beam"``, or a mesh,
         ``file = "part.msh"``; None for several bodies.
     body : BodySettings

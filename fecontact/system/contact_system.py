@@ -156,7 +156,7 @@ class ContactSystem(Summarised):
                 if not isinstance(one, law):
                     raise InputError(f"ContactSystem: {name} = {one!r} must be a "
                                      f"{law.__name__}.")
-        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
         _ = self.prescribed_motion
         for part in (self.law_groups("normal"), self.law_groups("friction")):

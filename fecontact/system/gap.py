@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, is_numeric
+from fecontact.core.checks import as_floats, as_pair, is_numeric
 from fecontact.core.errors import (
     FecontactError,
     InputError,
@@ -20,34 +20,48 @@ from fecontact.core.units import Unit
 
 @dataclass(frozen=True)
 class Crown:
-    """Gap below a face that is an arc of a circle, bulging towards the ground.
+    """Gap below a face that is an arc of a circle, or a part of a sphere, bulging to the ground.
 
-    ``g(x) = R - sqrt(R^2 - (x - centre)^2)``, exactly: a mesh with edges of length h would deviate
-    by h^2 / (8 R), easily as much as the roughness.
+    ``g = R - sqrt(R^2 - r^2)`` with ``r = |x - centre|``, of solids the distance of (x, y) from the
+    centre, exactly: a mesh with edges of length h would deviate by h^2 / (8 R), easily as much as
+    the roughness.
 
     Parameters
     ----------
     radius : float
         R, positive [m].
-    centre : float
-        Abscissa of the lowest point [m].
+    centre : float, of solids (float, float)
+        Abscissa of the lowest point, of solids x and y; a single number is x, with y zero [m].
 
     Raises
     ------
     InputError
-        For a radius that is not positive or, on use, is exceeded by a contact node.
+        For a radius that is not positive or, on use, is exceeded by a contact node; for a centre
+        that is not one or two finite numbers, or two for a plane body.
     """
 
     radius: Annotated[float, Unit("m")]
-    centre: Annotated[float, Unit("m")] = 0.0
+    centre: Annotated[float | tuple[float, float], Unit("m")] = 0.0
 
     def __post_init__(self) -> None:
         require_positive("Crown", radius=self.radius)
-        require_finite("Crown", centre=self.centre)
+        if np.ndim(self.centre):
+            object.__setattr__(self, "centre", as_pair(self.centre, "Crown: centre"))
+        else:
+            require_finite("Crown", centre=self.centre)
 
-    def __call__(self, x: Array) -> Array:
-        """Gap [m] at abscissae x [m]; InputError beyond the circle."""
-        away = np.asarray(x, dtype=float) - self.centre
+    def __call__(self, x: Array, y: Array | None = None) -> Array:
+        """Gap [m] at abscissae x, of solids at x and y [m]; InputError beyond the circle."""
+        if isinstance(self.centre, tuple):
+            if y is None:
+                raise InputError(f"Crown: centre = {self.centre!r} is that of a solid; give a "
+                                 f"plane body one number, the abscissa of its lowest point.")
+            centre = self.centre
+        else:
+            centre = (self.centre, 0.0)
+        away = np.asarray(x, dtype=float) - centre[0]
+        if y is not None:
+            away = np.hypot(away, np.asarray(y, dtype=float) - centre[1])
         if (np.abs(away) > self.radius).any():
             raise InputError(f"Crown: radius = {self.radius!r} must be at least "
                              f"{np.abs(away).max():g}, the distance of the farthest contact node "
@@ -55,32 +69,39 @@ class Crown:
         return np.asarray(away**2 / (self.radius + np.sqrt(self.radius**2 - away**2)))
 
 
-Gap = float | Sequence[float] | Crown | Callable[[Array], Array]
+Gap = float | Sequence[float] | Crown | Callable[..., Array]
 
 
-def gap_values(gap: Gap, abscissae: Array) -> float | tuple[float, ...]:
+def gap_values(gap: Gap, places: Array) -> float | tuple[float, ...]:
     """One gap for all contact nodes, or one for each.
+
+    ``places`` (n, d) are those of the nodes, or (n,) their abscissae. Functions take x (n,), of
+    solids x and y.
 
     Raises
     ------
     InputError
         For a wrong number of values, or a value that is negative or not finite.
     """
+    at = (places,) if places.ndim == 1 else tuple(places.T[:-1])
+    names = "x and y" if len(at) == 2 else "x"
     try:
-        given = gap(abscissae) if callable(gap) else gap
+        given = gap(*at) if callable(gap) else gap
     except FecontactError:
         raise
     except Exception as error:
-        raise InputError(f"gap: the function of x fails for the abscissae of the contact nodes "
-                         f"({type(error).__name__}: {error}); it must take an array (n,) and give "
+        where, taken = (("abscissae", "an array (n,)") if len(at) == 1 else
+                        ("places", "two arrays (n,)"))
+        raise InputError(f"gap: the function of {names} fails for the {where} of the contact nodes "
+                         f"({type(error).__name__}: {error}); it must take {taken} and give "
                          f"as many gaps.") from None
     if not is_numeric(given):
         raise InputError(f"gap = {shown(given)} must be a number, one per contact node, or a "
-                         f"function of x.")
+                         f"function of {names}.")
     values = as_floats(given, "gap")
-    if values.shape not in ((), abscissae.shape):
-        raise InputError(f"gap has {values.size} values for {abscissae.size} contact nodes; give "
-                         f"one number, one per node, or a function of x.")
+    if values.shape not in ((), (len(places),)):
+        raise InputError(f"gap has {values.size} values for {len(places)} contact nodes; give "
+                         f"one number, one per node, or a function of {names}.")
     if not np.isfinite(values).all() or (values < 0.0).any():
         raise InputError(f"gap = {values.min() if values.size else values} must be finite and "
                          f"zero or above.")

@@ -65,7 +65,7 @@ def test_mesh_survives_pickling() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (([[0, 0, 0]], [[0, 0, 0]]), r"nodes must have shape \(N, 2\), not \(1, 3\)"),
+        (([[0, 0, 0, 0]], [[0, 0, 0]]), r"nodes must have shape \(N, 2\), .* not \(1, 4\)"),
         ((SQUARE, [[0, 1]]), r"cells must have shape .* not \(1, 2\)"),
         ((SQUARE, np.empty((0, 3))), r"M > 0, not \(0, 3\)"),
         (([[0, 0], [1, np.nan], [0, 1]], [[0, 1, 2]]), "not finite"),

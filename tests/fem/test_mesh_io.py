@@ -479,14 +479,18 @@ def test_second_order_elements_of_other_formats(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["triangle6", "quad8", "quad9"])
-def test_curved_sides_are_refused_and_rounded_ones_are_not(tmp_path: Path, kind: str) -> None:
+def test_curved_sides_are_kept_and_rounded_ones_are_straight(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "a.vtu"
     meshio.write(path, meshio.Mesh(second_order(kind, 0.01).points, second_order(kind).cells))
-    with pytest.raises(MeshError, match=r"a\.vtu: The mesh has 1 second-order element sides that "
-                                        r"are curved, by up to 0\.01 m; mesh with first-order"):
-        read_mesh(path)
+    curved = read_mesh(path)
+    assert curved.curved_edges.shape == (1, 2)
     meshio.write(path, meshio.Mesh(second_order(kind, 1e-6).points, second_order(kind).cells))
-    assert len(read_mesh(path).cells) == 1
+    straight = read_mesh(path)
+    assert len(straight.curved_edges) == 0
+    # A parabola of height h over a chord L cuts off 2 h L / 3.
+    ends = curved.nodes[curved.curved_edges[0]]
+    length = np.linalg.norm(ends[1] - ends[0])
+    assert abs(curved.area - straight.area) == pytest.approx(2.0 / 3.0 * 0.01 * length, rel=1e-9)
 
 
 def test_coincident_and_unused_nodes_are_dropped(tmp_path: Path) -> None:
@@ -612,8 +616,9 @@ def nodes_and(cells: str) -> str:
         ("a.msh", "$MeshFormat\n4.1 1 8\n\0\0\0\1\n$EndMeshFormat\n$Nodes\n$EndNodes\n$Elements\n"
                   "$EndElements\n", "another byte order"),
         ("a.msh", nodes_and("1 2 2 1 1 1 2 3\n2 2 2 1 1 2 4 3\n"),
-         r"is a 3-D mesh \(z runs from 0 to 2 m\), but fecontact's bodies are plane"),
-        ("a.msh", nodes_and("1 4 2 1 1 1 2 3 4\n"), r"is a 3-D mesh \(it holds solid elements\)"),
+         r"holds surfaces only, in space \(z runs from 0 to 2 m\); a solid needs tetrahedra or"),
+        ("a.msh", nodes_and("1 6 2 1 1 1 2 3 4 2 3\n"),
+         r"holds solid elements that are not read \(solid\); mesh with tetrahedra or hexahedra"),
         ("a.msh", nodes_and("1 1 2 1 1 1 2\n"), "holds no triangles or quadrilaterals"),
         ("a.msh", nodes_and("1 2 2 1 1 1 2 3\n2 3 2 1 1 1 2 4 3\n"),
          "mixes 1 triangles and 1 quadrilaterals; mesh with one kind only"),
@@ -625,7 +630,8 @@ def nodes_and(cells: str) -> str:
         ("a.inp", "*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,9\n",
          "elements name nodes that the file does not hold"),
         ("a.inp", "*NODE\n1,0,0\n*ELEMENT, TYPE=CAX3\n1,1,2,3\n", r"axisymmetric elements \(CAX3"),
-        ("a.inp", "*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n1,1,1,1,1\n", "is a 3-D mesh"),
+        ("a.inp", "*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n1,1,1,1,1\n", "have no volume"),
+        ("a.inp", "*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D6\n1,1,1,1,1,1,1\n", "that are not read"),
         ("a.inp", "*NODE, SYSTEM=C\n1,0,0\n", "cylindrical or spherical coordinates"),
         ("a.inp", "*SYSTEM\n0,0,0,1,1,0\n*NODE\n1,0,0\n", r"local coordinate system \(\*SYSTEM"),
         ("a.inp", "*INCLUDE, INPUT=b.inp\n", r"includes another one \(\*INCLUDE\)"),
@@ -695,8 +701,8 @@ def test_elements_of_other_kinds_are_named(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"elements that are not read \(polygon\)"):
         read_mesh(path)
     cube = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], float)
-    meshio.write(path, meshio.Mesh(cube, [("hexahedron", [np.arange(8)])]))
-    with pytest.raises(MeshError, match=r"is a 3-D mesh \(it holds hexahedron elements\)"):
+    meshio.write(path, meshio.Mesh(cube[:6], [("wedge", [np.arange(6)])]))
+    with pytest.raises(MeshError, match=r"solid elements that are not read \(wedge\)"):
         read_mesh(path)
 
 

@@ -51,7 +51,7 @@ def test_bad_masses_are_named():
     for message, arguments in (
         ("masses is empty", {"masses": {}}),
         ("mass of 'a' = -1", {"masses": {"a": -1.0}}),
-        ("components = 'z'", {"components": "z"}),
+        ("components = 'zx'", {"components": "zx"}),
         ("springs names the mass 'c'", {"springs": {("a", "c"): 1.0}}),
         ("between two masses", {"springs": {("a", "a"): 1.0}}),
         ("dashpots between", {"dashpots": {("a", None): -1.0}}),

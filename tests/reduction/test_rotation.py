@@ -93,7 +93,7 @@ def test_centrifugal_pendulum():
     """Hinged at the distance a from the centre it swings with W sqrt(a m l / I)."""
     mesh = generate(Pendulum(hinge_radius=0.002))
     body = ElasticBody(mesh, fixed={"pivot": "hinge"})
-    _, hinge = body.hinges[0]
+    _, hinge, *_ = body.hinges[0]
     ones, arm = np.eye(2)[np.arange(2 * len(body.nodes)) % 2], (body.nodes - hinge).ravel()
     moment = ones.T @ body.mass @ arm
     inertia = arm @ body.mass @ arm

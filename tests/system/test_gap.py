@@ -77,3 +77,27 @@ def test_bad_gaps_are_refused():
         gap_values(Crown(0.5), x)
     with pytest.raises(InputError, match="radius = 0"):
         Crown(0.0)
+
+
+def test_crown_of_a_solid_is_a_part_of_a_sphere():
+    """Any section through the lowest point is the arc of the plane body, at any direction."""
+    crown, arc = Crown(0.5, (0.1, -0.05)), Crown(0.5)
+    away = np.linspace(0.0, 0.3, 7)
+    for angle in (0.0, 1.0, 4.0):
+        x, y = 0.1 + away * np.cos(angle), -0.05 + away * np.sin(angle)
+        assert crown(x, y) == pytest.approx(arc(away), rel=1e-12, abs=1e-17)
+    places = np.stack([0.1 + away, np.full(7, -0.05), np.full(7, 3.0)], axis=1)
+    assert gap_values(crown, places) == pytest.approx(arc(away), rel=1e-12, abs=1e-17)
+    # A single number is x; functions of solids take x and y.
+    assert gap_values(Crown(0.5, 0.1), places * [1.0, 0.0, 1.0]) == pytest.approx(arc(away))
+    assert gap_values(lambda x, y: x - y, places) == pytest.approx(places[:, 0] + 0.05)
+    assert gap_values(arc, places[:, :2]) == pytest.approx(arc(places[:, 0]))
+    for gap, message in ((crown, "is that of a solid"), (Crown(0.2), "must be at least 0.4")):
+        with pytest.raises(InputError, match=message):
+            gap_values(gap, places[:, 0])
+    with pytest.raises(InputError, match="the function of x and y fails"):
+        gap_values(lambda x: x, places)
+    with pytest.raises(InputError, match="7 contact nodes"):
+        gap_values((1.0, 2.0), places)
+    with pytest.raises(InputError, match="centre"):
+        Crown(0.5, (0.1, 0.2, 0.3))

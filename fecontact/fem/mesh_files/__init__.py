@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, MeshError
 from fecontact.core.files.atomic_write import replaced
-from fecontact.core.types import ArrayLike, Integers
+from fecontact.core.types import ArrayLike, Coordinates, Integers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.abaqus import read_inp
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_points
 from fecontact.fem.mesh_files.med import read_med
-from fecontact.fem.mesh_files.raw import RawMesh, plane_mesh
+from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
 
 
 def read_mesh(
@@ -30,17 +30,17 @@ def read_mesh(
     *,
     scale: float = 1.0,
     boundaries: Mapping[str, str | Box] | None = None,
-    points: Mapping[str, str | tuple[float, float]] | None = None,
+    points: Mapping[str, str | Coordinates] | None = None,
     part: str | None = None,
 ) -> Mesh:
-    """Read a plane mesh with named boundaries and points from a file.
+    """Read the mesh of a plane body or of a solid, with named boundaries and points, from a file.
 
     Formats: Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Nastran (.bdf, .nas, .fem), MED (.med), VTK
-    (.vtk, .vtu). Boundaries are physical curves (Gmsh), surfaces, sets of line elements and node
-    sets along the outline (Abaqus, MED), and line elements by property number (Nastran). Points
-    are physical points, node sets, and groups of edges inside the body. VTK files have no groups.
-    Second-order elements with straight sides are reduced to first order, coincident nodes are
-    merged, and nodes without a cell left out.
+    (.vtk, .vtu). Files with tetrahedra or hexahedra hold solids. Boundaries are groups of lines, of
+    solids those of surfaces: physical groups (Gmsh), surfaces, element sets and node sets on the
+    outline (Abaqus, MED), elements by property number (Nastran). Points are physical points, node
+    sets, groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
+    second-order elements are kept, coincident nodes merged, nodes without a cell left out.
 
     Parameters
     ----------
@@ -48,24 +48,22 @@ def read_mesh(
         The file; its suffix determines the format.
     scale : float
         Metres per unit of the file: 0.001 for millimetres.
-    boundaries : mapping of name to name or (x0, y0, x1, y1)
-        Boundaries by new name: a group of the file, or the edges of the outline within a box [m].
-    points : mapping of name to name or (x, y)
-        Points by new name: a group of the file (also a boundary), or the node nearest to a place
-        [m] in the body.
+    boundaries : mapping of name to name or (x0, y0, x1, y1), or (x0, y0, z0, x1, y1, z1)
+        Boundaries by new name: a group of the file, or the outline within a box [m].
+    points : mapping of name to name, (x, y) or (x, y, z)
+        Points by new name: a group of the file, or the node nearest to a place [m] in the body.
     part : str, optional
-        One of several bodies in the file: a physical surface (Gmsh), an element set or part
+        One of several bodies in the file: a physical group of cells (Gmsh), an element set or part
         (Abaqus), a group of cells (MED), a property number (Nastran); all cells by default.
-        Groups of the file keep what lies on this body.
 
     Raises
     ------
     InputError
-        If the file does not exist, its suffix is unknown, scale is not above zero, or a boundary or
-        point is given in another form.
+        If there is no such file or suffix, scale is not above zero, or a boundary or point is given
+        in another form.
     MeshError
-        If the file is not a plane mesh of first-order elements of one kind, or has no such group,
-        part, edges or node.
+        If the file holds no such mesh of one kind of elements, or has no such group, part, edges,
+        faces or node.
     """
     path = as_path(path, "a mesh")
     if not (isinstance(scale, Real) and 0.0 < scale < np.inf):
@@ -75,10 +73,11 @@ def read_mesh(
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     try:
-        mesh, groups = plane_mesh(_read(reader, path, format_name).part(part), scale)
+        mesh, groups = body_mesh(_read(reader, path, format_name).part(part), scale)
         return Mesh(mesh.nodes, mesh.cells,
                     named_boundaries(mesh, groups, boundaries or {}),
-                    named_points(mesh, groups, points or {}))
+                    named_points(mesh, groups, points or {}),
+                    mesh.curved_edges, mesh.curved_middles)
     except (MeshError, InputError) as error:
         raise type(error)(f"{path}: {error}") from None
 
@@ -214,7 +213,7 @@ def _read_vtu(path: Path) -> RawMesh:
 
 def _read_nastran(path: Path) -> RawMesh:
     text = path.read_text(encoding="utf-8", errors="replace").upper()
-    if re.search(r"^C(?:TRIA|QUAD|TRAX)\w*\s*\*", text, re.MULTILINE):
+    if re.search(r"^C(?:TRIA|QUAD|TRAX|TETRA|HEXA|PENTA|PYRAM)\w*\s*\*", text, re.MULTILINE):
         raise MeshError("The file has elements in large fields (CQUAD4*), which are not read; "
                         "write elements in small fields.")
     if not re.search(r"^\s*BEGIN BULK", text, re.MULTILINE):
@@ -235,7 +234,7 @@ def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
             getattr(meshio, format_name).read(source)
     if "cannot handle" in printed.getvalue():
         raise MeshError("The file holds elements of a kind that meshio does not read; mesh with "
-                        "first-order triangles or quadrilaterals.")
+                        "triangles, quadrilaterals, tetrahedra or hexahedra.")
     if np.any(found.point_data.get("nastran:ref", 0)):
         raise MeshError("The file gives nodes in local coordinate systems; export them in the "
                         "basic one.")

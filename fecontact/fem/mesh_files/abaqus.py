@@ -1,4 +1,4 @@
-"""Abaqus input files: parts with plane elements, their sets and surfaces.
+"""Abaqus input files: parts with plane or solid elements, their sets and surfaces.
 
 Unlike meshio this reads plane-strain and reduced-integration elements, several blocks of nodes,
 sets named on *ELEMENT, and surfaces.
@@ -13,7 +13,7 @@ import numpy as np
 
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Integers
-from fecontact.fem.mesh_files.raw import NODES, RawMesh
+from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
 _PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
 _PLANE_KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
@@ -21,6 +21,10 @@ _LINE = re.compile(r"(?:T[23]D|R2D)([23])|B[23]([123])")
 _LINE_KINDS = {("2", None): "line", ("3", None): "line3",
                (None, "1"): "line", (None, "2"): "line3", (None, "3"): "line"}
 _SOLID = re.compile(r"(?:C3D|DC3D|AC3D|SC)(\d+)")
+_SOLID_KINDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
+# Corners of the faces S1, S2, ...
+_FACES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+          8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))}
 
 
 def read_inp(path: Path) -> RawMesh:
@@ -85,6 +89,8 @@ def _joined(parts: dict[str, RawMesh]) -> RawMesh:
             for title, group in groups.items():
                 earlier = [all_groups[title]] if title in all_groups else []
                 all_groups[title] = np.concatenate([*earlier, group + first])
+        for title, blocks in raw.faces.items():
+            joined.faces.setdefault(title, []).extend(block + first for block in blocks)
         first += len(raw.points)
     return joined
 
@@ -192,20 +198,22 @@ class _Part:
         return numbers
 
     def surface(self, rows: list[list[str]]) -> list[list[int]]:
-        """Edges (pairs of Abaqus' node numbers) of ``set or element, S1`` rows."""
-        edges = []
+        """Edges or faces (Abaqus' node numbers) of ``set or element, S1`` rows."""
+        sides = []
         for name, side, *_ in (row for row in rows if len(row) > 1):
-            if not re.fullmatch(r"[SE][1-4]", side.upper()):
+            if not re.fullmatch(r"[SE][1-6]", side.upper()):
                 continue
             numbers = [int(name)] if name.isdigit() else self.resolve(self.element_sets, name)
             for number in numbers:
                 if number not in self.elements:
                     continue
                 kind, nodes = self.elements[number]
-                corners = 4 if kind.startswith("quad") else 3
-                first = int(side[1]) - 1
-                edges.append([nodes[first], nodes[(first + 1) % corners]])
-        return edges
+                which = int(side[1]) - 1
+                if kind in SOLID and which < len(_FACES[SOLID[kind]]):
+                    sides.append([nodes[corner] for corner in _FACES[SOLID[kind]][which]])
+                elif kind in PLANE and which < PLANE[kind]:
+                    sides.append([nodes[which], nodes[(which + 1) % PLANE[kind]]])
+        return sides
 
     def raw_mesh(self) -> RawMesh:
         index = {number: k for k, number in enumerate(self.nodes)}
@@ -224,8 +232,13 @@ class _Part:
                     held.setdefault(kind, []).append([index[node] for node in nodes])
             if held:
                 parts[name] = [(kind, np.array(rows)) for kind, rows in held.items()]
-        edges = {name: found for name, rows in self.surfaces.items()
-                 if (found := self.surface(rows))}
+        surfaces = {name: self.surface(rows) for name, rows in self.surfaces.items()}
+        edges = {name: found for name, sides in surfaces.items()
+                 if (found := [side for side in sides if len(side) == 2])}
+        faces = {name: [np.array([[index[node] for node in side] for side in found])
+                        for count in (3, 4)
+                        if (found := [side for side in sides if len(side) == count])]
+                 for name, sides in surfaces.items()}
         for name in self.element_sets:
             found = [self.elements[number][1][:2]
                      for number in self.resolve(self.element_sets, name)
@@ -242,6 +255,7 @@ class _Part:
                                    if number in index], np.int64)
                    for name in self.node_sets},
             sets_are_boundaries=True,
+            faces={name: blocks for name, blocks in faces.items() if blocks},
             parts=parts,
         )
 
@@ -253,8 +267,8 @@ def _kind(name: str) -> str | None:
     if name.startswith(("CAX", "CGAX", "DCAX", "SAX", "MAX")):
         raise MeshError(f"The file holds axisymmetric elements ({name}); fecontact's bodies are "
                         f"plane.")
-    if _SOLID.match(name):
-        return "solid"
+    if match := _SOLID.match(name):
+        return _SOLID_KINDS.get(int(match[1]), "solid")
     if match := _LINE.match(name):
         return _LINE_KINDS[match[1], match[2]]
     if match := _PLANE.match(name):

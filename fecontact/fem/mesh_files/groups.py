@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, Coordinates, Integers
+from fecontact.fem.interpolation import interpolation
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.mesh_files.raw import Groups, edges_on_outline
+from fecontact.fem.mesh_files.raw import Groups, on_outline
 
-Box = tuple[float, float, float, float]
+# Opposite corners (x0, y0, x1, y1), or (x0, y0, z0, x1, y1, z1).
+Box = tuple[float, float, float, float] | tuple[float, float, float, float, float, float]
 
 _BOX_TOLERANCE = 1e-6  # of the body's size
 
@@ -23,28 +25,34 @@ def named_boundaries(
     Raises
     ------
     MeshError
-        If a group does not exist or is not a boundary, or no edge lies in a box.
+        If a group does not exist or is not a boundary, or no edge or face lies in a box.
     InputError
-        If a boundary is given by neither a name nor four numbers.
+        If a boundary is given by neither a name nor four numbers, of a solid six.
     """
+    side = "edges" if mesh.dimension == 2 else "faces"
     taken = {source for source in wanted.values() if isinstance(source, str)}
     found = {name: edges for name, edges in groups.boundaries.items() if name not in taken}
     for name, source in wanted.items():
         if not isinstance(source, str):
-            found[name] = _edges_in_box(mesh, name, source)
+            found[name] = _facets_in_box(mesh, name, source)
         elif source in groups.boundaries:
             found[name] = groups.boundaries[source]
         elif source in groups.points:
             raise MeshError(f"The group '{source}', asked for as boundary '{name}', holds nodes or "
-                            f"edges inside the body, but a boundary is made of edges of the "
-                            f"outline; the boundaries are: {choices(groups.boundaries)}.")
+                            f"{'' if mesh.dimension == 2 else 'edges, or '}{side} inside the body, "
+                            f"but a boundary is made of {side} of the outline; the boundaries "
+                            f"are: {choices(groups.boundaries)}.")
+        elif source in groups.cells:
+            raise MeshError(f"The group '{source}', asked for as boundary '{name}', holds cells, "
+                            f"but a boundary is made of {side} of the outline; the boundaries "
+                            f"are: {choices(groups.boundaries)}.")
         else:
             raise _no_group("boundary", name, source, groups, groups.boundaries)
     return found
 
 
 def named_points(
-    mesh: Mesh, groups: Groups, wanted: Mapping[str, str | tuple[float, float]]
+    mesh: Mesh, groups: Groups, wanted: Mapping[str, str | Coordinates]
 ) -> dict[str, Integers]:
     """Points of the file, and those requested under new names.
 
@@ -80,34 +88,55 @@ def _no_group(
                      f"{nearest(source, available)}; the file's groups are: {choices(available)}.")
 
 
-def _edges_in_box(mesh: Mesh, name: str, box: Box) -> Integers:
-    values = _numbers(box, 4, f"Boundary '{name}' must be the name of a group or a box "
-                              f"(x0, y0, x1, y1) in metres")
-    low = np.minimum(values[:2], values[2:]) - _BOX_TOLERANCE * mesh.extent
-    high = np.maximum(values[:2], values[2:]) + _BOX_TOLERANCE * mesh.extent
-    edges = edges_on_outline(mesh, np.all((mesh.nodes >= low) & (mesh.nodes <= high), axis=1))
-    if not len(edges):
-        raise MeshError(f"Boundary '{name}' is empty: no edge of the outline lies in the box "
-                        f"{tuple(values.tolist())}; the body spans {_span(mesh)}.")
-    return edges
+def _facets_in_box(mesh: Mesh, name: str, box: Box) -> Integers:
+    d = mesh.dimension
+    corners = "(x0, y0, x1, y1)" if d == 2 else "(x0, y0, z0, x1, y1, z1)"
+    values = _numbers(box, 2 * d, f"Boundary '{name}' must be the name of a group or a box "
+                                  f"{corners} in metres")
+    low = np.minimum(values[:d], values[d:]) - _BOX_TOLERANCE * mesh.extent
+    high = np.maximum(values[:d], values[d:]) + _BOX_TOLERANCE * mesh.extent
+    facets = on_outline(mesh, np.all((mesh.nodes >= low) & (mesh.nodes <= high), axis=1))
+    if not len(facets):
+        raise MeshError(f"Boundary '{name}' is empty: no {'edge' if d == 2 else 'face'} of the "
+                        f"outline lies in the box {tuple(values.tolist())}; the body spans "
+                        f"{_span(mesh)}.")
+    return facets
 
 
-def _node_at(mesh: Mesh, name: str, place: tuple[float, float]) -> Integers:
-    where = _numbers(place, 2, f"Point '{name}' must be the name of a group or a place (x, y) in "
-                               f"metres")
+def _node_at(mesh: Mesh, name: str, place: Coordinates) -> Integers:
+    axes = "(x, y)" if mesh.dimension == 2 else "(x, y, z)"
+    where = _numbers(place, mesh.dimension, f"Point '{name}' must be the name of a group or a "
+                                            f"place {axes} in metres")
     distance = np.linalg.norm(mesh.nodes - where, axis=1)
     node = int(np.argmin(distance))
     corners = mesh.nodes[mesh.cells]
     around = corners[(mesh.cells == node).any(axis=1)]
     element_size = np.linalg.norm(np.roll(around, -1, axis=1) - around, axis=2).max()
+    if mesh.dimension == 3:
+        inside = _inside(mesh, where)
+        if not inside and distance[node] > element_size / 2:
+            raise _outside(mesh, name, where, float(distance[node]))
+        return np.array([node])
     to_next, to_place = np.roll(corners, -1, axis=1) - corners, where - corners
     left = to_next[..., 0] * to_place[..., 1] - to_next[..., 1] * to_place[..., 0]
     inside = bool((left >= 0).all(axis=1).any())
     if not inside and distance[node] > element_size / 2:
-        raise MeshError(f"Point '{name}' at {tuple(where.tolist())} is outside the body, "
-                        f"{distance[node]:.3g} m from the nearest node; the body spans "
-                        f"{_span(mesh)}.")
+        raise _outside(mesh, name, where, float(distance[node]))
     return np.array([node])
+
+
+def _inside(mesh: Mesh, place: Array) -> bool:
+    """Whether a place lies in a straight cell of a solid."""
+    try:
+        interpolation(mesh.nodes, mesh.cells[:, list(mesh.kind.order)], place, "")
+    except InputError:
+        return False
+    return True
+
+
+def _outside(mesh: Mesh, name: str, place: Array, distance: float) -> MeshError:
+    return MeshError(f"Point '{name}' at {tuple(place.tolist())} is outside the body, "
+                     f"{distance:.3g} m from the nearest node; the body spans {_span(mesh)}.")
 
 
 def _numbers(values: Any, count: int, message: str) -> Array:
@@ -121,5 +150,5 @@ def _numbers(values: Any, count: int, message: str) -> Array:
 
 
 def _span(mesh: Mesh) -> str:
-    (x0, y0), (x1, y1) = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
-    return f"x = {x0:g} ... {x1:g} m, y = {y0:g} ... {y1:g} m"
+    return ", ".join(f"{axis} = {low:g} ... {high:g} m" for axis, low, high in zip(
+        "xyz", mesh.nodes.min(axis=0), mesh.nodes.max(axis=0), strict=False))

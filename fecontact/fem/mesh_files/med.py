@@ -1,4 +1,4 @@
-"""MED files (Salome, Code_Aster): one plane mesh and its groups of nodes and elements.
+"""MED files (Salome, Code_Aster): one mesh and its groups of nodes and elements.
 
 Unlike meshio this reads files in which a family has no group, or a kind of element no families.
 """
@@ -14,7 +14,8 @@ from fecontact.core.types import Integers
 from fecontact.fem.mesh_files.raw import RawMesh
 
 _KINDS = {"PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
-          "QU4": "quad", "QU8": "quad8", "QU9": "quad9"}
+          "QU4": "quad", "QU8": "quad8", "QU9": "quad9", "TE4": "tetra", "T10": "tetra10",
+          "HE8": "hexahedron", "H20": "hexahedron20", "H27": "hexahedron27"}
 
 
 def read_med(path: Path) -> RawMesh:
@@ -81,7 +82,7 @@ def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
         kind = _KINDS.get(code, "solid")
         if kind == "solid" and code.startswith(("TR", "QU", "PO")):
             raise MeshError(f"The mesh holds elements {code}, which are not read; mesh with "
-                            f"first-order triangles or quadrilaterals.")
+                            f"triangles, quadrilaterals, tetrahedra or hexahedra.")
         number = int(stored["NOD"].attrs["NBR"])
         members = values(stored["NOD"]).reshape(-1, number).T.astype(np.int64) - 1
         if kind == "vertex":

@@ -1,4 +1,4 @@
-"""Contents of a mesh file as read, and their conversion to a plane first-order mesh."""
+"""Contents of a mesh file as read, and their conversion to a mesh with its groups."""
 
 from dataclasses import dataclass, field, replace
 
@@ -7,15 +7,20 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind
 from fecontact.fem.mesh import Mesh
 
-CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+SOLID = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8}
+CORNERS = {**PLANE, **SOLID}
 NODES = {"vertex": 1, "line": 2, "line3": 3,
-         "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9}
+         "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9,
+         "tetra": 4, "tetra10": 10, "hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27}
 
-_SOLID = ("tetra", "hexa", "wedge", "penta", "pyramid", "polyhedron", "voxel", "solid",
-          "VTK_LAGRANGE_TETRA", "VTK_LAGRANGE_HEXA", "VTK_LAGRANGE_WEDGE", "VTK_LAGRANGE_PYRAMID")
-_CURVED = 1e-4  # distance of mid-side node and chord per length; text files round coordinates
+_UNREAD_SOLIDS = ("wedge", "penta", "pyramid", "polyhedron", "voxel", "solid", "tetra", "hexa",
+                  "VTK_LAGRANGE_TETRA", "VTK_LAGRANGE_HEXA", "VTK_LAGRANGE_WEDGE",
+                  "VTK_LAGRANGE_PYRAMID")
+_CURVED = 1e-4  # distance of a middle and its chord per length; text files round coordinates
 _ROUNDED = 1e-6  # of the body's size: resolution of files with six digits
 _COINCIDENT = 1e-9  # of the body's size
 
@@ -30,9 +35,11 @@ class RawMesh:
         Coordinates, in the unit of the file.
     cells : list of (kind, (M, k) integer array)
         Elements of two and three dimensions by the names of meshio; corner nodes come first,
-        then mid-side nodes in the order of the sides.
+        then mid-side nodes, of plane elements in the order of the sides.
     edges : mapping of name to (k, 2 or more) integer array
         Groups of line elements, end nodes first.
+    faces : mapping of name to list of (k, 3) or (k, 4) integer arrays
+        Groups of faces of solid elements by their corners, beside the plane elements in ``parts``.
     nodes : mapping of name to (k,) integer array
         Groups of nodes.
     sets_are_boundaries : bool
@@ -46,6 +53,7 @@ class RawMesh:
     points: Array
     cells: list[tuple[str, Integers]]
     edges: dict[str, Integers] = field(default_factory=dict)
+    faces: dict[str, list[Integers]] = field(default_factory=dict)
     nodes: dict[str, Integers] = field(default_factory=dict)
     sets_are_boundaries: bool = False
     parts: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
@@ -70,6 +78,13 @@ class RawMesh:
             raise MeshError(f"The file has no part '{name}'{nearest(name, self.parts)}; its groups "
                             f"of cells are: {choices(self.parts)}.")
         cells = self.parts[name]
+        if self.is_solid:
+            solid = [(kind, block) for kind, block in cells if not _is_plane(kind)]
+            if not solid:
+                raise MeshError(f"The part '{name}' holds surfaces, but the file holds a solid; "
+                                f"its groups of solid cells are: "
+                                f"{choices(sorted(self._solid_parts))}.")
+            cells = solid
         corners = [block.ravel() for _, block in cells]
         points = np.full(np.shape(self.points), np.nan)
         if all(not len(block) or block.max() < len(points) for block in corners):
@@ -77,32 +92,55 @@ class RawMesh:
             points[used] = np.asarray(self.points, float)[used]
         return replace(self, points=points, cells=cells)
 
+    @property
+    def is_solid(self) -> bool:
+        """Whether the file holds solid elements, so that plane ones are faces."""
+        return any(len(block) and not _is_plane(kind) for kind, block in self.cells)
+
+    @property
+    def _solid_parts(self) -> set[str]:
+        return {name for name, cells in self.parts.items()
+                if any(not _is_plane(kind) for kind, _ in cells)}
+
+
+def _is_plane(kind: str) -> bool:
+    return kind in PLANE or not kind.startswith(_UNREAD_SOLIDS)
+
 
 @dataclass(frozen=True)
 class Groups:
-    """Named groups of a mesh, and the names of groups without nodes or edges of the body."""
+    """Named groups of a mesh.
+
+    ``empty`` are the names of groups without nodes, edges or faces of the body, ``cells`` those of
+    groups of cells.
+    """
 
     boundaries: dict[str, Integers]
     points: dict[str, Integers]
     empty: tuple[str, ...]
+    cells: tuple[str, ...] = ()
 
 
-def plane_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
-    """The first-order mesh without groups, and the groups of the file in its numbering.
+def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
+    """The mesh without groups, and the groups of the file in its numbering.
 
     Raises
     ------
     MeshError
-        If the elements are not a plane mesh of triangles or of quadrilaterals with straight sides.
+        If the elements are neither a plane mesh of triangles or of quadrilaterals, nor a solid of
+        tetrahedra or of hexahedra.
     """
-    second_order, corners = _plane_cells(raw.cells)
+    blocks = _blocks_of_one_kind(raw.cells)
+    corners = np.concatenate([block[:, :CORNERS[kind]] for kind, block in blocks])
+    second_order = [block for kind, block in blocks if block.shape[1] > CORNERS[kind]]
     points = np.asarray(raw.points, float) * scale
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise MeshError(f"The nodes have coordinates of shape {points.shape}, not (N, 2) or "
                         f"(N, 3).")
     if corners.min() < 0 or corners.max() >= len(points):
         raise MeshError("The elements name nodes that the file does not hold.")
-    named = [*second_order, *raw.nodes.values(), *(group[:, :2] for group in raw.edges.values())]
+    named = [*second_order, *raw.nodes.values(), *(group[:, :2] for group in raw.edges.values()),
+             *(block for groups in raw.faces.values() for block in groups)]
     if any(group.size and (group.min() < 0 or group.max() >= len(points)) for group in named):
         raise MeshError("A group, or the middle of a side, names nodes that the file does not "
                         "hold.")
@@ -110,10 +148,14 @@ def plane_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     if not np.isfinite(points[used]).all():
         raise MeshError("The nodes hold values that are not finite.")
     size = float(np.linalg.norm(np.ptp(points[used], axis=0)))
-    _require_plane(points[used], size)
-    points = points[:, :2]
-    for cells in second_order:
-        _require_straight(points, cells, size)
+    if blocks[0][0] in PLANE:
+        _require_plane(points[used], size)
+        points = points[:, :2]
+    elif points.shape[1] == 2:
+        raise MeshError("The file holds solid elements, but its nodes have two coordinates; save "
+                        "all three.")
+    kind = CELL_KINDS[points.shape[1], corners.shape[1]]
+    curves = [_curved_edges(points, cells, kind, size) for cells in second_order]
 
     first = _first_of_coincident(points, _COINCIDENT * size)
     used = np.unique(first[corners])
@@ -122,20 +164,23 @@ def plane_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     number = number[first]
     cells = number[corners]
     _, distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
-    mesh = Mesh(points[used], cells[np.sort(distinct)])
+    ends = number[np.concatenate([np.empty((0, 2), np.int64), *(ends for ends, _ in curves)])]
+    middles = np.concatenate([np.empty((0, points.shape[1])), *(places for _, places in curves)])
+    _, once = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
+    mesh = Mesh(points[used], cells[np.sort(distinct)], {}, {}, ends[once], middles[once])
     return mesh, _groups(raw, mesh, number)
 
 
-def edges_on_outline(mesh: Mesh, chosen: NDArray[np.bool_]) -> Integers:
-    """Outline edges whose two nodes are both chosen, ``chosen`` being a mask of the nodes."""
-    edges: Integers = mesh.outline[chosen[mesh.outline].all(axis=1)]
-    return edges
+def on_outline(mesh: Mesh, chosen: NDArray[np.bool_]) -> Integers:
+    """Outline edges or faces whose nodes are all chosen, ``chosen`` being a mask of the nodes."""
+    facets: Integers = mesh.outline[chosen[mesh.outline].all(axis=1)]
+    return facets
 
 
 def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
     boundaries: dict[str, Integers] = {}
     points: dict[str, Integers] = {}
-    row = {frozenset(edge): k for k, edge in enumerate(mesh.outline.tolist())}
+    row = {frozenset(facet): k for k, facet in enumerate(mesh.outline.tolist())}
     for name, group in raw.nodes.items():
         nodes = np.unique(number[group])
         nodes = nodes[nodes >= 0]
@@ -145,69 +190,116 @@ def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
         if raw.sets_are_boundaries:
             chosen = np.zeros(len(mesh.nodes), bool)
             chosen[nodes] = True
-            edges = edges_on_outline(mesh, chosen)
-            if len(np.unique(edges)) == len(nodes):
-                boundaries[name] = edges
-    for name, group in raw.edges.items():
-        edges = number[group[:, :2]]
-        edges = edges[(edges >= 0).all(axis=1) & (edges[:, 0] != edges[:, 1])]
-        rows = [row.get(frozenset(edge)) for edge in edges.tolist()]
-        on_outline = sorted({k for k in rows if k is not None})
+            facets = on_outline(mesh, chosen)
+            if len(np.unique(facets)) == len(nodes):
+                boundaries[name] = facets
+    # Lines bound plane bodies, faces solids; lines of solids are their nodes.
+    sides = _faces(raw) if mesh.dimension == 3 else {
+        name: [group[:, :2]] for name, group in raw.edges.items()}
+    for name, blocks in sides.items():
+        rows: list[int | None] = []
+        met: list[Integers] = []
+        for block in blocks:
+            facets = number[block]
+            facets = facets[(facets >= 0).all(axis=1)]
+            facets = facets[(np.diff(np.sort(facets, axis=1), axis=1) > 0).all(axis=1)]
+            rows += [row.get(frozenset(facet)) for facet in facets.tolist()]
+            met.append(facets.ravel())
+        outer = sorted({k for k in rows if k is not None})
         if None not in rows and rows:
-            boundaries[name] = mesh.outline[on_outline]
+            boundaries[name] = mesh.outline[outer]
         elif rows:
-            points.setdefault(name, np.unique(edges))
+            points.setdefault(name, np.unique(np.concatenate(met)))
+    if mesh.dimension == 3:
+        for name, group in raw.edges.items():
+            nodes = np.unique(number[group[:, :2]])
+            if len(nodes[nodes >= 0]):
+                points.setdefault(name, nodes[nodes >= 0])
     kept = {*boundaries, *points}
-    empty = tuple(name for name in (*raw.nodes, *raw.edges) if name not in kept)
-    return Groups(boundaries, points, empty)
+    empty = tuple(name for name in (*raw.nodes, *raw.edges, *sides) if name not in kept)
+    return Groups(boundaries, points, empty, tuple(name for name in raw.parts if name not in kept))
 
 
-def _plane_cells(cells: list[tuple[str, Integers]]) -> tuple[list[Integers], Integers]:
-    """Second-order cells with all their nodes, and the corners of all cells."""
-    plane = [(kind, block) for kind, block in cells if len(block)]
-    other = sorted({kind for kind, _ in plane if kind not in CORNERS})
-    if any(kind.startswith(_SOLID) for kind in other):
-        raise MeshError(f"The mesh is a 3-D mesh (it holds {', '.join(other)} elements), but "
-                        f"fecontact's bodies are plane; give a mesh of triangles or "
-                        f"quadrilaterals.")
+def _faces(raw: RawMesh) -> dict[str, list[Integers]]:
+    """Groups of faces of a solid by their corners."""
+    found = {name: list(blocks) for name, blocks in raw.faces.items()}
+    for name, cells in raw.parts.items():
+        plane = [block[:, :CORNERS[kind]] for kind, block in cells if kind in PLANE]
+        if plane:
+            found.setdefault(name, []).extend(plane)
+    return found
+
+
+def _blocks_of_one_kind(cells: list[tuple[str, Integers]]) -> list[tuple[str, Integers]]:
+    """The solid elements of a file, or the plane ones if there are no others."""
+    present = [(kind, block) for kind, block in cells if len(block)]
+    solid = [(kind, block) for kind, block in present if kind in SOLID]
+    other = sorted({kind for kind, _ in present if kind not in CORNERS})
+    if other and (solid or any(kind.startswith(_UNREAD_SOLIDS) for kind in other)):
+        raise MeshError(f"The mesh holds solid elements that are not read ({', '.join(other)}); "
+                        f"mesh with tetrahedra or hexahedra of first or second order.")
     if other:
         raise MeshError(f"The mesh holds elements that are not read ({', '.join(other)}); mesh "
                         f"with first-order triangles or quadrilaterals.")
-    if not plane:
-        raise MeshError("The mesh holds no triangles or quadrilaterals; save these elements too.")
-    counts = {3: 0, 4: 0}
-    for kind, block in plane:
-        counts[CORNERS[kind]] += len(block)
-    if all(counts.values()):
-        raise MeshError(
-            f"The mesh mixes {counts[3]} triangles and {counts[4]} quadrilaterals; mesh with one "
-            f"kind only (in Gmsh, recombine all surfaces or none)."
-        )
-    second_order = [block for kind, block in plane if block.shape[1] > CORNERS[kind]]
-    return second_order, np.concatenate([block[:, :CORNERS[kind]] for kind, block in plane])
+    if not present:
+        raise MeshError("The mesh holds no triangles or quadrilaterals, and no tetrahedra or "
+                        "hexahedra; save these elements too.")
+    chosen = solid or present
+    names = {3: "triangles", 4: "tetrahedra" if solid else "quadrilaterals", 8: "hexahedra"}
+    counts: dict[int, int] = {}
+    for kind, block in chosen:
+        counts[CORNERS[kind]] = counts.get(CORNERS[kind], 0) + len(block)
+    if len(counts) > 1:
+        (a, first), (b, second) = sorted(counts.items())
+        remedy = "volumes" if solid else "surfaces"
+        raise MeshError(f"The mesh mixes {first} {names[a]} and {second} {names[b]}; mesh with one "
+                        f"kind only (in Gmsh, recombine all {remedy} or none).")
+    return chosen
 
 
 def _require_plane(points: Array, size: float) -> None:
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > _ROUNDED * size:
         low, high = points[:, 2].min(), points[:, 2].max()
-        raise MeshError(f"The mesh is a 3-D mesh (z runs from {low:g} to {high:g} m), but "
-                        f"fecontact's bodies are plane; turn it into the x-y plane.")
+        raise MeshError(f"The mesh holds surfaces only, in space (z runs from {low:g} to {high:g} "
+                        f"m); a solid needs tetrahedra or hexahedra inside its surfaces, and a "
+                        f"plane body lies in the x-y plane.")
 
 
-def _require_straight(points: Array, cells: Integers, size: float) -> None:
-    corners = 3 if cells.shape[1] == 6 else 4
-    start = points[cells[:, :corners]]
-    chord = np.roll(start, -1, axis=1) - start
-    middle = points[cells[:, corners:2 * corners]] - start
+def _curved_edges(
+    points: Array, cells: Integers, kind: CellKind, size: float
+) -> tuple[Integers, Array]:
+    """Ends (k, 2) of the curved edges of second-order cells, and their middles (k, d)."""
+    ends = cells[:, np.array(kind.edges)]
+    middles = cells[:, kind.corners + _edge_order(points, cells, kind)]
+    at, middle = points[ends], points[middles]
+    chord = at[:, :, 1] - at[:, :, 0]
     length = np.linalg.norm(chord, axis=2)
-    distance = np.abs(chord[..., 0] * middle[..., 1] - chord[..., 1] * middle[..., 0])
-    distance /= np.maximum(length, np.finfo(float).tiny)
-    curved = distance > np.maximum(_CURVED * length, _ROUNDED * size)
-    if curved.any():
-        raise MeshError(
-            f"The mesh has {np.count_nonzero(curved)} second-order element sides that are curved, "
-            f"by up to {distance.max():.2g} m; mesh with first-order elements and a smaller size."
-        )
+    along = chord / np.maximum(length, np.finfo(float).tiny)[..., None]
+    arm = middle - at[:, :, 0]
+    off = np.linalg.norm(arm - (arm * along).sum(axis=2, keepdims=True) * along, axis=2)
+    curved = off > np.maximum(_CURVED * length, _ROUNDED * size)
+    return ends[curved], middle[curved]
+
+
+def _edge_order(points: Array, cells: Integers, kind: CellKind) -> Integers:
+    """Column of the middle of each edge, behind the corners.
+
+    Formats differ in the order of the middles of solids; each belongs to the edge in whose middle
+    it lies most closely, which all cells of a block together decide.
+    """
+    if kind.dimension == 2:
+        return np.arange(len(kind.edges))
+    count = len(kind.edges)
+    chords = points[cells[:, np.array(kind.edges)]].mean(axis=2)
+    middles = points[cells[:, kind.corners:kind.corners + count]]
+    extent = np.ptp(points[cells[:, :kind.corners]], axis=1).max(axis=1)
+    distance = (np.linalg.norm(chords[:, :, None] - middles[:, None], axis=3)
+                / np.maximum(extent, np.finfo(float).tiny)[:, None, None]).mean(axis=0)
+    order = distance.argmin(axis=1)
+    if len(np.unique(order)) < count:
+        raise MeshError("The middles of the edges of second-order elements do not lie on these "
+                        "edges; the file is damaged, or its elements are too strongly curved.")
+    return order
 
 
 def _first_of_coincident(points: Array, tolerance: float) -> Integers:

@@ -22,6 +22,7 @@ from fecontact.core.files.stored import (
     values,
 )
 from fecontact.core.interrupts import held_back_interrupt
+from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
@@ -173,8 +174,9 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     shapes = group.create_group("mode_shapes")
     for name in _MODE_SHAPES:
         shapes.create_dataset(name, data=getattr(basis.mode_shapes, name))
-    if basis.mode_shapes.elements is not None:
-        shapes.create_dataset("elements", data=basis.mode_shapes.elements)
+    for name in ("elements", "outline_nodes"):
+        if getattr(basis.mode_shapes, name) is not None:
+            shapes.create_dataset(name, data=getattr(basis.mode_shapes, name))
     restriction = basis.mode_shapes.restriction.tocsr()
     for name in ("data", "indices", "indptr"):
         shapes.create_dataset(f"restriction/{name}", data=getattr(restriction, name))
@@ -191,14 +193,17 @@ def stored_basis(group: Any) -> ModalBasis:
     """
     w = array(group, "angular_frequencies", (None,))
     m = len(w)
-    T = array(group, "T", (None, 3, m))
+    T = array(group, "T", (None, None, m))
+    if T.shape[1] not in (3, 6):
+        raise DamagedError(f"T has {T.shape[1]} rows for each point, not 3 or 6")
+    d = 2 if T.shape[1] == 3 else 3
     extra = tuple(str(name) for name in np.atleast_1d(group.attrs["extra"]))
     names, sizes = (np.atleast_1d(group.attrs[name]) for name in ("groups", "group_sizes"))
     require_lengths("'group_sizes'", len(names), sizes)
     boundaries: tuple[str, ...] = ()
     tributary = array(group, "tributary", (None,))
-    shapes = {"inertia_rows": (2, m), "stiffness": (m, m), "link_load": (m,),
-              "contact_normals": (len(tributary), 2)}
+    shapes = {"inertia_rows": (d, m), "stiffness": (m, m), "link_load": (m,),
+              "contact_normals": (len(tributary), d)}
     given: dict[str, Any] = {name: array(group, name, shape) for name, shape in shapes.items()
                              if name in group}
     if "on_ground" in group:
@@ -207,13 +212,13 @@ def stored_basis(group: Any) -> ModalBasis:
     if "boundary_rows" in group:
         stored = member(group, "boundary_rows")
         boundaries = tuple(str(name) for name in np.atleast_1d(stored.attrs["names"]))
-        given["boundary_rows"] = array(group, "boundary_rows", (len(boundaries), 2, m))
+        given["boundary_rows"] = array(group, "boundary_rows", (len(boundaries), d, m))
     return ModalBasis(
-        w, array(group, "damping", (m, m)), T, array(group, "positions", (len(T), 2)),
+        w, array(group, "damping", (m, m)), T, array(group, "positions", (len(T), d)),
         tributary, extra=extra,
-        mode_shapes=(_read_mode_shapes(member(group, "mode_shapes"), m, len(T))
+        mode_shapes=(_read_mode_shapes(member(group, "mode_shapes"), m, T)
                      if "mode_shapes" in group else None),
-        quality=(_read_quality(member(group, "quality"), m, len(T), len(boundaries))
+        quality=(_read_quality(member(group, "quality"), m, (len(T), d), len(boundaries))
                  if "quality" in group else None),
         groups=tuple((str(name), int(count)) for name, count in zip(names, sizes, strict=True)),
         boundaries=boundaries, parts=_read_parts(group) if "parts" in group else (), **given,
@@ -233,33 +238,45 @@ def _read_parts(group: Any) -> tuple[BodyPart, ...]:
                  for name, block in zip(names, blocks, strict=True))
 
 
-def _read_mode_shapes(group: Any, modes: int, points: int) -> ModeShapes:
+def _read_mode_shapes(group: Any, modes: int, T: Array) -> ModeShapes:
     import scipy.sparse as sp
 
-    nodes = array(group, "nodes", (None, 2))
+    d = 2 if T.shape[1] == 3 else 3
+    nodes = array(group, "nodes", (None, d))
     N = len(nodes)
     cells = indices(group, "cells", (None, None), N)
-    if cells.shape[1] not in (3, 4):
-        raise DamagedError(f"cells have {cells.shape[1]} corners, not 3 or 4")
+    if cells.shape[1] not in (d + 1, 2**d):
+        raise DamagedError(f"cells have {cells.shape[1]} corners, not {d + 1} or {2**d}")
     stored = member(group, "restriction")
     shape = tuple(int(length) for length in np.atleast_1d(stored.attrs["shape"]))
-    if shape != (3 * points, 2 * N):
-        raise DamagedError(f"the restriction has shape {shape}, not {(3 * points, 2 * N)}")
+    if shape != (T.shape[0] * T.shape[1], d * N):
+        raise DamagedError(f"the restriction has shape {shape}, not "
+                           f"{(T.shape[0] * T.shape[1], d * N)}")
     rows = array(stored, "indptr", (shape[0] + 1,), "i")
     columns = array(stored, "indices", (None,), "i")
     restriction = sp.csr_array((array(stored, "data", (len(columns),)), columns, rows),
                                shape=shape)
-    return ModeShapes(nodes, cells, indices(group, "outline", (None, 2), N),
-                      array(group, "shapes", (N, 2, modes)), array(group, "stress", (N, 4, modes)),
-                      sound_sparse(restriction), _elements(group, N))
+    outline = indices(group, "outline", (None, None), N)
+    if outline.shape[1] not in ((2,) if d == 2 else (3, 4)):
+        raise DamagedError(f"the outline has shape {outline.shape}")
+    nodes_of = None
+    if "outline_nodes" in group:
+        nodes_of = array(group, "outline_nodes", (len(outline),), "i")
+        if nodes_of.size and not -1 <= nodes_of.min() <= nodes_of.max() < len(T) - 2:
+            raise DamagedError("'outline_nodes' names contact nodes that are not there")
+    return ModeShapes(nodes, cells, outline, array(group, "shapes", (N, d, modes)),
+                      array(group, "stress", (N, 4 if d == 2 else 6, modes)),
+                      sound_sparse(restriction), _elements(group, N, d), nodes_of)
 
 
-def _elements(group: Any, nodes: int) -> Any:
+def _elements(group: Any, nodes: int, dimension: int) -> Any:
     if "elements" not in group:
         return None
     elements = indices(group, "elements", (None, None), nodes)
-    if elements.shape[1] not in (3, 4, 6, 9):
-        raise DamagedError(f"elements have {elements.shape[1]} nodes, not 3, 4, 6 or 9")
+    known = (3, 4, 6, 9) if dimension == 2 else (4, 8, 10, 27)
+    if elements.shape[1] not in known:
+        raise DamagedError(f"elements have {elements.shape[1]} nodes, not "
+                           f"{', '.join(map(str, known[:-1]))} or {known[-1]}")
     return elements
 
 
@@ -269,12 +286,14 @@ def _read_rotation(group: Any, modes: int) -> ModalRotation:
         array(group, "stiffening", (modes, modes)), array(group, "load", (modes,)))
 
 
-def _read_quality(group: Any, modes: int, points: int, boundaries: int) -> ReductionQuality:
+def _read_quality(
+    group: Any, modes: int, points: tuple[int, int], boundaries: int
+) -> ReductionQuality:
     mass, count, orthogonality = (
         values(member(group, name)).item() for name in ("mass", "vibration_modes",
                                                         "orthogonality"))
     return ReductionQuality(
         mass=float(mass), vibration_modes=int(count), orthogonality=float(orthogonality),
         residuals=array(group, "residuals", (modes,)),
-        compliance=array(group, "compliance", (points, 2)),
-        load_compliance=array(group, "load_compliance", (1 + boundaries, 2)))
+        compliance=array(group, "compliance", points),
+        load_compliance=array(group, "load_compliance", (1 + boundaries, points[1])))

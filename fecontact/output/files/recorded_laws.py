@@ -81,7 +81,7 @@ class RecordedSystem(ContactSystem):
     needs: str = ""
 
     def _check(self) -> None:
-        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_x))
+        object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
 
     @property

@@ -1,0 +1,323 @@
+"""Stiffness and mass of isotropic bodies, assembled by compiled loops over the cells.
+
+Cells that are images of the reference cell under an affine map need no quadrature of their own:
+with the inverse Jacobian J of the map and the integrals over the reference cell
+
+    G_ij,ab = int d_a phi_i d_b phi_j,      H_ij,pq = |det| sum_ab J_ap J_bq G_ij,ab
+
+the stiffness between nodes i and j in directions p and q is, with the Lame constants,
+
+    K_ij,pq = lambda H_ij,pq + mu H_ij,qp + mu delta_pq (H_ij,11 + H_ij,22 + H_ij,33).
+
+Other cells, curved or with faces that are not parallel, are integrated point by point. A plane
+cell is a solid one without the third derivatives; K has this form in plane stress, too, with the
+lateral constant for lambda.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import block, i8, integers, kernel, matrix, vector
+from fecontact.core.errors import MeshError
+from fecontact.core.types import Array, Integers
+
+_index = types.Array(types.int32, 1, "C")
+_slots = types.Array(types.int32, 3, "C")
+_reference = types.Array(types.float64, 4, "C")
+
+# Largest difference between the edges of a cell whose map counts as affine, relative to them.
+_AFFINE = 1e-13
+
+# Entries that indices of 32 bits can number.
+_MOST = np.iinfo(np.int32).max
+
+
+def assembled(basis: Any, lateral: float, shear: float, density: float) -> tuple[Any, Any]:
+    """Stiffness and mass of one displacement component, both exactly symmetric.
+
+    Parameters
+    ----------
+    basis : skfem.Basis
+        Scalar Lagrange elements (N nodes) on triangles, quadrilaterals, tetrahedra or hexahedra,
+        straight or curved. Its quadrature is used in the cells whose map is not affine; the others
+        are exact.
+    lateral, shear : float
+        Lame's constants lambda and mu of a solid or in plane strain [Pa]; in plane stress
+        ``nu E / (1 - nu^2)`` and mu.
+    density : float
+        rho [kg/m^3].
+
+    Returns
+    -------
+    K : sparse (d N, d N) array of d x d blocks
+        Degree of freedom d k + p is the displacement of node k in direction p [N/m, in the plane
+        per thickness].
+    M : sparse (N, N) array by rows
+        [kg, in the plane per thickness].
+
+    Raises
+    ------
+    MeshError
+        For a mesh whose matrices would have more entries than can be numbered.
+    """
+    import scipy.sparse as sp
+
+    dofs = np.ascontiguousarray(basis.element_dofs.T, dtype=np.int64)
+    dimension, size = basis.mesh.dim(), int(basis.N)
+    indptr, indices, slots = pattern(dofs, size)
+    blocks, mass = np.zeros((len(indices), dimension, dimension)), np.zeros(len(indices))
+    nodes, corners, element = _geometry(basis)
+    affine = _affine_cells(nodes, corners, dimension)
+    if affine.any():
+        which = np.flatnonzero(affine)
+        inverse, scale = _inverse_jacobians(nodes, corners[which], dimension)
+        gradients, masses = _reference_integrals(basis.elem)
+        _add_affine(which, inverse, scale, gradients, masses, lateral, shear, slots, blocks, mass)
+    if not affine.all():
+        at, weights = basis.X, np.ascontiguousarray(basis.W)
+        values, slopes = _shapes(basis.elem, at)
+        _add_quadrature(np.flatnonzero(~affine), nodes, corners, _shapes(element, at)[1], values,
+                        slopes, weights, lateral, shear, slots, blocks, mass)
+    mass *= density
+    return (sp.bsr_array((blocks, indices, indptr), shape=(dimension * size,) * 2),
+            sp.csr_array((mass, indices, indptr), shape=(size, size)))
+
+
+def pattern(dofs: Integers, size: int) -> tuple[Any, Any, Any]:
+    """Sparsity of a matrix between nodes that share a cell.
+
+    Returns
+    -------
+    indptr (N + 1,), indices : integer arrays
+        By rows, sorted.
+    slots : (c, k, k) integer array
+        Where the entry between two of the k nodes of each cell stands.
+    """
+    count, width = dofs.shape
+    starts = np.zeros(size + 1, dtype=np.int64)
+    np.cumsum(np.bincount(dofs.ravel(), minlength=size), out=starts[1:])
+    around = np.argsort(dofs.ravel(), kind="stable") // width
+    indptr = np.zeros(size + 1, dtype=np.int64)
+    seen = np.full(size, -1)
+    _row_lengths(dofs, starts, around, seen, indptr)
+    entries = int(indptr[-1])
+    if entries > _MOST:
+        raise MeshError(f"The matrices of {count} cells with {width} nodes each would have "
+                        f"{entries:.2g} entries, more than can be numbered; use a coarser mesh.")
+    indices = np.empty(entries, dtype=np.int32)
+    slots = np.empty((count, width, width), dtype=np.int32)
+    seen[:] = -1
+    _rows(dofs, starts, around, seen, indptr, indices, slots)
+    return indptr.astype(np.int32), indices, slots
+
+
+@kernel(types.void(types.Array(i8, 2, "C"), integers, integers, integers, integers))
+def _row_lengths(dofs, starts, around, seen, indptr):
+    """Fill indptr (N + 1,); the cells at node i are around[starts[i]:starts[i + 1]]."""
+    total = 0
+    for i in range(len(seen)):
+        for a in range(starts[i], starts[i + 1]):
+            for j in range(dofs.shape[1]):
+                node = dofs[around[a], j]
+                if seen[node] != i:
+                    seen[node] = i
+                    total += 1
+        indptr[i + 1] = total
+
+
+@kernel(types.void(types.Array(i8, 2, "C"), integers, integers, integers, integers, _index,
+                   _slots))
+def _rows(dofs, starts, around, seen, indptr, indices, slots):
+    """Fill the column indices, and where each cell finds its entries."""
+    width = dofs.shape[1]
+    for i in range(len(seen)):
+        first, last = indptr[i], indptr[i + 1]
+        end = first
+        for a in range(starts[i], starts[i + 1]):
+            for j in range(width):
+                node = dofs[around[a], j]
+                # Marks of earlier rows lie below the first entry of this one.
+                if seen[node] < first:
+                    seen[node] = end
+                    indices[end] = node
+                    end += 1
+        row = np.sort(indices[first:last])
+        for s in range(last - first):
+            indices[first + s] = row[s]
+            seen[row[s]] = first + s
+        for a in range(starts[i], starts[i + 1]):
+            cell = around[a]
+            for own in range(width):
+                if dofs[cell, own] == i:
+                    for j in range(width):
+                        slots[cell, own, j] = seen[dofs[cell, j]]
+
+
+def _geometry(basis: Any) -> tuple[Array, Integers, Any]:
+    """Nodes (n, 3) of the map of the cells, those of each cell (c, g), and its element."""
+    mesh = basis.mesh
+    if hasattr(basis.mapping, "elem"):
+        places, cells, element = mesh.doflocs, mesh.dofs.element_dofs, basis.mapping.elem
+    else:
+        places, cells, element = mesh.p, mesh.t, mesh.elem()
+    nodes = np.zeros((places.shape[1], 3))
+    nodes[:, : mesh.dim()] = places.T
+    return nodes, np.ascontiguousarray(cells.T, dtype=np.int64), element
+
+
+def _edges(element_nodes: int, dimension: int) -> Integers:
+    """Nodes at the ends of the axes of the reference cell, whose corner 0 is at the origin."""
+    if dimension == 2:
+        return np.array((1, 2) if element_nodes in (3, 6) else (1, 3))
+    return np.array((1, 2, 3))
+
+
+def _reference_places(element_nodes: int, dimension: int) -> Array:
+    """Places (g, d) of the nodes of the map of a cell in the reference cell."""
+    import skfem
+
+    kinds = {(3, 2): skfem.ElementTriP1, (6, 2): skfem.ElementTriP2, (4, 2): skfem.ElementQuad1,
+             (9, 2): skfem.ElementQuad2, (4, 3): skfem.ElementTetP1, (10, 3): skfem.ElementTetP2,
+             (8, 3): skfem.ElementHex1, (27, 3): skfem.ElementHex2}
+    return np.asarray(kinds[element_nodes, dimension]().doflocs)
+
+
+def _affine_cells(nodes: Array, corners: Integers, dimension: int) -> Any:
+    """Which cells (c,) are affine images of the reference cell."""
+    if corners.shape[1] == dimension + 1:
+        return np.ones(len(corners), dtype=bool)
+    places = _reference_places(corners.shape[1], dimension)
+    origin = nodes[corners[:, 0]]
+    edges = nodes[corners[:, _edges(corners.shape[1], dimension)]] - origin[:, None]
+    size = np.abs(edges).max(axis=(1, 2))
+    affine = np.ones(len(corners), dtype=bool)
+    for node, place in zip(corners.T, places, strict=True):
+        expected = origin + np.einsum("a,cap->cp", place, edges)
+        affine &= np.abs(nodes[node] - expected).max(axis=1) <= _AFFINE * size
+    return affine
+
+
+def _inverse_jacobians(
+    nodes: Array, corners: Integers, dimension: int
+) -> tuple[Array, Array]:
+    """Derivatives (c, 3, 3) of the reference coordinates and volumes (c,) of affine cells."""
+    ends = corners[:, _edges(corners.shape[1], dimension)]
+    edges = (nodes[ends] - nodes[corners[:, :1]])[:, :, :dimension]
+    jacobian = np.moveaxis(edges, 1, 2)
+    inverse = np.zeros((len(corners), 3, 3))
+    inverse[:, :dimension, :dimension] = np.linalg.inv(jacobian)
+    return inverse, np.abs(np.linalg.det(jacobian))
+
+
+def _shapes(element: Any, at: Array) -> tuple[Array, Array]:
+    """Values (q, k) and slopes (q, k, 3) of shape functions at reference points (d, q)."""
+    count = len(element.doflocs)
+    values, slopes = np.empty((at.shape[1], count)), np.zeros((at.shape[1], count, 3))
+    for i in range(count):
+        value, slope = element.lbasis(at, i)
+        values[:, i] = value
+        slopes[:, i, : len(at)] = np.asarray(slope).T
+    return values, slopes
+
+
+def _reference_integrals(element: Any) -> tuple[Array, Array]:
+    """Integrals of the products of slopes (k, k, 3, 3) and values (k, k) of shape functions."""
+    from skfem.quadrature import get_quadrature
+
+    # Exact for quadratic functions; per direction where the cell is a square or a cube.
+    at, weights = get_quadrature(element.refdom, 4)
+    values, slopes = _shapes(element, at)
+    return (np.einsum("q,qia,qjb->ijab", weights, slopes, slopes),
+            np.einsum("q,qi,qj->ij", weights, values, values))
+
+
+@kernel(types.void(integers, block, vector, _reference, matrix, types.float64, types.float64,
+                   _slots, block, vector))
+def _add_affine(which, inverse, scale, gradients, masses, lateral, shear, slots, blocks, mass):
+    """Add the affine cells ``which`` to the blocks of the stiffness and the entries of the mass."""
+    width, dimension = slots.shape[1], blocks.shape[1]
+    half, H = np.empty((3, 3)), np.empty((3, 3))
+    for cell in range(len(which)):
+        e, J, volume = which[cell], inverse[cell], scale[cell]
+        for i in range(width):
+            for j in range(i, width):
+                G = gradients[i, j]
+                for a in range(3):
+                    for q in range(3):
+                        half[a, q] = G[a, 0] * J[0, q] + G[a, 1] * J[1, q] + G[a, 2] * J[2, q]
+                for p in range(3):
+                    for q in range(3):
+                        H[p, q] = volume * (J[0, p] * half[0, q] + J[1, p] * half[1, q]
+                                            + J[2, p] * half[2, q])
+                spread = shear * (H[0, 0] + H[1, 1] + H[2, 2])
+                there, back = slots[e, i, j], slots[e, j, i]
+                weight = volume * masses[i, j]
+                mass[there] += weight
+                if there != back:
+                    mass[back] += weight
+                for p in range(dimension):
+                    for q in range(p if i == j else 0, dimension):
+                        entry = lateral * H[p, q] + shear * H[q, p]
+                        if p == q:
+                            entry += spread
+                        blocks[there, p, q] += entry
+                        if i != j or p != q:
+                            blocks[back, q, p] += entry
+
+
+@kernel(types.void(integers, matrix, types.Array(i8, 2, "C"), block, matrix, block, vector,
+                   types.float64, types.float64, _slots, block, vector))
+def _add_quadrature(which, nodes, corners, stretch, values, slopes, weights, lateral, shear, slots,
+                    blocks, mass):
+    """Add the cells ``which`` by quadrature; ``stretch`` (q, g, 3) are slopes of their map."""
+    width, dimension, points = slots.shape[1], blocks.shape[1], len(weights)
+    J, I = np.empty((3, 3)), np.empty((3, 3))
+    slope, H = np.empty((width, 3)), np.empty((width, width, 3, 3))
+    own = np.empty((width, width))
+    for e in which:
+        H[:] = 0.0
+        own[:] = 0.0
+        for point in range(points):
+            # A plane cell has unit thickness.
+            J[:] = 0.0
+            if dimension == 2:
+                J[2, 2] = 1.0
+            for g in range(corners.shape[1]):
+                for p in range(3):
+                    for a in range(3):
+                        J[p, a] += nodes[corners[e, g], p] * stretch[point, g, a]
+            for a in range(3):
+                b, c = (a + 1) % 3, (a + 2) % 3
+                for p in range(3):
+                    q, r = (p + 1) % 3, (p + 2) % 3
+                    I[a, p] = J[q, b] * J[r, c] - J[q, c] * J[r, b]
+            volume = J[0, 0] * I[0, 0] + J[1, 0] * I[0, 1] + J[2, 0] * I[0, 2]
+            for i in range(width):
+                for p in range(3):
+                    slope[i, p] = (slopes[point, i, 0] * I[0, p] + slopes[point, i, 1] * I[1, p]
+                                   + slopes[point, i, 2] * I[2, p]) / volume
+            volume = abs(volume) * weights[point]
+            for i in range(width):
+                for j in range(i, width):
+                    own[i, j] += volume * values[point, i] * values[point, j]
+                    for p in range(3):
+                        along = volume * slope[i, p]
+                        for q in range(3):
+                            H[i, j, p, q] += along * slope[j, q]
+        for i in range(width):
+            for j in range(i, width):
+                there, back = slots[e, i, j], slots[e, j, i]
+                mass[there] += own[i, j]
+                if there != back:
+                    mass[back] += own[i, j]
+                spread = shear * (H[i, j, 0, 0] + H[i, j, 1, 1] + H[i, j, 2, 2])
+                for p in range(dimension):
+                    for q in range(p if i == j else 0, dimension):
+                        entry = lateral * H[i, j, p, q] + shear * H[i, j, q, p]
+                        if p == q:
+                            entry += spread
+                        blocks[there, p, q] += entry
+                        if i != j or p != q:
+                            blocks[back, q, p] += entry

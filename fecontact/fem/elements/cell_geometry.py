@@ -1,0 +1,133 @@
+"""Geometry of cells: orientation, volume, sides in common, second-order places of curved cells."""
+
+import numpy as np
+
+from fecontact.core.errors import MeshError
+from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import CellKind, shape_functions
+
+_FLAT = 1e-12  # volume of a degenerate cell, relative to the cube of its size
+# Gauss points from 0 to 1, exact for determinants of second-order cells: degree 5 a direction.
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+_GAUSS, _WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
+
+
+def oriented_solids(nodes: Array, cells: Integers, kind: CellKind) -> Integers:
+    """Cells of space with positive volume, those of the opposite orientation renumbered.
+
+    Raises
+    ------
+    MeshError
+        For cells without volume, or hexahedra folded at a corner.
+    """
+    smallest, largest = _corner_volumes(nodes, cells, kind)
+    cells = np.where((largest < 0.0)[:, None], cells[:, list(kind.mirrored)], cells)
+    smallest = np.where(largest < 0.0, -largest, smallest)
+    size = np.linalg.norm(np.ptp(nodes[cells], axis=1), axis=1)
+    bad = smallest <= _FLAT * size**3
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        x, y, z = nodes[cells[first]].mean(axis=0)
+        what = "have no volume" if kind.simplex else "have no volume, or are folded or inverted"
+        raise MeshError(f"{np.count_nonzero(bad)} mesh cells {what}, the first is cell {first} at "
+                        f"({x:g}, {y:g}, {z:g}).")
+    return cells
+
+
+def _corner_volumes(nodes: Array, cells: Integers, kind: CellKind) -> tuple[Array, Array]:
+    """Least and largest Jacobian determinants (M,) at the corners."""
+    corners = nodes[cells[:, list(kind.order)]]
+    local = np.array(kind.places[:kind.corners], float)[:1 if kind.simplex else None]
+    _, slopes = shape_functions(kind.dimension, kind.corners, local)
+    determinants = np.linalg.det(np.einsum("pkj,mki->mpij", slopes, corners))
+    return determinants.min(axis=1), determinants.max(axis=1)
+
+
+def solid_volumes(nodes: Array, cells: Integers, kind: CellKind) -> Array:
+    """Volumes (M,) of cells with straight edges [m^3]."""
+    corners = nodes[cells[:, list(kind.order)]]
+    if kind.simplex:
+        return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0)
+    # Determinants of trilinear cells are quadratic in each direction: two points are exact.
+    points = 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)
+    local = np.stack(np.meshgrid(points, points, points), axis=-1).reshape(-1, 3)
+    _, slopes = shape_functions(3, 8, local)
+    return np.asarray(np.linalg.det(np.einsum("pkj,mki->mpij", slopes, corners)).mean(axis=1))
+
+
+def facets_of(cells: Integers, kind: CellKind) -> Integers:
+    """Sides (M f, n) of each cell in turn, so that inner ones occur twice."""
+    return cells[:, np.array(kind.facets)].reshape(-1, len(kind.facets[0]))
+
+
+def require_apart(facets: Integers, number: Integers, count: Integers, nodes: Array) -> None:
+    """Raise :class:`MeshError` where two cells lie on the same side of the face they share.
+
+    ``facets`` are the outward faces of all cells, ``number`` those without orientation.
+    """
+    first = np.argmin(facets, axis=1)
+    rows, width = np.arange(len(facets)), facets.shape[1]
+    ahead = (facets[rows, (first + 1) % width] < facets[rows, first - 1]).astype(np.int64)
+    twice = (count == 2) & (np.bincount(number, ahead, minlength=len(count)) != 1)
+    if twice.any():
+        x, y, z = nodes[facets[np.flatnonzero(twice[number])[0]]].mean(axis=0)
+        raise MeshError(f"{np.count_nonzero(twice)} faces have both of their cells on one side, "
+                        f"the first at ({x:g}, {y:g}, {z:g}): the mesh has inverted or "
+                        f"overlapping elements; mesh the body anew.")
+
+
+def second_order_places(
+    nodes: Array, cells: Integers, kind: CellKind, middles: Array
+) -> Array:
+    """Places (M, k, d) of the second-order nodes of cells, in the order of ``kind.places``.
+
+    ``middles`` (M, edges, d) are those of the edges. Middles of faces and of cells follow from
+    these: x = sum over edges / 2 - sum over corners / 4 for a face, half of both for a cell.
+    """
+    corners = nodes[cells[:, list(kind.order)]]
+    places = [corners, middles]
+    local = np.array(kind.places, float)
+    if not kind.simplex:
+        count, edges = kind.corners, len(kind.edges)
+        for middle in local[count + edges:]:
+            held = middle != 0.5
+            near = [(np.flatnonzero((local[a:b][:, held] == middle[held]).all(axis=1)))
+                    for a, b in ((0, count), (count, count + edges))]
+            share = 0.5 if len(near[1]) == 4 else 0.25
+            places.append((share * middles[:, near[1]].sum(axis=1)
+                           - 0.25 * corners[:, near[0]].sum(axis=1))[:, None])
+    return np.concatenate(places, axis=1)
+
+
+def curved_volumes(places: Array, kind: CellKind) -> Array:
+    """Volumes (M,), in the plane areas, of cells with second-order places (M, k, d).
+
+    Raises
+    ------
+    MeshError
+        If a cell is folded: its Jacobian determinant is not positive everywhere.
+    """
+    count, dimension = len(kind.places), kind.dimension
+    corners = np.array(kind.places, float)
+    points = np.stack(np.meshgrid(*[_GAUSS] * dimension, indexing="ij"), -1).reshape(-1, dimension)
+    weights = np.prod(np.meshgrid(*[_WEIGHTS] * dimension, indexing="ij"), axis=0).ravel()
+    if kind.simplex:  # collapse the square or cube: x1 = s1, x2 = s2 (1 - s1), ...
+        left = np.ones(len(points))
+        for axis in range(dimension):
+            points[:, axis], left, weights = (points[:, axis] * left,
+                                              left * (1.0 - points[:, axis]), weights * left)
+    volume = np.zeros(len(places))
+    smallest = np.full(len(places), np.inf)
+    for local, weight in zip(np.concatenate([points, corners]),
+                             np.concatenate([weights, np.zeros(len(corners))]), strict=True):
+        _, slopes = shape_functions(dimension, count, local)
+        determinant = np.linalg.det(np.einsum("kj,mki->mij", slopes, places))
+        volume += weight * determinant
+        smallest = np.minimum(smallest, determinant)
+    bad = smallest <= 1e-6 * volume
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        where = ", ".join(f"{x:g}" for x in places[first].mean(axis=0))
+        raise MeshError(f"{np.count_nonzero(bad)} curved mesh cells are folded, the first is cell "
+                        f"{first} at ({where}); mesh with a smaller size or first-order elements.")
+    return volume

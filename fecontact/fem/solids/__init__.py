@@ -1,0 +1,1 @@
+"""Solids described by their dimensions, and their meshes."""

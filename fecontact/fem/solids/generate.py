@@ -1,0 +1,307 @@
+"""Meshes of solids with named faces and points, swept from plane patches."""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fecontact.core.errors import InputError
+from fecontact.core.memory import available_memory
+from fecontact.core.types import Array
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.solids.shapes import (
+    Cylinder,
+    LapStrip,
+    Plate,
+    Ring,
+    SolidBlock,
+    SolidShape,
+    SphereSegment,
+)
+from fecontact.fem.solids.swept_blocks import (
+    Patch2D,
+    Sweep,
+    arc,
+    between,
+    full_disc,
+    lines,
+    rectangle,
+    segment,
+    swept_mesh,
+)
+
+MAX_CELLS = 2_000_000
+_BYTES = 12_000.0  # memory per hexahedron during meshing
+_NEAR = 1e-6  # of the solid's size: how close corners are to the face they lie on
+
+# Names of faces by their corners (k, n, 3) and area vectors (k, 3).
+_Names = Callable[[Array, Array], Array]
+
+
+def generate_solid(shape: SolidShape) -> Mesh:
+    """The mesh of a solid; InputError for an element size that makes too many elements."""
+    match shape:
+        case SolidBlock():
+            return _block(shape)
+        case Plate():
+            return _plate(shape)
+        case Ring():
+            return _ring(shape)
+        case Cylinder():
+            return _cylinder(shape)
+        case SphereSegment():
+            return _sphere_segment(shape)
+        case LapStrip():
+            return _lap_strip(shape)
+
+
+def _made(shape: SolidShape, sweep: Sweep, names: _Names,
+          points: dict[str, tuple[float, float, float]],
+          groups: dict[str, Callable[[Array], Array]] | None = None) -> Mesh:
+    tetrahedra = shape.element == "tetrahedron"
+    count = sweep.count * (6 if tetrahedra else 1)
+    most = int(min(MAX_CELLS, available_memory() / _BYTES * (6 if tetrahedra else 1)))
+    if count > most:
+        raise InputError(
+            f"{type(shape).__name__}: element_size = {shape.element_size!r} makes {count:.3g} "
+            f"elements, more than {most}; take one of at least "
+            f"{1.2 * shape.element_size * (count / most) ** (1 / 3):.2g} m.")
+    return swept_mesh(sweep, tetrahedra, names, points, groups)
+
+
+def _block(shape: SolidBlock) -> Mesh:
+    L, W, H = shape.length, shape.width, shape.height
+    a = L if shape.contact_length is None else shape.contact_length
+    b = W if shape.contact_width is None else shape.contact_width
+    drive = H / 2 if shape.drive_height is None else shape.drive_height
+    size = shape.element_size
+    z = _divided(size, 0.0, H, drive)
+    sweep = Sweep([rectangle(_divided(size, 0.0, L, L / 2, (L - a) / 2, (L + a) / 2),
+                             _divided(size, 0.0, W, W / 2, (W - b) / 2, (W + b) / 2))],
+                  z / H, lambda xy, w: np.concatenate([xy, H * w[..., None]], axis=-1))
+
+    def touching(at: Array) -> Array:
+        middle = np.abs(at.mean(axis=1)[:, :2] - [L / 2, W / 2])
+        return np.asarray((middle < [a / 2, b / 2]).all(axis=1))
+
+    return _made(shape, sweep, _box_names(touching),
+                 {"B": (0.0, W / 2, drive), "C": (L / 2, W / 2, H)})
+
+
+def _plate(shape: Plate) -> Mesh:
+    L, W, H = shape.length, shape.width, shape.thickness
+    size, near = shape.element_size, _NEAR * max(shape.length, shape.width)
+    layers = shape.layers
+    middle = H / 2 if layers % 2 == 0 else H * (layers // 2) / layers
+    sweep = Sweep([rectangle(_divided(size, 0.0, L, L / 2), _divided(size, 0.0, W, W / 2))],
+                  lines(layers), lambda xy, w: np.concatenate([xy, H * w[..., None]], axis=-1))
+
+    def bottom_edges(nodes: Array) -> Array:
+        x, y, z = nodes.T
+        rim = (x < near) | (x > L - near) | (y < near) | (y > W - near)
+        return np.asarray(rim & (z < 1e-6 * H))
+
+    return _made(shape, sweep, _box_names(lambda at: np.ones(len(at), bool)),
+                 {"B": (0.0, W / 2, middle), "C": (L / 2, W / 2, H)},
+                 {"bottom_edges": bottom_edges})
+
+
+def _ring(shape: Ring) -> Mesh:
+    R, r, H, size = shape.outer_radius, shape.inner_radius, shape.thickness, shape.element_size
+    layers = shape.layers or _count(H, size)
+    patches = _round(R, r, 0.25 * math.pi, size)
+    sweep = Sweep(patches, lines(layers),
+                  lambda xy, w: np.concatenate([xy, H * w[..., None]], axis=-1))
+    middle = H * ((layers + 1) // 2) / layers
+    return _made(shape, sweep, _round_names(R, r, 2, ("contact", "top")),
+                 {"B": (R, 0.0, middle), "C": (0.5 * (R + r) if r else 0.0, 0.0, H)})
+
+
+def _cylinder(shape: Cylinder) -> Mesh:
+    R, r, L, size = shape.radius, shape.inner_radius, shape.length, shape.element_size
+    half = math.radians(0.5 * shape.contact_angle)
+    y = _divided(size, 0.0, L, L / 2)
+
+    def lift(xy: Array, w: Array) -> Array:
+        # The plane of the patches, turned up: x, and z from the axis; y along the sweep.
+        return np.stack([xy[..., 0], L * w, R + xy[..., 1]], axis=-1)
+
+    around = _round_names(R, r, 1, ("front", "back"))
+
+    def names(at: Array, normals: Array) -> Array:
+        found = around(at - [0.0, 0.0, R], normals)
+        x, _, z = (at.mean(axis=1) - [0.0, 0.0, R]).T
+        low = np.abs(np.arctan2(x, -z)) < half
+        return np.where((found == "outer") & low, "contact", found)
+
+    return _made(shape, Sweep(_round(R, r, half, size), y / L, lift), names,
+                 {"B": (-R, L / 2, R), "C": (0.0, L / 2, 2 * R)})
+
+
+def _sphere_segment(shape: SphereSegment) -> Mesh:
+    R, a, H = shape.radius, shape.base_radius, shape.height
+    c = a if shape.contact_radius is None else shape.contact_radius
+    fine = shape.contact_element_size or shape.element_size
+    inside = c < a * (1 - 1e-9)
+    core = (0.6 * c)
+    side = _count(0.5 * math.pi * c, fine)
+    disc = full_disc(c, core, 0.25 * math.pi, (side, side), lines(_count(c - 0.8 * core, fine)))
+    patches = list(disc)
+    if inside:
+        across = _growing(a - c, fine, shape.element_size)
+        patches += [between(arc(c, t, t + 0.5 * math.pi), arc(a, t, t + 0.5 * math.pi),
+                            lines(side), across)
+                    for t in (0.25 * math.pi + 0.5 * math.pi * k for k in range(4))]
+    z = _growing(H, fine, shape.element_size)
+
+    def lift(xy: Array, w: Array) -> Array:
+        low = R - np.sqrt(R**2 - np.minimum((xy**2).sum(axis=-1), a**2))
+        return np.concatenate([xy, (low + w * (H - low))[..., None]], axis=-1)
+
+    def names(at: Array, normals: Array) -> Array:
+        x, y, z = np.moveaxis(at, 2, 0)
+        away = np.hypot(x, y)
+        top = (z > H - _NEAR * a).all(axis=1)
+        outer = (away > a * (1 - _NEAR)).all(axis=1)
+        contact = (away < c * (1 + _NEAR)).all(axis=1)
+        return np.select([top, outer, contact], ["top", "outer", "contact"], "bottom")
+
+    rise = R - math.sqrt(R**2 - a**2)
+    half = z[len(z) // 2]
+    return _made(shape, Sweep(patches, z, lift), names,
+                 {"B": (-a, 0.0, rise + half * (H - rise)), "C": (0.0, 0.0, H)})
+
+
+def _lap_strip(shape: LapStrip) -> Mesh:
+    L, W, H, lap = shape.length, shape.width, shape.thickness, shape.overlap
+    size, r, washer = shape.element_size, shape.hole_radius, shape.washer_radius
+    nx, ny = shape.holes_along, shape.holes_across
+    cell = lap / nx, W / ny
+    # An even number of elements along x and y: the corners of the cells are at whole ones.
+    counts = [2 * _count(0.5 * side, size) for side in cell]
+    patches: list[Patch2D] = []
+    centres = [(-lap / 2 + (i + 0.5) * cell[0], (j + 0.5) * cell[1])
+               for i in range(nx) for j in range(ny)]
+    for centre in centres:
+        patches += _cell_with_hole(centre, cell, r, washer, counts, size)
+    far = _divided(size, lap / 2, L - lap / 2)
+    patches.append(rectangle(far, np.concatenate(
+        [cell[1] * (j + lines(counts[1])[(1 if j else 0):]) for j in range(ny)])))
+    sign = 1.0 if shape.layer == "upper" else -1.0
+
+    def lift(xy: Array, w: Array) -> Array:
+        # The lower layer is the upper one turned about the y axis.
+        return np.stack([sign * xy[..., 0], xy[..., 1], sign * H * w], axis=-1)
+
+    near = _NEAR * L
+
+    def names(at: Array, normals: Array) -> Array:
+        x, y, z = np.moveaxis(at * [sign, 1.0, sign], 2, 0)
+        middle = np.stack([x.mean(axis=1), y.mean(axis=1)], axis=1)
+        owner = np.linalg.norm(middle[:, None] - np.array(centres), axis=2).argmin(axis=1)
+        away = np.hypot(*(np.stack([x, y], -1) - np.array(centres)[owner][:, None]).T).T
+        number = np.char.add("_", (owner + 1).astype(str))
+        low, high = (np.abs(z) < near).all(axis=1), (np.abs(z - H) < near).all(axis=1)
+        hole = (np.abs(away - r) < near).all(axis=1) & ~low & ~high
+        ring = high & (away < washer + near).all(axis=1)
+        return np.select(
+            [hole, ring, low & (middle[:, 0] < lap / 2), low, high,
+             (x > L - lap / 2 - near).all(axis=1), (x < near - lap / 2).all(axis=1),
+             (y < near).all(axis=1)],
+            [np.char.add("hole", number), np.char.add("washer", number), "contact", "inner",
+             "outer", "end", "tip", "front"], "back")
+
+    middle = W / 2 if counts[1] * ny % 2 == 0 else W / 2 - 0.5 * cell[1] / counts[1]
+    level = H * ((shape.layers + 1) // 2) / shape.layers
+    return _made(shape, Sweep(patches, lines(shape.layers), lift), names,
+                 {"B": (sign * (L - lap / 2), middle, sign * level),
+                  "C": (-sign * lap / 2, middle, sign * H)})
+
+
+def _cell_with_hole(
+    centre: tuple[float, float], cell: tuple[float, float], hole: float, washer: float,
+    counts: Sequence[int], size: float,
+) -> list[Patch2D]:
+    """A rectangle around a round hole: a ring to the washer's rim, and from there to the sides."""
+    x, y = 0.5 * cell[0], 0.5 * cell[1]
+    corners = [(centre[0] + i * x, centre[1] + j * y) for i, j in ((-1, -1), (1, -1), (1, 1),
+                                                                   (-1, 1))]
+    tilt = math.atan2(y, x)
+    angles = [-math.pi + tilt, -tilt, tilt, math.pi - tilt, math.pi + tilt]
+    ring = lines(_count(washer - hole, size))
+    beyond = lines(_count(math.hypot(x, y) - washer, 1.5 * size))
+    patches = []
+    for k in range(4):
+        along = lines(counts[k % 2])
+        inner, rim = (arc(radius, angles[k], angles[k + 1], centre) for radius in (hole, washer))
+        side = segment(corners[k], corners[(k + 1) % 4])
+        patches += [between(inner, rim, along, ring), between(rim, side, along, beyond)]
+    return patches
+
+
+def _round(outer: float, inner: float, half: float, size: float) -> list[Patch2D]:
+    """A disc or ring, with lines at ``half`` [rad] to both sides of -y and +y."""
+    counts = tuple(2 * _count(0.5 * angle * outer, size) for angle in (2 * half,
+                                                                       math.pi - 2 * half))
+    if inner == 0.0:
+        core = 0.6 * outer
+        return full_disc(outer, core, half, (counts[0], counts[1]),
+                         lines(_count(outer - 0.85 * core, size)))
+    across = lines(2 * _count(0.5 * (outer - inner), size))
+    angles = [-0.5 * math.pi - half, -0.5 * math.pi + half, 0.5 * math.pi - half,
+              0.5 * math.pi + half, 1.5 * math.pi - half]
+    return [between(arc(inner, angles[k], angles[k + 1]), arc(outer, angles[k], angles[k + 1]),
+                    lines(counts[k % 2]), across) for k in range(4)]
+
+
+def _box_names(touching: Callable[[Array], Array]) -> _Names:
+    def names(at: Array, normals: Array) -> Array:
+        main = np.abs(normals).argmax(axis=1)
+        facing = np.eye(3, dtype=bool)[main]
+        low, high = facing & (normals < 0.0), facing & (normals > 0.0)
+        return np.select(
+            [low[:, 2] & touching(at), low[:, 2], high[:, 2], low[:, 0], high[:, 0], low[:, 1]],
+            ["contact", "bottom", "top", "left", "right", "front"], "back")
+
+    return names
+
+
+def _round_names(outer: float, inner: float, axis: int, ends: tuple[str, str]) -> _Names:
+    """Names of the faces of a body of rotation about an axis."""
+
+    def names(at: Array, normals: Array) -> Array:
+        across = [i for i in range(3) if i != axis]
+        away = np.linalg.norm(at[..., across], axis=2)
+        flat = np.abs(normals[:, axis]) > 0.5 * np.linalg.norm(normals, axis=1)
+        return np.select(
+            [flat & (normals[:, axis] < 0), flat, (away > 0.5 * (outer + inner)).all(axis=1)],
+            [*ends, "outer"], "inner")
+
+    return names
+
+
+def _divided(size: float, first: float, last: float, *between: float) -> Array:
+    """Lines from first to last that include those between, with steps of at most ``size``."""
+    kept = [first, last]
+    for value in between:
+        if all(abs(value - line) > 1e-9 * (last - first) for line in kept):
+            kept.append(value)
+    kept.sort()
+    parts = [np.linspace(a, b, _count(b - a, size) + 1)[:-1]
+             for a, b in itertools.pairwise(kept)]
+    return np.append(np.concatenate(parts), last)
+
+
+def _count(length: float, size: float) -> int:
+    """Number of parts of a length that are at most as long as a size."""
+    return int(np.clip(math.ceil(length / max(size, 1e-99) - 1e-6), 1, 10**7))
+
+
+def _growing(length: float, first: float, last: float) -> Array:
+    """Lines from 0 to 1 over a length, steps growing from the first size to about the last one."""
+    steps = [min(first, length)]
+    while sum(steps) < length * (1 - 1e-9) and len(steps) < 10**6:
+        steps.append(min(1.35 * steps[-1], max(last, first)))
+    reached = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.asarray(reached / reached[-1])
