@@ -21,6 +21,9 @@ from fecontact.core.types import Array
 
 Product = Callable[[Array], Array]
 
+# Largest eta that counts as converged where round-off allows no less: 1e-8 of the frequency.
+_WORST = 1e-4
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -90,7 +93,7 @@ def lowest_modes(
         residual = KS[:, :width] - MS[:, :width] * squares
         W = precondition(residual)
         errors = np.sqrt(np.abs(np.einsum("ij,ij->j", residual, W)) / squares)
-        limit = np.maximum(tolerance, np.sqrt(floor / squares))
+        limit = np.clip(np.sqrt(floor / squares), tolerance, _WORST)
         # Guard vectors need no accuracy of their own, but help the last modes.
         active = errors > limit
         if not active[:count].any() or step == most or not np.isfinite(errors).all():
