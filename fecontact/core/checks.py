@@ -122,6 +122,18 @@ def as_unit_pair(values: Any, what: str) -> tuple[float, float]:
     return float(x), float(y)
 
 
+def as_direction(values: Any, what: str) -> Coordinates:
+    """A direction (x, y) or (x, y, z) of length one; InputError for one of length zero."""
+    if np.ndim(values) != 1 or len(values) != 3:
+        return as_unit_pair(values, what)
+    direction = np.array(as_place(values, what, 3))
+    length = float(np.linalg.norm(direction))
+    if not 0.0 < length < np.inf:
+        raise InputError(f"{what} = {shown(values)} must be longer than zero.")
+    x, y, z = (direction if abs(length - 1.0) <= 1e-12 else direction / length).tolist()
+    return x, y, z
+
+
 def as_integers(values: Any, what: str) -> Integers:
     """Convert to an array of integers; InputError if a value is not a whole number."""
     found = as_floats(values, what)
