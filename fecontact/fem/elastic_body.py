@@ -27,9 +27,9 @@ from fecontact.fem.supports import HingeSupport, check_supports, expansion, fixe
 # Memory per unknown for modes [bytes], by dimension and number of corners.
 _BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 8): 1.2e4}
 # Order of quadrature by dimension, number of corners and degree: exact for the mass of straight
-# triangles and tetrahedra, parallelograms and parallelepipeds.
+# triangles and tetrahedra, parallelograms and parallelepipeds; for trilinear cells of degree 1 too.
 _ORDER = {(2, 3, 1): 4, (2, 3, 2): 4, (2, 4, 1): 4, (2, 4, 2): 4,
-          (3, 4, 1): 2, (3, 4, 2): 4, (3, 8, 1): 3, (3, 8, 2): 5}
+          (3, 4, 1): 2, (3, 4, 2): 4, (3, 8, 1): 5, (3, 8, 2): 5}
 # With curved cells the products of shape functions meet determinants of higher order.
 _CURVED_ORDER = {(2, 3): 6, (2, 4): 6, (3, 4): 6, (3, 8): 6}
 
