@@ -106,10 +106,18 @@ def lowest_modes(
         W, MW = _normalised(W, MW)
         KW = stiffness(W)
         squares, C, energies = _best(energies, S.T @ KW, W.T @ KW, width, active)
-        S, KS, MS = (one @ C[: one.shape[1]] + new @ C[one.shape[1] :]
-                     for one, new in ((S, W), (KS, KW), (MS, MW)))
+        # One after the other: two sets of three would be most of the memory.
+        S = _combined(S, W, C)
+        KS = _combined(KS, KW, C)
+        MS = _combined(MS, MW, C)
     converged = bool((errors[:count] <= limit[:count]).all())
     return Found(squares[:count], S[:, :count], errors[:count], converged, step)
+
+
+def _combined(one: Array, new: Array, C: Array) -> Array:
+    found = one @ C[: one.shape[1]]
+    found += new @ C[one.shape[1] :]
+    return found
 
 
 def _best(
