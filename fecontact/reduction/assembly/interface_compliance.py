@@ -24,7 +24,7 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.assembly.contact_faces import contact_faces
 from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.static_modes.residual_vectors import Flexibility
+from fecontact.reduction.static_modes.residual_vectors import flexibility_of
 
 # Part of the compliance that should be resolved; laws of contact are not known better.
 _ENOUGH = 0.9
@@ -159,7 +159,7 @@ def interface_compliance(
         kept = full = own @ own.T
         if body is not None and len(used):
             full = np.zeros_like(kept)
-            full[np.ix_(used, used)] = Flexibility(
+            full[np.ix_(used, used)] = flexibility_of(
                 FreeSystem.of(body), nodal[used] @ body.expansion).compliance
         whole += full
         missing[name] = full - kept
