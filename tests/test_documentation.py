@@ -279,6 +279,14 @@ def check_solids(names, printed, folder):
                                                                      rel=0.02)
 
 
+def check_faces_in_space(names, printed, folder):
+    """The areas add up to the face; a crown's lowest place lies within a patch of its centre."""
+    assert names["basis"].tributary.sum() == pytest.approx(0.1 * 0.06)
+    assert 0.0 <= names["lowest"] < 0.02**2 / 4.0
+    assert names["pairing"].tributary.sum() == pytest.approx(0.1 * 0.06)
+    assert "uniform pressure" in printed
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
@@ -286,7 +294,7 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
           "set-valued.md": check_set_valued, "loads.md": check_loads,
           "preload.md": check_preload, "rotation.md": check_rotation, "bodies.md": check_bodies,
           "solids.md": check_solids,
-          "report.md": check_report,
+          "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,
           "results.md": check_results}
 
 

@@ -307,7 +307,8 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     """
     K, M = system.stiffness, system.mass
     size = K.shape[0]
-    if system.body is not None and system.iterative is not None and 3 * count < size:
+    if size > max(_DENSE, 6 * count) and system.iterative is not None:
+        assert system.body is not None
         E = system.body.expansion
         found = system.iterative.modes(count, E @ system.rigid)
         if found.converged:

@@ -13,6 +13,7 @@ from fecontact.fem.elements.cell_kinds import CELL_KINDS
 from fecontact.reduction import eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import FreeSystem, eigenmodes, strain_energies
 from fecontact.reduction.solvers.factorisation import factorised, nested_dissection
+from fecontact.reduction.solvers.lobpcg import lowest_modes
 from fecontact.reduction.solvers.solid_solver import aspect_ratios, suited
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
@@ -130,6 +131,19 @@ def test_choice(monkeypatch):
     assert FreeSystem.of(ElasticBody(mesh, STEEL), "direct").iterative is None
     with pytest.raises(InputError, match=r"eigensolver = 'lanczos' must be one of"):
         eigenmodes(ElasticBody(mesh, STEEL), 8, "lanczos")
+
+
+@pytest.mark.parametrize(("noise", "reached"), [(0.0, 1e-6), (1e-12, 1e-5), (1.0, 1e-4)])
+def test_accuracy_is_stated(noise, reached):
+    """Residuals end at the tolerance, or where round-off ends them, but no frequency above 1e-8."""
+    squares = np.linspace(1.0, 3.0, 400)[:, None] ** 4
+    rough = squares * np.linspace(0.7, 1.6, 400)[::-1, None]
+    start = np.random.default_rng(0).standard_normal((400, 16))
+    found = lowest_modes(lambda x: squares * x, lambda x: x.copy(), lambda x: x / rough, start, 5,
+                         np.zeros((400, 0)), 1e-6, np.array([noise]))
+    assert found.converged
+    assert reached / 100.0 < found.errors.max() <= reached
+    assert np.sqrt(found.squares) == pytest.approx(np.sqrt(squares[:5, 0]), rel=reached**2)
 
 
 def test_aspect_ratios():

@@ -21,6 +21,9 @@ from fecontact.core.types import Array
 
 Product = Callable[[Array], Array]
 
+# Largest eta that counts as converged where round-off allows no less: 1e-8 of the frequency.
+_WORST = 1e-4
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -90,7 +93,7 @@ def lowest_modes(
         residual = KS[:, :width] - MS[:, :width] * squares
         W = precondition(residual)
         errors = np.sqrt(np.abs(np.einsum("ij,ij->j", residual, W)) / squares)
-        limit = np.maximum(tolerance, np.sqrt(floor / squares))
+        limit = np.clip(np.sqrt(floor / squares), tolerance, _WORST)
         # Guard vectors need no accuracy of their own, but help the last modes.
         active = errors > limit
         if not active[:count].any() or step == most or not np.isfinite(errors).all():
@@ -103,10 +106,18 @@ def lowest_modes(
         W, MW = _normalised(W, MW)
         KW = stiffness(W)
         squares, C, energies = _best(energies, S.T @ KW, W.T @ KW, width, active)
-        S, KS, MS = (one @ C[: one.shape[1]] + new @ C[one.shape[1] :]
-                     for one, new in ((S, W), (KS, KW), (MS, MW)))
+        # One after the other: two sets of three would be most of the memory.
+        S = _combined(S, W, C)
+        KS = _combined(KS, KW, C)
+        MS = _combined(MS, MW, C)
     converged = bool((errors[:count] <= limit[:count]).all())
     return Found(squares[:count], S[:, :count], errors[:count], converged, step)
+
+
+def _combined(one: Array, new: Array, C: Array) -> Array:
+    found = one @ C[: one.shape[1]]
+    found += new @ C[one.shape[1] :]
+    return found
 
 
 def _best(
