@@ -137,6 +137,10 @@ class ContactSystem(Summarised):
         if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
             raise InputError("ContactSystem: there are no contact nodes; give the basis contact "
                              "nodes, or the bodies an interface or a nonlinear spring.")
+        if isinstance(self.basis, ModalBasis) and self.basis.dimension == 3:
+            raise InputError("ContactSystem: the basis is that of a solid, but contact forces have "
+                             "one tangent only; make the body plane. Of solids there are modes, "
+                             "contact patches, compliance and convergence.")
         if self.normal is None:
             raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
         if self.friction is None:
