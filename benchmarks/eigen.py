@@ -1,19 +1,31 @@
-"""Modes of a body with 150,000 unknowns: fecontact against scipy's default, side by side.
+"""Modes of bodies with 150,000 unknowns: fecontact against scipy's default, side by side.
 
 Usage: python benchmarks/eigen.py [repetitions] [--quick]
+       python benchmarks/eigen.py --solids [unknowns] [shape ...] [solver ...] [--quick]
+
+Solids are a cube of side 1 and a plate 1 x 1 x 0.05 of quadratic tetrahedra; solvers are "scipy",
+"direct" and "iterative", each in a process of its own, whose largest memory is told. By default all
+of them, with 50,000 unknowns. Times are those of the modes, without the assembly, which is told in
+a column of its own.
 """
 
+import json
+import resource
 import statistics
+import subprocess
 import sys
 import time
 
 import numpy as np
 from scipy.sparse.linalg import eigsh
+from skfem import MeshTet
 
-from fecontact import ElasticBody, Mesh
-from fecontact.reduction.eigenmodes import backward_error, eigenmodes
+from fecontact import ElasticBody, Material, Mesh
+from fecontact.reduction.eigenmodes import FreeSystem, backward_error, eigenmodes, free_modes
 
 MODES = 20
+SHAPES = {"cube": (1.0, 1.0, 1.0), "plate": (1.0, 1.0, 0.05)}
+SOLVERS = ("scipy", "direct", "iterative")
 
 
 def rectangle(length: float, height: float, nx: int, ny: int, corners: int) -> Mesh:
@@ -55,6 +67,75 @@ def main(repetitions: int = 3, quick: bool = False) -> None:
               f"{statistics.median(ours):14.2f} {ratio:6.2f} {error:9.1e}")
 
 
+def block(shape: str, unknowns: int) -> Mesh:
+    """Cells about as long as wide, so many that quadratic elements have so many unknowns."""
+    sides = np.array(SHAPES[shape])
+    length = (3.0 * sides.prod() / unknowns) ** (1.0 / 3.0) * 2.0
+    # Nodes on the faces make more of thin bodies.
+    for _ in range(20):
+        cells = np.maximum(np.round(sides / length), 1).astype(int)
+        if 3 * np.prod(2 * cells + 1) <= 1.05 * unknowns:
+            break
+        length *= 1.02
+    grid = MeshTet.init_tensor(*(np.linspace(0.0, a, n + 1)
+                                 for a, n in zip(sides, cells, strict=True)))
+    return Mesh(grid.p.T, grid.t.T)
+
+
+def solved(shape: str, solver: str, unknowns: int) -> None:
+    """Print what one solver finds, as JSON."""
+    begin = time.perf_counter()
+    body = ElasticBody(block(shape, unknowns), Material.named("steel"))
+    K, M = body.stiffness, body.mass
+    ready = time.perf_counter()
+    if solver == "scipy":
+        # Well below the lowest elastic mode.
+        waves = body.elasticity[2] / body.material.density
+        sigma = -1e-3 * waves * (np.pi / body.mesh.extent) ** 2
+        squares = eigsh(K, k=MODES + 6, M=M, sigma=sigma, return_eigenvectors=True)[0]
+        w = np.sqrt(np.sort(squares)[6:])
+    else:
+        w = free_modes(FreeSystem.of(body, solver), MODES + 6)[0][6:]
+    end = time.perf_counter()
+    print(json.dumps({"unknowns": K.shape[0], "assembly": ready - begin, "time": end - ready,
+                      "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2,
+                      "w": w.tolist()}))
+
+
+def solids(unknowns: int, shapes: list[str], solvers: list[str]) -> None:
+    """Print the table of solids."""
+    print(f"{'body':6s} {'unknowns':>9s} {'solver':>10s} {'assembly [s]':>13s} {'modes [s]':>10s} "
+          f"{'times faster':>13s} {'memory [GB]':>12s} {'difference':>11s}")
+    for shape in shapes:
+        first = None
+        for solver in solvers:
+            done = subprocess.run(
+                [sys.executable, __file__, "--one", shape, solver, str(unknowns)], check=True,
+                capture_output=True, text=True)
+            found = json.loads(done.stdout)
+            first = first or found
+            difference = np.abs(np.array(found["w"]) / first["w"] - 1.0).max()
+            print(f"{shape:6s} {found['unknowns']:9d} {solver:>10s} {found['assembly']:13.2f} "
+                  f"{found['time']:10.2f} {first['time'] / found['time']:13.1f} "
+                  f"{found['memory']:12.2f} {difference:11.1e}", flush=True)
+
+
+def chosen(words: list[str], quick: bool) -> None:
+    """Solids, by the words of the command line."""
+    numbers = [int(word) for word in words if word.isdigit()]
+    solids(numbers[0] if numbers else 3000 if quick else 50_000,
+           [name for name in SHAPES if name in words] or list(SHAPES),
+           [name for name in SOLVERS if name in words] or list(SOLVERS))
+
+
 if __name__ == "__main__":
-    main(*(int(given) for given in sys.argv[1:] if given != "--quick"),
-         quick="--quick" in sys.argv)
+    given = [word for word in sys.argv[1:] if word != "--quick"]
+    if given[:1] == ["--one"]:
+        solved(given[1], given[2], int(given[3]))
+    elif given[:1] == ["--solids"]:
+        chosen(given[1:], "--quick" in sys.argv)
+    else:
+        main(*(int(word) for word in given), quick="--quick" in sys.argv)
+        if "--quick" in sys.argv:
+            print()
+            chosen([], True)

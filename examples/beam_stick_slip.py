@@ -33,6 +33,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.integrate import initial_state
 from fecontact.laws import Constant, ExponentialFriction, RoughSurface
+from fecontact.plot import COLOURS, new_figure
 
 SPEED = "ground.speed"
 PULL = 9.5  # N, of the spring on the beam where it is not displaced
@@ -145,32 +146,31 @@ def side_by_side(branch: Branch, speed: float) -> list[PeriodicMotion]:
 def draw(path: Path, stuck_slip: Branch, free: Branch, hopf: BranchPoint,
          runs: list[tuple[float, PeriodicMotion]]) -> None:
     """Amplitude and period over the speed of the belt: stable solid, unstable dashed, runs dots."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(11.0, 4.0), layout="constrained")
-    for axis in axes:
-        for branch, colour in ((stuck_slip, "C0"), (free, "C1")):
-            speed = 1e3 * branch.parameter
-            stable = np.array([point.values["stable"] for point in branch.points])
-            y = np.array([amplitude(point) if axis is axes[0] else 1e3 * point.values["period"]
-                          for point in branch.points])
-            unstable = ~stable
-            unstable[1:] |= ~stable[:-1]
-            unstable[:-1] |= ~stable[1:]
-            axis.plot(speed, np.where(stable, y, np.nan), color=colour,
-                      label="stick-slip" if branch is stuck_slip else None)
-            axis.plot(speed, np.where(unstable, y, np.nan), "--", color=colour,
-                      label="without stick" if branch is free else None)
-        values = [run_amplitude(run) if axis is axes[0] else 1e3 * run.period for _, run in runs]
-        axis.plot([1e3 * speed for speed, _ in runs], values, "k.", label="runs")
-        axis.set_xlabel("speed of the belt [mm/s]")
-        axis.set_ylabel("amplitude of B [mm]" if axis is axes[0] else "period [ms]")
-    axes[0].plot([1e3 * hopf.parameter, 320.0], [0.0, 0.0], color="C2", label="steady sliding")
-    axes[0].plot([2.0, 1e3 * hopf.parameter], [0.0, 0.0], "--", color="C2")
-    axes[0].legend(frameon=False)
-    axes[2].set(xlim=(39.2, 40.9), ylim=(57.8, 60.6))
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    with new_figure(11.0, 4.0, path) as figure:
+        axes = figure.subplots(1, 3)
+        for axis in axes:
+            for branch, colour in ((stuck_slip, COLOURS[0]), (free, COLOURS[1])):
+                speed = 1e3 * branch.parameter
+                stable = np.array([point.values["stable"] for point in branch.points])
+                y = np.array([amplitude(point) if axis is axes[0] else 1e3 * point.values["period"]
+                              for point in branch.points])
+                unstable = ~stable
+                unstable[1:] |= ~stable[:-1]
+                unstable[:-1] |= ~stable[1:]
+                axis.plot(speed, np.where(stable, y, np.nan), color=colour,
+                          label="stick-slip" if branch is stuck_slip else None)
+                axis.plot(speed, np.where(unstable, y, np.nan), "--", color=colour,
+                          label="without stick" if branch is free else None)
+            values = [run_amplitude(run) if axis is axes[0] else 1e3 * run.period
+                      for _, run in runs]
+            axis.plot([1e3 * speed for speed, _ in runs], values, "k.", label="runs")
+            axis.set_xlabel("speed of the belt [mm/s]")
+            axis.set_ylabel("amplitude of B [mm]" if axis is axes[0] else "period [ms]")
+        steady = 1e3 * hopf.parameter
+        axes[0].plot([steady, 320.0], [0.0, 0.0], color=COLOURS[2], label="steady sliding")
+        axes[0].plot([2.0, steady], [0.0, 0.0], "--", color=COLOURS[2])
+        axes[0].legend()
+        axes[2].set(xlim=(39.2, 40.9), ylim=(57.8, 60.6))
 
 
 def main(path: Path = Path("beam_stick_slip.png"), quick: bool = False) -> None:

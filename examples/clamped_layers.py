@@ -115,7 +115,7 @@ def figure(parts: np.ndarray, losses: np.ndarray, path: Path | None = None) -> "
         axis = drawn.subplots()
         axis.plot(fine, slip_theory(fine * END_LOAD), color=COLOURS[0], label="slip theory")
         axis.plot(parts, losses, "o", color=COLOURS[1], label="two bodies")
-        axis.set(xlabel="mu p b h / P", ylabel="loss per cycle [J]", xlim=(0.0, 0.8))
+        axis.set(xlabel="µ p b h / P", ylabel="loss per cycle [J]", xlim=(0.0, 0.8))
         axis.set_ylim(bottom=0.0)
         axis.legend()
     return drawn

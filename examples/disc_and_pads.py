@@ -129,7 +129,9 @@ def plot_map(system: fc.ContactSystem, frictions: np.ndarray, path: Path) -> Non
                 for grows, colour in enumerate(COLOURS[:2]):  # growing modes on top
                     chosen = values[modes.grows[low] == grows]
                     axes.plot(np.full(len(chosen), friction), chosen, ".", color=colour, ms=5.0,
-                              zorder=2.0 + grows)
+                              zorder=2.0 + grows, label="grows" if grows else "decays")
+        entries = dict(zip(*reversed(above.get_legend_handles_labels()), strict=True))
+        figure.legend(entries.values(), entries, loc="outside upper right", ncols=2)
         above.set(ylabel="frequency [kHz]")
         below.set(ylabel="damping ratio [%]", xlabel="friction coefficient")
 

@@ -136,7 +136,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
         for (_, amplitude), name, colour in ((free, "free", COLOURS[1]),
                                              (stuck, "stuck", COLOURS[2])):
             axes.axhline(1e6 * amplitude, color=colour, ls="--", label=name)
-        axes.set(xlabel="normal load [N]", ylabel="amplitude at resonance [um]")
+        axes.set(xlabel="normal load [N]", ylabel="amplitude at resonance [µm]")
         axes.legend(loc="center right")
 
 

@@ -150,7 +150,7 @@ def figure(contact: LineContact, path: Path | None = None) -> "Figure":
                                       (contact.shear, COLOURS[1], "shear")):
             axis.plot(contact.x[order] / b, scale * values[order], "o", color=colour,
                       markersize=3.0, label=label)
-        axis.set(xlabel="x / b", ylabel="[GPa]", xlim=(-1.4, 1.4))
+        axis.set(xlabel="x / b", ylabel="pressure, shear [GPa]", xlim=(-1.4, 1.4))
         axis.legend()
     return drawn
 

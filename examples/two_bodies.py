@@ -190,7 +190,7 @@ def figure(contact: ShearedContact, path: Path | None = None) -> "Figure":
         for values, colour, label in ((contact.pressure, COLOURS[0], "pressure"),
                                       (np.abs(contact.shear), COLOURS[1], "shear")):
             axis.plot(contact.x / b, scale * values, "o", color=colour, markersize=3.0, label=label)
-        axis.set(xlabel="x / b", ylabel="[GPa]", xlim=(-1.4, 1.4))
+        axis.set(xlabel="x / b", ylabel="pressure, shear [GPa]", xlim=(-1.4, 1.4))
         axis.legend()
     return drawn
 

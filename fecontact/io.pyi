@@ -6,7 +6,7 @@ from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .output.files.wear import read_wear, write_wear
 from .output.report.branch_report import report_branches
-from .output.report.notebook import ReportFrame, report_frame
+from .output.report.notebook import ReportFrame, report_frame, report_widget
 from .output.report.run_report import report
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import UffModes, read_uff
@@ -34,6 +34,7 @@ __all__ = [
     "report_branches",
     "report_frame",
     "report_sweep",
+    "report_widget",
     "to_pandas",
     "to_xarray",
     "write_basis",

@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SLOW = {"test_documentation", "test_examples", "test_benchmarks", "test_site", "test_reference",
         "test_sweep_killed", "test_ending_signals",
         "test_two_mass_example", "test_shooting_of_beam", "test_branch_command",
-        "test_impact_orbits", "test_report_browser"}
+        "test_impact_orbits", "test_report_browser", "test_report_solid", "test_report_widget"}
 
 # Files whose tests start processes, draw movies, compile or follow motions for long.
 LONG = {
@@ -33,6 +33,7 @@ LONG = {
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",
     "test_receptance", "test_references", "test_eigen", "test_set_valued_search",
     "test_two_bodies", "test_report", "test_report_branches", "test_sweep_report",
+    "test_solid_basis", "test_solid_assembly", "test_surface_patches",
 }
 
 

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from fecontact.output.report.payload import stored_array, unpacked
+from fecontact.output.report.payload import from_text, stored_array, unpacked
 
 
 class Shown:
@@ -12,8 +12,8 @@ class Shown:
 
     def __init__(self, path):
         self.text = path.read_text(encoding="utf-8")
-        block = re.search(r'id="payload">([A-Za-z0-9+/=]+)</script>', self.text).group(1)
-        self.header, self._content = unpacked(block)
+        block = re.search(r'id="payload">([!#-;=-}]+)</script>', self.text).group(1)
+        self.header, self._content = unpacked(from_text(block))
 
     def array(self, *names):
         found = self.header
@@ -38,7 +38,6 @@ class Shown:
 
     @property
     def forces(self):
-        """(N, n, 2) on the contact nodes along x and y."""
-        contact = self.header["contact"]
-        return (self.array("contact", "normal")[..., None] * np.array(contact["normals"])
-                + self.array("contact", "along")[..., None] * np.array(contact["tangents"]))
+        """(N, n, d) on the contact nodes along x, y (and z)."""
+        return np.einsum("tni,nik->tnk", self.array("contact", "forces"),
+                         self.array("contact", "axes"))

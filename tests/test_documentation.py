@@ -271,13 +271,30 @@ def check_results(names, printed, folder):
     assert (best > 0.0).all()
 
 
+def check_solids(names, printed, folder):
+    assert names["body"].total_mass == pytest.approx(7850.0 * np.pi * 0.0075 * 0.004, rel=1e-4)
+    # Leissa's annular plate, clamped inside and free outside, b / a = 0.5: 13.02, 13.29 twice.
+    unit = np.sqrt(2.1e11 * 0.004**2 / (12.0 * 0.91 * 7850.0)) / (2.0 * np.pi * 0.1**2)
+    assert names["basis"].frequencies_hz[:3] / unit == pytest.approx([13.02, 13.29, 13.29],
+                                                                     rel=0.02)
+
+
+def check_faces_in_space(names, printed, folder):
+    """The areas add up to the face; a crown's lowest place lies within a patch of its centre."""
+    assert names["basis"].tributary.sum() == pytest.approx(0.1 * 0.06)
+    assert 0.0 <= names["lowest"] < 0.02**2 / 4.0
+    assert names["pairing"].tributary.sum() == pytest.approx(0.1 * 0.06)
+    assert "uniform pressure" in printed
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,
           "preload.md": check_preload, "rotation.md": check_rotation, "bodies.md": check_bodies,
-          "report.md": check_report,
+          "solids.md": check_solids,
+          "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,
           "results.md": check_results}
 
 

@@ -185,3 +185,10 @@ def test_what_is_wrong_with_a_page_is_found(page, problem, tmp_path):
 def test_stylesheets_from_elsewhere_are_found(tmp_path):
     (tmp_path / "a.css").write_text("@font-face { src: url(https://example.org/x.woff2) }")
     assert len(list(site_module("check_links").problems(tmp_path))) == 1
+
+
+def test_every_picture_of_a_page_can_be_made_again():
+    made = {name for names in site_module("page_images").MAKERS.values() for name in names}
+    images = Path(__file__).parents[1] / "docs" / "images"
+    assert made == {path.stem for path in images.glob("*.png")}
+    assert max(path.stat().st_size for path in images.rglob("*.png")) < 250_000

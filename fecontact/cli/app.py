@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from fecontact.cli.commands import about, branch, run, study, sweep, view
+from fecontact.cli.commands import about, branch, run, study, sweep
 from fecontact.core.errors import InputError
 
 
@@ -39,7 +39,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     run.render,
     run.plot,
     run.export,
-    view.open,
+    run.open,
     about.keys,
     about.laws,
     about.demo,

@@ -18,6 +18,7 @@ UNITS = {
     "Pa": ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa")),
     "W": ((1e-6, "µW"), (1e-3, "mW"), (1.0, "W"), (1e3, "kW")),
     "Hz": ((1.0, "Hz"), (1e3, "kHz")),
+    "J/m": ((1e-9, "nJ/m"), (1e-6, "µJ/m"), (1e-3, "mJ/m"), (1.0, "J/m"), (1e3, "kJ/m")),
     "J": ((1e-9, "nJ"), (1e-6, "µJ"), (1e-3, "mJ"), (1.0, "J"), (1e3, "kJ")),
 }
 
@@ -42,7 +43,7 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
     size : float
         Largest magnitude to show, in ``unit``; zero gives ``unit`` itself.
     unit : str
-        SI unit: m, m/s, rad, rad/s, s, Hz, N, N/m, Pa, W or J.
+        SI unit: m, m/s, rad, rad/s, s, Hz, N, N/m, Pa, W, J or J/m.
 
     Returns
     -------

@@ -85,7 +85,7 @@ def assembled(basis: Any, lateral: float, shear: float, density: float) -> tuple
             sp.csr_array((mass, indices, indptr), shape=(size, size)))
 
 
-def pattern(dofs: Integers, size: int) -> tuple[Integers, Integers, Integers]:
+def pattern(dofs: Integers, size: int) -> tuple[Any, Any, Any]:
     """Sparsity of a matrix between nodes that share a cell.
 
     Returns

@@ -19,6 +19,7 @@ from fecontact.core.errors import (
 from fecontact.core.memory import require_memory
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, quantity, span
+from fecontact.fem.assembly import assembled
 from fecontact.fem.elements.cell_kinds import numbered_rows
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.supports import HingeSupport, check_supports, expansion, fixed_dofs, hinges
@@ -26,9 +27,9 @@ from fecontact.fem.supports import HingeSupport, check_supports, expansion, fixe
 # Memory per unknown for modes [bytes], by dimension and number of corners.
 _BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 8): 1.2e4}
 # Order of quadrature by dimension, number of corners and degree: exact for the mass of straight
-# triangles and tetrahedra, parallelograms and parallelepipeds.
+# triangles and tetrahedra, parallelograms and parallelepipeds; for trilinear cells of degree 1 too.
 _ORDER = {(2, 3, 1): 4, (2, 3, 2): 4, (2, 4, 1): 4, (2, 4, 2): 4,
-          (3, 4, 1): 2, (3, 4, 2): 4, (3, 8, 1): 3, (3, 8, 2): 5}
+          (3, 4, 1): 2, (3, 4, 2): 4, (3, 8, 1): 5, (3, 8, 2): 5}
 # With curved cells the products of shape functions meet determinants of higher order.
 _CURVED_ORDER = {(2, 3): 6, (2, 4): 6, (3, 4): 6, (3, 8): 6}
 
@@ -215,27 +216,33 @@ class ElasticBody(Summarised):
         import scipy.sparse as sp
         from skfem import BilinearForm
 
-        # Scalar forms, three in the plane, are much faster than one vector form, most of whose
-        # products are zero.
-        axes = range(self.dimension)
-        pairs = [(a, a) for a in axes] + [(a, b) for a in axes for b in axes if a < b]
-        forms = {
-            (a, b): BilinearForm(lambda u, v, w, a=a, b=b: v.grad[a] * u.grad[b]).assemble(
-                self.basis).tocsr()
-            for a, b in pairs
-        }
+        if self.dimension == 3:
+            rows = self.stiffness_blocks.tocsr()
+            return sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
+        # Three scalar forms of 9 x 9 pairs are much faster than one vector form of 18 x 18 pairs,
+        # most of whose products are zero.
+        gradients = [
+            BilinearForm(lambda u, v, w, a=a, b=b: v.grad[a] * u.grad[b]).assemble(self.basis)
+            for a, b in ((0, 0), (1, 1), (0, 1))
+        ]
+        xx, yy, xy = (matrix.tocsr() for matrix in gradients)
         direct, lateral, shear = self.elasticity
-
-        def block(i: int, j: int) -> Any:
-            if i == j:
-                return sum((shear * forms[a, a] for a in axes if a != i), direct * forms[i, i])
-            one = forms[min(i, j), max(i, j)]
-            return (lateral * one + shear * one.T) if i < j else (lateral * one.T + shear * one)
-
-        shape = (self.dimension,) * 2
-        K = sum(sp.kron(block(i, j), sp.csr_array(([1.0], ([i], [j])), shape=shape))
-                for i in axes for j in axes)
+        blocks = [[direct * xx + shear * yy, lateral * xy + shear * xy.T],
+                  [lateral * xy.T + shear * xy, direct * yy + shear * xx]]
+        K = sum(sp.kron(blocks[i][j], sp.csr_array(([1.0], ([i], [j])), shape=(2, 2)))
+                for i in range(2) for j in range(2))
         return sp.csc_array(0.5 * self.thickness * (K + K.T))
+
+    @property
+    def stiffness_blocks(self) -> Any:
+        """Stiffness of a solid without supports, sparse (3 N, 3 N) of 3 x 3 blocks [N/m]."""
+        return self._assembled[0]
+
+    @cached_property
+    def _assembled(self) -> tuple[Any, Any]:
+        """Stiffness and mass of one component of a solid."""
+        _, lateral, shear = self.elasticity
+        return assembled(self.basis, lateral, shear, self.material.density)
 
     @cached_property
     def component_mass(self) -> Any:
@@ -243,6 +250,8 @@ class ElasticBody(Summarised):
         import scipy.sparse as sp
         from skfem import BilinearForm
 
+        if self.dimension == 3:
+            return self._assembled[1]
         scalar = BilinearForm(lambda u, v, w: u * v).assemble(self.basis)
         return sp.csr_array(0.5 * self.material.density * self.thickness * (scalar + scalar.T))
 

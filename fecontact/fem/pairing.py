@@ -29,6 +29,12 @@ from fecontact.fem.face_samples import (
     pressure_samples,
     segment_samples,
 )
+from fecontact.fem.faces.solid_pairing import (
+    SolidFace,
+    check_solids_apart,
+    grounded_solid,
+    paired_solids,
+)
 from fecontact.fem.pairing_report import SAME, PairingReport, closed_gaps, no_partner, reasons
 from fecontact.fem.points import Pieces, edge_weights, node_matrix, patch_rows, whole
 
@@ -41,23 +47,24 @@ class Pairing(Summarised):
     """Contact nodes on a face of one body, each with its foot on another body or on the ground.
 
     The relative displacement of node j, with opposite forces at node and foot, is
-    ``nodes @ u_body - feet @ u_other`` in its rows 3 j (x), 3 j + 1 (y); made by
-    :func:`pair_faces`.
+    ``nodes @ u_body - feet @ u_other`` in its rows 3 j (x), 3 j + 1 (y), of solids 6 j, 6 j + 1,
+    6 j + 2; made by :func:`pair_faces`.
 
     Parameters
     ----------
     body, other : str
         Names of the body with the nodes and of the other one; None for the ground.
-    places, feet_places : (n, 2) array
-        Reference places of nodes and feet, on the smooth face [m].
-    normals, tangents : (n, 2) array
-        Unit normals n out of the other side into ``body``, and ``t = (n_y, -n_x)``.
+    places, feet_places : (n, d) array
+        Reference places of nodes and feet, on the smooth face, of solids of patches [m].
+    normals, tangents : (n, 2) array, of solids (n, 3) and (n, 2, 3)
+        Unit normals n out of the other side into ``body``, and ``t = (n_y, -n_x)``; in space t and
+        t2 as in :attr:`fecontact.ModalBasis.tangents`.
     gaps : (n,) array
         Initial gaps, not negative [m].
     tributary : (n,) array
-        Length of the face that each node stands for [m].
-    nodes, feet : sparse (3 n, 2 N) array
-        Displacement x, y and rotation of each node from the nodal displacements of ``body``, and of
+        Length of the face that each node stands for [m], of solids area [m^2].
+    nodes, feet : sparse (3 n, 2 N), of solids (6 n, 3 N) array
+        Displacements and rotations of each node from the nodal displacements of ``body``, and of
         its foot from those of ``other`` (None for the ground).
     report : PairingReport
     swapped : bool
@@ -146,10 +153,12 @@ def pair_faces(
     bodies : mapping of name to ElasticBody
         In the places where they are assembled.
     face, other : str
-        "BODY.BOUNDARY"; ``other`` may be "ground", y = 0, and both may be of one body.
+        "BODY.BOUNDARY"; ``other`` may be "ground", y = 0 (of solids z = 0), and both may be of one
+        body.
     nodes : "all" or int
         Every displacement node, or so many segments of equal length with their mean displacement,
-        whose loads are even also where the meshes do not match.
+        whose loads are even also where the meshes do not match. Of solids every facet, or patches
+        of about equal area.
     nodes_on : "finer" or "face"
         Which face has the nodes: ``other`` if it is finer than ``face``, or ``face`` in any case.
     reach : float or None
@@ -172,9 +181,11 @@ def pair_faces(
     """
     first = _face(bodies, face, "face")
     _check_options(nodes_on, reach, overlap)
+    if isinstance(first, SolidFace):
+        return _in_space(bodies, first, other, nodes, nodes_on, reach, overlap)
     if other == "ground":
         return _on_ground(first, nodes, reach, overlap)
-    second = _face(bodies, other, "other")
+    second = _plane_face(bodies, other, first)
     _check_apart(first, second)
     if nodes_on == "finer" and finer_face(bodies, face, other) == other:
         return replace(_paired(second, first, nodes, reach, overlap), swapped=True)
@@ -191,11 +202,16 @@ def pair_both_faces(
     redundant. Arguments and errors are those of :func:`pair_faces`. One interface takes both:
     ``Interface(name, pair_both_faces(bodies, face, other), normal, friction)``.
     """
-    first, second = _face(bodies, face, "face"), _face(bodies, other, "other")
+    first = _face(bodies, face, "face")
     _check_options("face", reach, overlap)
-    _check_apart(first, second)
-    one, two = (_paired(*pair, nodes, reach, overlap)
-                for pair in ((first, second), (second, first)))
+    if isinstance(first, SolidFace):
+        one, two = (_in_space(bodies, _solid_face(bodies, here, first), there, nodes, "face", reach,
+                              overlap) for here, there in ((face, other), (other, face)))
+    else:
+        second = _plane_face(bodies, other, first)
+        _check_apart(first, second)
+        one, two = (_paired(*pair, nodes, reach, overlap)
+                    for pair in ((first, second), (second, first)))
     return TwoPassPairing(replace(one, tributary=0.5 * one.tributary),
                           replace(two, tributary=0.5 * two.tributary, swapped=True))
 
@@ -208,11 +224,47 @@ def finer_face(bodies: Mapping[str, ElasticBody], face: str, other: str) -> str:
     InputError, MeshError
         If there is no such body or boundary.
     """
-    first, second = _face(bodies, face, "face"), _face(bodies, other, "other")
+    first = _face(bodies, face, "face")
+    second = (_solid_face(bodies, other, first) if isinstance(first, SolidFace)
+              else _plane_face(bodies, other, first))
     return other if second.spacing < _FINER * first.spacing else face
 
 
-def _face(bodies: Mapping[str, ElasticBody], name: str, key: str) -> Face:
+def _in_space(
+    bodies: Mapping[str, ElasticBody], first: SolidFace, other: str, nodes: Literal["all"] | int,
+    nodes_on: str, reach: float | None, overlap: float,
+) -> Pairing:
+    if other == "ground":
+        return Pairing(**grounded_solid(first, nodes, reach, overlap))
+    second = _solid_face(bodies, other, first)
+    check_solids_apart(first, second)
+    if nodes_on == "finer" and second.spacing < _FINER * first.spacing:
+        return Pairing(**paired_solids(second, first, nodes, reach, overlap), swapped=True)
+    return Pairing(**paired_solids(first, second, nodes, reach, overlap))
+
+
+def _plane_face(bodies: Mapping[str, ElasticBody], name: str, first: Face | SolidFace) -> Face:
+    found = _face(bodies, name, "other")
+    if isinstance(found, SolidFace):
+        raise _mixed(found, first)
+    return found
+
+
+def _solid_face(
+    bodies: Mapping[str, ElasticBody], name: str, first: Face | SolidFace
+) -> SolidFace:
+    found = _face(bodies, name, "other")
+    if not isinstance(found, SolidFace):
+        raise _mixed(first, found)
+    return found
+
+
+def _mixed(solid: Face | SolidFace, plane: Face | SolidFace) -> InputError:
+    return InputError(f"pair_faces: '{solid.label}' is a face of a solid and '{plane.label}' of a "
+                      f"plane body, which cannot touch each other; model both alike.")
+
+
+def _face(bodies: Mapping[str, ElasticBody], name: str, key: str) -> Face | SolidFace:
     require_kind("pair_faces", Mapping, bodies=bodies)
     require_kind("pair_faces", str, **{key: name})
     body, dot, boundary = name.partition(".")
@@ -224,6 +276,8 @@ def _face(bodies: Mapping[str, ElasticBody], name: str, key: str) -> Face:
                          f"bodies are {choices(bodies)}.")
     require_kind("pair_faces", ElasticBody, **{f"bodies['{body}']": bodies[body]})
     bodies[body].mesh.boundary(boundary)
+    if bodies[body].dimension == 3:
+        return SolidFace(bodies[body], boundary, name)
     return Face(bodies[body], boundary, name)
 
 
@@ -288,7 +342,8 @@ def _described(
     tangents = np.column_stack([normals[:, 1], -normals[:, 0]])
     places = samples.mean(samples.places, size)
     gaps, closed = closed_gaps(hit.mean(found.gaps[found.valid], size), places, overlap,
-                           min(face.lengths.mean(), other.lengths.mean()), face, other.label)
+                           min(face.lengths.mean(), other.lengths.mean()), face.label,
+                               other.label)
     at_node = _at_nodes(other, hit, found, size)
     chosen = np.unique(other.nodes)
     feet = sp.csr_array(sp.kron(at_node[:, chosen], sp.eye_array(3))
@@ -321,8 +376,8 @@ def _on_ground(
         raise InputError(f"pair_faces: no node of '{face.label}' is within reach = {reach:g} m of "
                          f"the ground, y = 0; the lowest is {places[:, 1].min():.4g} m above it.")
     alone, places = places[~kept], places[kept]
-    gaps, closed = closed_gaps(places[:, 1], places, overlap, float(face.lengths.mean()), face,
-                           "the ground, y = 0,")
+    gaps, closed = closed_gaps(places[:, 1], places, overlap, float(face.lengths.mean()),
+                               face.label, "the ground, y = 0,")
     normals, tangents = np.tile([0.0, 1.0], (len(gaps), 1)), np.tile([1.0, 0.0], (len(gaps), 1))
     report = PairingReport(
         face.label, "ground", len(gaps), alone, ("is out of reach",) * len(alone),

@@ -25,8 +25,8 @@ class PairingReport(Summarised):
         The face with the contact nodes and the other side, "BODY.BOUNDARY" or "ground".
     nodes : int
         Contact nodes.
-    left_out : (k, 2) array
-        Places of the face's displacement nodes without a partner [m].
+    left_out : (k, d) array
+        Places of the face's displacement nodes without a partner, of solids of its facets [m].
     reasons : tuple of str
         Why each of them has none.
     covered : float
@@ -52,14 +52,18 @@ class PairingReport(Summarised):
     closed_overlap: float
     largest_offset: float
 
+    @property
+    def _places(self) -> str:
+        return "node" if self.left_out.shape[1] == 2 else "facet"
+
     def summary(self) -> list[tuple[str, str]]:
         """Numbers of nodes, gaps, overlaps, and how evenly the other side is loaded."""
-        where = [f"({x:.4g}, {y:.4g}) m {reason}"
-                 for (x, y), reason in zip(self.left_out.tolist(), self.reasons, strict=True)]
+        where = [f"({_coordinates(place)}) m {reason}"
+                 for place, reason in zip(self.left_out, self.reasons, strict=True)]
         return [
             ("faces", f"{self.face} on {self.other}"),
             ("nodes", f"{self.nodes}"),
-            ("without partner", f"{count(len(where), 'node')}: {listed(where, 3)}" if where
+            ("without partner", f"{count(len(where), self._places)}: {listed(where, 3)}" if where
              else "none"),
             ("covered", f"{100.0 * self.covered:.4g} %"),
             ("largest gap", quantity(self.largest_gap, "m")),
@@ -67,6 +71,10 @@ class PairingReport(Summarised):
             ("unevenness", f"{100.0 * _beyond(self.unevenness, SAME):.3g} %"),
             ("largest offset", quantity(_beyond(self.largest_offset, _TINY), "m")),
         ]
+
+
+def _coordinates(place: Array) -> str:
+    return ", ".join(f"{value:.4g}" for value in place.tolist())
 
 
 def _beyond(value: float, least: float) -> float:
@@ -105,7 +113,7 @@ def reasons(
 
 
 def closed_gaps(
-    gaps: Array, places: Array, overlap: float, edge: float, face: Face, other: str
+    gaps: Array, places: Array, overlap: float, edge: float, face: str, other: str
 ) -> tuple[Array, float]:
     """Gaps without overlaps, and the largest of these [m].
 
@@ -114,9 +122,8 @@ def closed_gaps(
     deepest, allowed, tiny = int(np.argmin(gaps)), overlap * edge, SAME * edge
     depth = -float(gaps[deepest])
     if depth > max(allowed, tiny):
-        x, y = places[deepest]
-        raise InputError(f"pair_faces: '{face.label}' starts {depth:.4g} m inside {other} at "
-                         f"({x:.4g}, {y:.4g}) m, deeper than overlap = {overlap:g} edges, "
-                         f"{allowed:.4g} m; move the bodies apart, give faces that look at each "
-                         f"other, or raise overlap.")
+        raise InputError(f"pair_faces: '{face}' starts {depth:.4g} m inside {other} at "
+                         f"({_coordinates(places[deepest])}) m, deeper than overlap = {overlap:g} "
+                         f"edges, {allowed:.4g} m; move the bodies apart, give faces that look at "
+                         f"each other, or raise overlap.")
     return np.where(gaps < tiny, 0.0, gaps), depth if depth > tiny else 0.0

@@ -1,9 +1,10 @@
-from .assembly.assembled_basis import PointPairing, assembled_basis
+from .assembly.assembled_basis import assembled_basis
 from .assembly.bodies_convergence import BodiesConvergence, bodies_convergence
 from .assembly.face_weld import FaceWeld
 from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, NonlinearSpring, Spring, Weld, linked
 from .assembly.nonlinear_springs import CubicSpring, PiecewiseSpring, PlaySpring
+from .assembly.point_pairing import PointPairing
 from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation

@@ -26,8 +26,13 @@ from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_mode
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import modal_rotation
+from fecontact.reduction.solvers.solid_solver import Eigensolver
 from fecontact.reduction.static_modes.craig_bampton import craig_bampton
-from fecontact.reduction.static_modes.residual_vectors import Flexibility, residual_modes
+from fecontact.reduction.static_modes.residual_vectors import (
+    Flexibility,
+    flexibility_of,
+    residual_modes,
+)
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
@@ -47,6 +52,7 @@ def modal_basis(
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
     rows: Any = (),
+    eigensolver: Eigensolver = "auto",
 ) -> ModalBasis:
     """Mass-normalised modes of a plane body or solid, and T at B, C and the contact nodes.
 
@@ -57,12 +63,10 @@ def modal_basis(
     modes : int
         Number of modes, lowest first, rigid-body modes included.
     contact : str or sequence of str
-        Boundary that touches the ground, facing -y, of solids -z; each of several is an interface.
-        Or none, ().
+        Boundary that touches the ground, facing -y, of solids -z; several interfaces; or none, ().
     contact_nodes : int or 'all', or one of them for each boundary
-        Number of equal segments of the boundary, each with a contact node at its centre that moves
-        with the segment's mean displacement; 'all' takes every displacement node. Of solids
-        patches of facets of about equal area, or every facet.
+        Number of equal segments of the boundary, each a contact node with the mean displacement;
+        'all' takes every displacement node. Of solids patches of about equal area, or every facet.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, coordinates, or a
         :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.
@@ -82,6 +86,8 @@ def modal_basis(
         The plane body rotates; displacements are those in its frame, modes those at rest.
     rows : sequence of sparse (k, d N) arrays
         Further motions on which forces act; see :func:`fecontact.reduction.reduce_bodies`.
+    eigensolver : 'auto', 'direct' or 'iterative'
+        Of solids, see :func:`fecontact.reduction.eigenmodes.eigenmodes`.
 
     Raises
     ------
@@ -115,12 +121,12 @@ def modal_basis(
     if loads and reduction == "vibration":
         raise InputError("loads complete the modes only with reduction = 'residual' or "
                          "'craig-bampton'; choose one of these, or leave loads out.")
-    system = FreeSystem.of(body)
+    system = FreeSystem.of(body, eigensolver)
     completing = loading(body, system, loads, points)
     # At B, C and the contact nodes there are forces, but no moments.
     at_points = sp.csr_array(displacement_rows(restriction, d))
     further_rows = [_given_rows(body, given) for given in rows]
-    flexibility = Flexibility(system, sp.csr_array(
+    flexibility = flexibility_of(system, sp.csr_array(
         sp.vstack([at_points, *further_rows]) @ body.expansion))
     row = np.arange(len(flexibility.rows.indptr) - 1)
     is_point = row < at_points.shape[0]

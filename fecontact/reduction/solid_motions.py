@@ -1,7 +1,9 @@
 """Rigid modes of solids from their geometry and supports, and strain energies of their motions."""
 
 import numpy as np
+from numba import types
 
+from fecontact.core.compiled import block, kernel, matrix, vector
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
@@ -71,8 +73,8 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
     _, slopes = shape_functions(3, members.shape[1], local)
     straight = body.mesh.kind.corners
     geometry = slopes if body.curved else shape_functions(3, straight, local)[1]
-    direct, lateral, shear = body.elasticity
-    fields = shapes.reshape(len(body.nodes), 3, -1)
+    constants = np.array(body.elasticity)
+    fields = np.ascontiguousarray(shapes, dtype=float).reshape(len(body.nodes), 3, -1)
     energies = np.zeros(shapes.shape[1])
     for first in range(0, len(members), _AT_ONCE):
         nodes = members[first : first + _AT_ONCE]
@@ -81,16 +83,42 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
         # scikit-fem may mirror cells; rules of tetrahedra have negative weights.
         volume = np.abs(np.linalg.det(jacobian)) * weights
         gradients = np.einsum("qkj,eqji->eqki", slopes, np.linalg.inv(jacobian))
-        # Subtract a node: rigid displacements may be much larger than differences.
-        moved = fields[nodes] - fields[nodes[:, :1]]
-        count, points = volume.shape
-        slope = np.matmul(np.swapaxes(gradients, 2, 3).reshape(count, 3 * points, -1),
-                          moved.reshape(count, len(nodes[0]), -1))
-        slope = slope.reshape(count, points, 3, 3, -1)
-        xx, yy, zz = (slope[:, :, axis, axis] for axis in range(3))
-        slides = [slope[:, :, a, b] + slope[:, :, b, a] for a, b in ((0, 1), (1, 2), (0, 2))]
-        density = (direct * (xx * xx + yy * yy + zz * zz)
-                   + 2.0 * lateral * (xx * yy + yy * zz + zz * xx)
-                   + shear * sum(slide * slide for slide in slides))
-        energies += 0.5 * np.einsum("eq,eqm->m", volume, density)
+        _add_strain_energies(np.ascontiguousarray(gradients), volume,
+                             np.ascontiguousarray(nodes, dtype=np.int64), fields, constants,
+                             energies)
     return energies
+
+
+@kernel(types.void(types.Array(types.float64, 4, "C"), matrix, types.Array(types.int64, 2, "C"),
+                   block, vector, vector))
+def _add_strain_energies(gradients, volume, nodes, fields, elasticity, energies):
+    """Add the energies of some elements; gradients (e, q, k, 3) of their k shape functions."""
+    elements, points = volume.shape
+    corners, modes = nodes.shape[1], len(energies)
+    direct, lateral, shear = elasticity
+    strains = np.empty((6, modes))
+    for e in range(elements):
+        first = nodes[e, 0]
+        for q in range(points):
+            strains[:] = 0.0
+            for k in range(1, corners):
+                x, y, z = gradients[e, q, k, 0], gradients[e, q, k, 1], gradients[e, q, k, 2]
+                node = nodes[e, k]
+                for i in range(modes):
+                    # Subtract a node: rigid displacements may be much larger than differences.
+                    u = fields[node, 0, i] - fields[first, 0, i]
+                    v = fields[node, 1, i] - fields[first, 1, i]
+                    w = fields[node, 2, i] - fields[first, 2, i]
+                    strains[0, i] += x * u
+                    strains[1, i] += y * v
+                    strains[2, i] += z * w
+                    strains[3, i] += y * u + x * v
+                    strains[4, i] += z * v + y * w
+                    strains[5, i] += z * u + x * w
+            half = 0.5 * volume[e, q]
+            for i in range(modes):
+                xx, yy, zz = strains[0, i], strains[1, i], strains[2, i]
+                slides = strains[3, i] ** 2 + strains[4, i] ** 2 + strains[5, i] ** 2
+                energies[i] += half * (direct * (xx * xx + yy * yy + zz * zz)
+                                       + 2.0 * lateral * (xx * yy + yy * zz + zz * xx)
+                                       + shear * slides)

@@ -123,6 +123,8 @@ class BasisSettings:
         [N s/m].
     select : list, optional
         Indices of the modes to keep, counted from 0; all by default.
+    eigensolver : 'auto', 'direct' or 'iterative'
+        Solver for the modes of solids; 'auto' takes the iterative one for large, compact bodies.
     """
 
     modes: int = 20
@@ -138,6 +140,7 @@ class BasisSettings:
     dashpots: Annotated[Mapping[str, tuple[float, float]], Unit("N s/m")] = field(
         default_factory=dict)
     select: tuple[int, ...] | None = None
+    eigensolver: Literal["auto", "direct", "iterative"] = "auto"
 
     def __post_init__(self) -> None:
         if self.modes < 1:
@@ -155,7 +158,7 @@ class BasisSettings:
     @property
     def options(self) -> dict[str, Any]:
         """Options of :func:`fecontact.modal_basis` that concern neither contact nor modes."""
-        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads")
+        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads", "eigensolver")
         return {name: getattr(self, name) for name in names}
 
     def modal_basis(self, body: ElasticBody, rotation: Rotation | None = None) -> ModalBasis:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.units import UNITS, suitable_unit
+from fecontact.core.units import UNITS, quantity, suitable_unit
 from fecontact.output.files.case import library_versions
 from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.report.page import write_page
@@ -111,9 +111,9 @@ def _row(table: SweepTable, case: int) -> list[str]:
 
     summaries = []
     for name, values in table.values.items():
-        value = float(values[case])
-        unit = unit_of(name)
-        summaries.append(f"{text(value)} {unit}".strip() if math.isfinite(value) else "")
+        value, unit = float(values[case]), unit_of(name)
+        shown = quantity(value, unit, 7) if unit in UNITS else f"{text(value)} {unit}".strip()
+        summaries.append(shown if math.isfinite(value) else "")
     reason = table.reasons[case]
     return [f"{case}", *(text(values[case]) for values in table.parameters.values()), *summaries,
             "not computed" if reason is None else reason,

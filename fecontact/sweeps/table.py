@@ -19,7 +19,7 @@ from fecontact.core.units import Summarised, html_table, listed, span
 from fecontact.sweeps.store import write_whole
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
+    import pandas
     import xarray
 
 _BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
@@ -150,7 +150,7 @@ class SweepTable(Summarised):
             from pandas import DataFrame, RangeIndex
         except ImportError:
             raise MissingLibraryError("pandas is not installed; install it with pip install "
-                                      "pandas.") from None
+                                      "'fecontact[pandas]'.") from None
         status = [_status(reason) for reason in self.reasons]
         return DataFrame(
             {"key": list(self.keys), **{name: list(column)

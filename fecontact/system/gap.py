@@ -45,10 +45,10 @@ class Crown:
 
     def __post_init__(self) -> None:
         require_positive("Crown", radius=self.radius)
-        if np.ndim(self.centre):
-            object.__setattr__(self, "centre", as_pair(self.centre, "Crown: centre"))
-        else:
+        if isinstance(self.centre, int | float):
             require_finite("Crown", centre=self.centre)
+        else:
+            object.__setattr__(self, "centre", as_pair(self.centre, "Crown: centre"))
 
     def __call__(self, x: Array, y: Array | None = None) -> Array:
         """Gap [m] at abscissae x, of solids at x and y [m]; InputError beyond the circle."""

@@ -24,9 +24,10 @@ from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
-from fecontact.reduction.assembly.assembled_basis import PointPairing, assembled_basis
+from fecontact.reduction.assembly.assembled_basis import assembled_basis
 from fecontact.reduction.assembly.links import Link, Links
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
+from fecontact.reduction.assembly.point_pairing import PointPairing
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.gap import Gap, gap_values
 

@@ -115,7 +115,41 @@ def test_letters_are_left_out_where_there_is_no_room():
     assert len([line for line in axis.lines if line.get_marker() == "s"]) == 10
     letters = [text.get_text() for text in axis.texts]
     assert "F10" in letters
-    assert 2 <= len(letters) <= 5
+    assert 2 <= len(letters) <= 7
+
+
+def boxes_of_letters(figure):
+    axis = figure.axes[0]
+    figure.draw_without_rendering()
+    return [text.get_window_extent() for text in axis.texts], axis
+
+
+def test_letters_keep_clear_of_curves_axes_and_each_other():
+    """Folds on a curve that turns at them, and at the ends of the axes."""
+    angle = np.linspace(0.0, 4.0 * np.pi, 161)
+    wave = tuple(point(p, np.sin(p), True, "fold" if k % 20 == 0 else None)
+                 for k, p in enumerate(angle))
+    figure = plot_branches([Branch("p", wave)], 0)
+    boxes, axis = boxes_of_letters(figure)
+    assert len(boxes) == 9
+    inside = axis.get_window_extent()
+    dense = np.linspace(0.0, 4.0 * np.pi, 4001)
+    curve = axis.transData.transform(np.column_stack([dense, np.sin(dense)]))
+    for number, box in enumerate(boxes):
+        assert not box.count_contains(curve)
+        assert inside.x0 <= box.x0 < box.x1 <= inside.x1
+        assert inside.y0 <= box.y0 < box.y1 <= inside.y1
+        assert not box.count_overlaps(boxes[:number])
+
+
+def test_ticks_of_both_axes_are_in_suitable_units():
+    axis = plot_branches([BRANCH], lambda at: 1e-4 * at.parameter, y_label="amplitude [m]").axes[0]
+    assert axis.get_ylabel() == "amplitude [µm]"
+    axis.figure.draw_without_rendering()
+    places = dict(zip(axis.get_yticks(), (text.get_text() for text in axis.get_yticklabels()),
+                      strict=True))
+    assert {round(1e6 * place): text for place, text in places.items()}[100] == "100"
+    assert axis.yaxis.get_offset_text().get_text() == ""
 
 
 def test_flutter_shows_frequencies_that_meet(tmp_path):

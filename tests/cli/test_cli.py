@@ -19,27 +19,6 @@ from fecontact.io import read_table, read_wear
 from fecontact.laws import ArchardWear, EnergyWear
 
 
-@pytest.fixture
-def study(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "tiny.toml"
-    path.write_text(TINY)
-    return path
-
-
-@pytest.fixture
-def cli(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def run(*tokens):
-        code = execute([str(token) for token in tokens])
-        said = capsys.readouterr()
-        assert "Traceback" not in said.err
-        return code, said.out, said.err
-
-    return run
-
-
 def heed_interrupts():
     """In a new process: shells make what runs in the background deaf to Ctrl-C."""
     signal.signal(signal.SIGINT, signal.default_int_handler)

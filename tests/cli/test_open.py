@@ -6,30 +6,8 @@ import webbrowser
 
 import pytest
 from matplotlib.image import imread
-from tiny_study import TINY
 
-from fecontact.cli import execute, viewers
-
-
-@pytest.fixture
-def cli(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def run(*tokens):
-        code = execute([str(token) for token in tokens])
-        said = capsys.readouterr()
-        assert "Traceback" not in said.err
-        return code, said.out, said.err
-
-    return run
-
-
-@pytest.fixture
-def study(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "tiny.toml"
-    path.write_text(TINY)
-    return path
+from fecontact.cli import viewers
 
 
 @pytest.fixture

@@ -409,7 +409,7 @@ def test_nastran_and_vtk_saved_by_gmsh(gmsh_model, tmp_path: Path) -> None:
         assert lengths(mesh, mesh.boundary("contact")).sum() == pytest.approx(2.0, rel=1e-6)
 
 
-def test_solid_saved_by_gmsh_is_refused(tmp_path: Path) -> None:
+def test_solid_saved_by_gmsh_is_read_and_its_surfaces_alone_are_refused(tmp_path: Path) -> None:
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -418,11 +418,15 @@ def test_solid_saved_by_gmsh_is_refused(tmp_path: Path) -> None:
         gmsh.model.mesh.generate(3)
         gmsh.write(str(tmp_path / "a.msh"))
         gmsh.write(str(tmp_path / "a.inp"))
+        gmsh.model.mesh.clear()
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(tmp_path / "b.msh"))
     finally:
         gmsh.finalize()
     for name in ("a.msh", "a.inp"):
-        with pytest.raises(MeshError, match="is a 3-D mesh"):
-            read_mesh(tmp_path / name)
+        assert read_mesh(tmp_path / name).volume == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(MeshError, match="holds surfaces only, in space"):
+        read_mesh(tmp_path / "b.msh")
 
 
 def test_written_mesh_can_be_read_by_gmsh(tmp_path: Path) -> None:

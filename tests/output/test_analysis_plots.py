@@ -78,12 +78,39 @@ def test_response_figure_names_its_curves(trajectory):
     body = trajectory.system.basis
     f = np.linspace(10.0, 3000.0, 50)
     one = receptance(body, f, [("B", "x")])
-    two = receptance(body, f, [("B", "x")], [("C", "y"), (2, "y")])
+    two = receptance(body, f, [("B", "y")], [("C", "y"), (2, "y")])
     figure = analysis.plot_receptance([one, two], ["drive", "other"])
     names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert names == ["drive", "other, C y by B x", "other, contact node 2 y by B x"]
+    assert names == ["drive", "other, C y by B y", "other, contact node 2 y by B y"]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), np.abs(one.values[:, 0, 0]))
     assert figure.axes[0].get_ylabel() == "receptance [m/N]"
+    mixed = replace(two, responses=(("C", "y"), (2, "phi")))
+    panel = analysis.plot_receptance(mixed).axes[0]
+    assert panel.get_ylabel() == "receptance"
+    assert [text.get_text() for text in panel.get_legend().get_texts()] == [
+        "C y by B y [m/N]", "contact node 2 phi by B y [rad/N]"]
+
+
+def test_responses_that_are_round_off_are_left_out(trajectory):
+    """A force at half the height of a straight bar stretches it and bends nothing."""
+    body = trajectory.system.basis
+    found = receptance(body, np.linspace(10.0, 3000.0, 50), [("B", "x")],
+                       [("C", "x"), ("C", "y"), (2, "x")])
+    assert np.abs(found.values[:, 1]).max() < 1e-12 * np.abs(found.values[:, 0]).max()
+    figure = analysis.plot_receptance(found)
+    assert [line.get_label() for line in figure.axes[0].lines] == [
+        "C x by B x", "contact node 2 x by B x"]
+    assert len(figure.axes[1].lines) == 2
+    assert figure.get_supxlabel() == "not drawn, as zero but for round-off: C y by B x"
+
+
+def test_phases_do_not_leap_about_180_degrees(trajectory):
+    """Far above its resonances a body follows a force at -180 degrees, give or take round-off."""
+    one = receptance(trajectory.system.basis, np.linspace(10.0, 3000.0, 50), [("B", "x")])
+    beyond = replace(one, values=-np.abs(one.values) * np.exp(
+        1e-6j * np.where(np.arange(50) % 2, 1.0, -1.0))[:, None, None])
+    phase = analysis.plot_receptance(beyond).axes[1].lines[0].get_ydata()
+    np.testing.assert_allclose(phase, -180.0, atol=1e-3)
 
 
 def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):

@@ -17,6 +17,7 @@ from fecontact.plot import (
     STATE_COLOURS,
     plot_contact_map,
     plot_energies,
+    plot_friction_work,
     plot_history,
     plot_modes,
     plot_phase,
@@ -82,6 +83,25 @@ def test_colours_of_a_stress_end_below_a_sharp_peak():
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["peak -5 MPa"]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_xydata()[0], nodes[7])
     assert figure.axes[0].get_xlabel() == "x [mm]"
+
+
+def test_words_of_a_stress_stay_within_the_figure():
+    """Of a slender body, whose picture is low."""
+    nodes, cells, _ = rectangle(1.0, 0.05, 20, 2)
+    stress = np.zeros((len(nodes), 4))
+    stress[:, 0] = np.linspace(0.0, 1e6, len(nodes)) + 1e7 * (np.arange(len(nodes)) == 3)
+    for component in ("von_mises", "xx"):
+        figure = plot_stress(BodyFields(nodes, cells, 1e-3 * nodes, stress),
+                             component=component)
+        figure.draw_without_rendering()
+        renderer = figure.canvas.get_renderer()
+        boxes = [figure.axes[0].title.get_window_extent(renderer),
+                 figure.axes[0].xaxis.label.get_window_extent(renderer),
+                 figure.axes[1].yaxis.label.get_window_extent(renderer)]
+        width, height = figure.canvas.get_width_height()
+        for box in boxes:
+            assert 0.0 <= box.x0 < box.x1 <= width
+            assert 0.0 <= box.y0 < box.y1 <= height
 
 
 def test_slip_and_friction_have_colours_of_their_own():
@@ -189,25 +209,44 @@ def placed(x_mm, length_mm, groups=()):
 def bands(trajectory):
     """Ends [mm] of the coloured rows of both maps and, in that order, the line loads shown."""
     found = []
-    for axis in plot_contact_map(trajectory).axes[:2]:
-        assert axis.get_ylabel() == "contact position x [mm]"
+    panels = [axis for axis in plot_contact_map(trajectory).axes
+              if axis.get_label() != "<colorbar>"]
+    several = len(trajectory.system.basis.groups) > 1
+    for axis in panels:
+        assert axis.get_ylabel() == "contact position x [mm]" or (several and axis in panels[1::2])
         mesh = axis.collections[0]
         edges = mesh.get_coordinates()[:, 0, 1]
         values = np.ma.asarray(mesh.get_array())
         shown = ~np.ma.getmaskarray(values).any(axis=1)
         assert np.ma.getmaskarray(values)[~shown].all()
         found.append((np.column_stack([edges[:-1], edges[1:]])[shown], values[shown].data))
-    np.testing.assert_array_equal(found[0][0], found[1][0])
-    return found[0]
+    loads, states = found[::2], found[1::2]
+    for (ends, _), (same, _) in zip(loads, states, strict=True):
+        np.testing.assert_array_equal(ends, same)
+    return np.concatenate([ends for ends, _ in loads]), np.concatenate([load for _, load in loads])
 
 
 def test_contact_map_leaves_places_without_contact_face_blank():
     # Faces at 0 to 50 and 150 to 200 mm, the right one given first.
-    trajectory = placed([162.5, 187.5, 10.0, 35.0], [25.0, 25.0, 20.0, 30.0],
-                        (("right", 2), ("left", 2)))
+    trajectory = placed([162.5, 187.5, 10.0, 35.0], [25.0, 25.0, 20.0, 30.0])
     ends, load = bands(trajectory)
     np.testing.assert_allclose(ends, [[0, 20], [20, 50], [150, 175], [175, 200]], atol=1e-9)
     np.testing.assert_allclose(load, trajectory.line_load.T[[2, 3, 0, 1]])
+
+
+def test_contact_groups_of_one_body_have_panels_of_their_own():
+    """No white space between faces that lie apart, here at 0 to 50 and 150 to 200 mm."""
+    trajectory = placed([162.5, 187.5, 10.0, 35.0], [25.0, 25.0, 20.0, 30.0],
+                        (("right", 2), ("left", 2)))
+    axes = plot_contact_map(trajectory).axes
+    assert [axis.get_title(loc="left") for axis in axes[:4:2]] == ["right", "left"]
+    assert axes[0].get_ylim() == axes[1].get_ylim() == pytest.approx((150.0, 200.0))
+    assert axes[2].get_ylim() == pytest.approx((0.0, 50.0))
+    np.testing.assert_allclose(bands(trajectory)[1], trajectory.line_load.T)
+    work = plot_friction_work(trajectory).axes
+    assert [axis.get_title() for axis in work[:2]] == ["right", "left"]
+    assert [len(axis.patches) for axis in work] == [2] * 4
+    assert work[2].get_xlabel() == "contact position x [mm]"
 
 
 @pytest.mark.parametrize(("x", "length", "groups", "ends"), [
@@ -215,11 +254,9 @@ def test_contact_map_leaves_places_without_contact_face_blank():
     ([5, 15, 35, 45], [10, 10, 10, 10], (), [[0, 10], [10, 20], [30, 40], [40, 50]]),
     # A gap narrower than a band between groups, and nodes from right to left.
     ([45, 35, 20, 10], [10, 10, 10, 10], (("a", 2), ("b", 2)),
-     [[5, 15], [15, 25], [30, 40], [40, 50]]),
+     [[30, 40], [40, 50], [5, 15], [15, 25]]),
     # An inclined face, along which x grows less than the length.
     ([5, 14, 23], [10, 10, 10], (), [[0, 9.5], [9.5, 18.5], [18.5, 28]]),
-    # One node each.
-    ([25, 175], [50, 50], (("a", 1), ("b", 1)), [[0, 50], [150, 200]]),
     # Displacement nodes of linear elements of 10, 20 and 10 mm, with nodes on the ends.
     ([0, 10, 30, 40], [5, 15, 15, 5], (), [[0, 5], [5, 20], [20, 35], [35, 40]]),
     # Those of quadratic elements of 60 mm; two groups touch at 60 mm, where each has a node.

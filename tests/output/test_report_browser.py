@@ -17,8 +17,6 @@ from synthetic import run
 from test_report import EVIL, true_fields
 
 from fecontact.io import report, report_frame, report_sweep
-from fecontact.output.report.page import page
-from fecontact.output.report.payload import Payload
 from fecontact.sweeps import SweepTable
 
 
@@ -253,52 +251,6 @@ def test_without_webgl_there_is_a_message_and_the_rest(playwright, path, traject
             assert opened.page.locator(".chart").count() >= 4
     finally:
         browser.close()
-
-
-def test_a_solid_is_drawn_and_turns(browser, path, tmp_path):
-    """A cube of one mode: places with three coordinates, seen from the front, then turned."""
-    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
-    quads = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
-    triangles = np.array([part for a, b, c, d in quads for part in ((a, b, c), (a, c, d))])
-    edges = np.array([[a, b] for a in range(8) for b in range(a + 1, 8)
-                      if np.abs(corners[a] - corners[b]).sum() == 1.0])
-    header, shown = dict(Shown(path).header), Payload()
-    for name in ("contact", "charts", "phases", "energies", "ground"):
-        header[name] = [] if isinstance(header[name], list) else None
-    header |= {
-        "time": shown.add([0.0, 1.0], 1e-6), "coordinates": shown.add([[0.0], [1.0]], 1e-6),
-        "scale": 0.1, "box": [0.0, 1.0, 0.0, 1.0],
-        "bodies": header["bodies"] | {
-            "dimension": 3, "points": shown.add(corners, 1e-6), "triangles": shown.add(triangles),
-            "edges": shown.add(edges), "shapes": shown.add(corners[:, :, None], 1e-6),
-            "stress": shown.add(np.ones((8, 2, 1)) * [[[3.0], [2.0]]], 1e-6),
-            "components": ["zz", "yz"], "paints": ["von Mises stress", "none"],
-            "modes": [["mode 0", "1", "", ""]], "parts": [],
-            "largest": {"displacement": 2.0, "stress": 5.0, "peak": 5.0}}}
-    target = tmp_path / "cube.html"
-    target.write_text(page("cube", shown.block(header)))
-    with Opened(browser, target) as opened:
-        opened.scrub(1.0)
-        places = np.reshape(opened.of_player("Array.from(player.places)"), (-1, 3))
-        np.testing.assert_allclose(places, 1.1 * corners, atol=1e-5)
-        # Uniaxial stress and shear: sqrt(s^2 + 3 t^2).
-        np.testing.assert_allclose(opened.of_player("Array.from(player.values)"),
-                                   np.sqrt(9.0 + 3.0 * 4.0), rtol=1e-6)
-        front = opened.picture()
-        flat = opened.of_player("[player.project(0, 0, 0), player.project(0, 0, 1)]")
-        np.testing.assert_allclose(flat[0], flat[1], atol=1e-6)
-        box = opened.page.locator(".stage").bounding_box()
-        opened.page.mouse.move(box["x"] + 300, box["y"] + 150)
-        opened.page.mouse.down()
-        opened.page.mouse.move(box["x"] + 350, box["y"] + 180, steps=4)
-        opened.page.mouse.up()
-        turned = np.reshape(opened.of_player("player.turn"), (3, 3))
-        np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
-        apart = np.diff(opened.of_player("[player.project(0, 0, 0), player.project(0, 0, 1)]"),
-                        axis=0)
-        assert np.linalg.norm(apart) > 10.0
-        assert (np.abs(opened.picture() - front).max(axis=2) > 20).mean() > 0.02
-        assert not opened.complaints
 
 
 def test_a_cell_of_a_sweep_shows_its_case(browser, tmp_path):

@@ -27,6 +27,8 @@ from fecontact.output.files.frames import (
     frame_indices,
     nodal_contact_force,
 )
+from fecontact.output.plots.face_panels import scale_row
+from fecontact.output.plots.figure import new_figure
 from fecontact.output.render import offscreen
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion, body_labels
@@ -212,15 +214,33 @@ def test_contact_maps_have_a_row_an_interface(trajectory, leaning):
 
 
 def test_friction_work_has_a_column_an_interface(trajectory):
+    """The shoe does thirty times the work of the foot: each has a scale of its own."""
     figure = plot_friction_work(trajectory)
     shoe, foot = figure.axes[:2]
     assert [shoe.get_title(), foot.get_title()] == ["shoe: block and beam", "foot: beam and ground"]
-    assert [len(axis.patches) for axis in (shoe, foot)] == [8, 21]
     work = trajectory.friction_work[-1] / trajectory.system.basis.tributary
-    heights = [bar.get_height() for axis in (shoe, foot) for bar in axis.patches]
-    np.testing.assert_allclose(np.divide(heights, max(heights)), work / work.max(), atol=1e-12)
-    assert shoe.get_ylim() == foot.get_ylim()
-    assert shoe.get_ylim()[1] >= max(heights)
+    assert work[8:].max() < 0.2 * work[:8].max()
+    for axis, nodes in ((shoe, slice(0, 8)), (foot, slice(8, 29))):
+        name, _, unit = axis.get_ylabel().partition(" [")
+        assert name == "friction work per length"
+        factor = {"J/m": 1.0, "mJ/m": 1e-3, "µJ/m": 1e-6, "nJ/m": 1e-9}[unit[:-1]]
+        heights = np.array([bar.get_height() for bar in axis.patches])
+        np.testing.assert_allclose(heights * factor, work[nodes], rtol=1e-9)
+        assert axis.get_ylim()[1] < 1.2 * heights.max()  # fills its panel
+
+
+def test_panels_of_similar_values_share_a_scale():
+    with new_figure(6.0, 3.0) as figure:
+        near, far = figure.subplots(1, 2)
+        assert scale_row([near, far], [3e-3, 9e-3], "slip", "m") == [1e-3, 1e-3]
+        near.plot([0.0, 3.0])
+        far.plot([0.0, 9.0])
+    assert near.get_ylim() == far.get_ylim()
+    assert (near.get_ylabel(), far.get_ylabel()) == ("slip [mm]", "")
+    with new_figure(6.0, 3.0) as figure:
+        axes = figure.subplots(1, 3)
+        assert scale_row(axes, [3e-5, 9e-3, 0.0], "slip", "m") == [1e-6, 1e-3, 1.0]
+        assert [axis.get_ylabel() for axis in axes] == ["slip [µm]", "slip [mm]", "slip [m]"]
 
 
 def test_shear_has_a_column_an_interface():

@@ -294,6 +294,29 @@ def test_pvd_lists_frames_that_vtk_reads(tmp_path):
     assert (tmp_path / "new" / "run" / "run_0001.vtu").is_file()
 
 
+def test_pvd_frames_hold_velocity_and_contact_state(tmp_path):
+    """What VTK reads from VTU files is what it reads from the temporal file."""
+    trajectory = run(basis(LENGTH, HEIGHT, columns=20, rows=2), times=31)
+    reader, times = open_by_vtk(write_case(tmp_path / "case.vtkhdf", trajectory, frames=31))
+    listed = export_pvd(trajectory, tmp_path / "frames", frames=31)
+    seen = set()
+    for number in (0, 5, 12, 21, 30):
+        reader.UpdateTimeStep(times[number])
+        expected = reader.GetOutputDataObject(0)
+        frame = vtkXMLUnstructuredGridReader()
+        frame.SetFileName(str(listed.with_name(f"frames_{number:04d}.vtu")))
+        frame.Update()
+        for name in ("displacement", "velocity", "von_mises", "contact_force", "contact_state"):
+            np.testing.assert_array_equal(point_data(frame.GetOutput(), name),
+                                          point_data(expected, name))
+        velocity = point_data(frame.GetOutput(), "velocity")[:, :2]
+        np.testing.assert_allclose(velocity, trajectory.system.basis.mode_shapes.shapes
+                                   @ trajectory.modal_velocities[number], rtol=1e-6, atol=1e-10)
+        seen |= set(point_data(frame.GetOutput(), "contact_state").tolist())
+    assert seen == {-1, *trajectory.contact_state[[0, 5, 12, 21, 30]].ravel().tolist()}
+    assert len(seen) > 2
+
+
 def test_pvd_is_whole_or_not_there(tmp_path, monkeypatch):
     trajectory = run(basis(columns=4, rows=2), times=5)
     export_pvd(trajectory, tmp_path / "kept", frames=4)

@@ -12,7 +12,7 @@ from fecontact import ElasticBody, InputError
 from fecontact.io import read_basis, write_basis
 from fecontact.reduction import BasisReport, eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import FreeSystem
-from fecontact.reduction.factorisation import SymmetricFactors
+from fecontact.reduction.solvers.factorisation import SymmetricFactors
 from fecontact.reduction.static_modes.craig_bampton import craig_bampton
 from fecontact.reduction.static_modes.residual_vectors import Flexibility
 

@@ -39,7 +39,7 @@ def test_cases_are_those_of_the_table(tmp_path):
     cases = [dict(zip(shown["headings"], row, strict=True)) for row in shown["rows"]]
     assert cases[1]["warning"] == "far"
     assert cases[2] == {"case": "2", "ground.speed": "0.01", "friction.law": "exponential",
-                        "amplitude_x": "3e-05 m", "stick_fraction": "0.4", "failed because": "",
+                        "amplitude_x": "30 µm", "stick_fraction": "0.4", "failed because": "",
                         "warning": ""}
     assert cases[3]["failed because"] == EVIL
     assert cases[5]["failed because"] == "not computed"

@@ -32,7 +32,8 @@ def partition(surface: Surface, count: int) -> Integers:
     """
     part = parts_of(surface)
     sizes = np.bincount(part)
-    shares = _shared_out(count, np.bincount(part, surface.areas), sizes)
+    totals = np.bincount(part, surface.areas).astype(float)
+    shares = _shared_out(count, totals, sizes)
     owner = np.empty(len(part), dtype=np.int64)
     first = 0
     for number, share in enumerate(shares):

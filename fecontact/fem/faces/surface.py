@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import shape_functions
@@ -26,10 +27,13 @@ class Surface:
         Nodes of each facet: 3 or 4 corners, counter-clockwise seen from outside the body, of
         quadratic elements then the middles between successive corners and the centre of four-sided
         facets.
+    covered : (k, g) bool array, optional
+        Quadrature points that count, as of a face of which a part has no partner; all by default.
     """
 
     places: Array
     facets: Integers
+    covered: NDArray[np.bool_] | None = None
 
     @cached_property
     def sampled(self) -> tuple[Array, Array, Array, Array]:
@@ -39,7 +43,9 @@ class Surface:
         """
         local, weights = quadrature(self.facets.shape[1])
         values, places, normals, areas = self.at(local)
-        return values, places, normals, areas * weights
+        weights = areas * weights
+        return values, places, normals, (weights if self.covered is None
+                                         else weights * self.covered)
 
     def at(self, local: Array) -> tuple[Array, Array, Array, Array]:
         """Shape functions, places, unit normals and Jacobians at local coordinates (g, 2)."""
@@ -82,7 +88,8 @@ class Surface:
 
     def only(self, which: Any) -> "Surface":
         """Some of the facets."""
-        return Surface(self.places, self.facets[which])
+        return Surface(self.places, self.facets[which],
+                       None if self.covered is None else self.covered[which])
 
     def patches(self, owner: Integers) -> "Patches":
         """Mean motions of patches of facets: ``owner`` (k,) numbers the patch of each, from 0."""

@@ -234,7 +234,7 @@ def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
             getattr(meshio, format_name).read(source)
     if "cannot handle" in printed.getvalue():
         raise MeshError("The file holds elements of a kind that meshio does not read; mesh with "
-                        "first-order triangles or quadrilaterals.")
+                        "triangles, quadrilaterals, tetrahedra or hexahedra.")
     if np.any(found.point_data.get("nastran:ref", 0)):
         raise MeshError("The file gives nodes in local coordinate systems; export them in the "
                         "basic one.")

@@ -173,7 +173,7 @@ def _kind(code: int) -> tuple[str, int]:
     if code in _SOLIDS:
         return "solid", _SOLIDS[code]
     raise MeshError(f"The mesh holds elements of Gmsh's type {code}, which are not read; mesh with "
-                    f"first-order triangles or quadrilaterals.")
+                    f"triangles, quadrilaterals, tetrahedra or hexahedra.")
 
 
 def _raw_mesh(
@@ -211,47 +211,69 @@ def _raw_mesh(
     )
 
 
+# Gmsh's types of elements by number of corners and dimension, of first and second order.
+_CODES = {(2, 1): (1, 8), (3, 2): (2, 9), (4, 2): (3, 16), (4, 3): (4, 11), (8, 3): (5, 17)}
+# Edges of elements in the order of Gmsh's second-order nodes.
+_EDGES = {
+    (2, 1): ((0, 1),), (3, 2): ((0, 1), (1, 2), (2, 0)), (4, 2): ((0, 1), (1, 2), (2, 3), (3, 0)),
+    (4, 3): ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
+    (8, 3): ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6),
+             (6, 7)),
+}
+
+
 def write_msh(mesh: Mesh, stream: TextIO) -> None:
-    """Write a mesh as Gmsh 4.1 text: groups are physical groups, the cells the group ``body``."""
+    """Write a mesh as Gmsh 4.1 text: groups are physical groups, the cells the group ``body``.
+
+    Meshes with curved edges are written with elements of second order.
+    """
     group_names = sorted({*mesh.points, *mesh.boundaries})
     number = {name: k for k, name in enumerate(group_names, start=1)}
     vertices: dict[int, list[int]] = {}
     for name, nodes in mesh.points.items():
         for node in nodes.tolist():
             vertices.setdefault(node, []).append(number[name])
-    edges: dict[tuple[int, int], list[int]] = {}
-    for name, pairs in mesh.boundaries.items():
-        for first, second in np.sort(pairs, axis=1).tolist():
-            edges.setdefault((first, second), []).append(number[name])
-    curves: dict[tuple[int, ...], list[tuple[int, int]]] = {}
-    for edge, owners in edges.items():
-        curves.setdefault(tuple(owners), []).append(edge)
+    sides: dict[tuple[int, ...], list[int]] = {}
+    first: dict[tuple[int, ...], tuple[int, ...]] = {}
+    for name, facets in mesh.boundaries.items():
+        for facet in facets.tolist():
+            key = tuple(sorted(facet))
+            sides.setdefault(key, []).append(number[name])
+            first.setdefault(key, key if len(facet) == 2 else tuple(facet))
+    groups: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
+    for key, owners in sides.items():
+        groups.setdefault(tuple(owners), []).append(first[key])
 
     def lines(rows: list[Any]) -> None:
         stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows)
 
+    d = mesh.dimension
     names = [(0, number[name], name) for name in mesh.points]
-    names += [(1, number[name], name) for name in mesh.boundaries]
-    names += [(2, 1, "body")]
+    names += [(d - 1, number[name], name) for name in mesh.boundaries]
+    names += [(d, 1, "body")]
     stream.write(f"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n{len(names)}\n")
     stream.writelines(f'{dimension} {tag} "{name}"\n' for dimension, tag, name in sorted(names))
     stream.write("$EndPhysicalNames\n$Entities\n")
-    low, high = mesh.nodes.min(axis=0).tolist(), mesh.nodes.max(axis=0).tolist()
-    box = [*low, 0.0, *high, 0.0]
-    lines([(len(vertices), len(curves), 1, 0)])
-    lines([(tag, *mesh.nodes[node].tolist(), 0.0, len(owners), *owners)
+    flat = [0.0] * (3 - d)
+    box = [*mesh.nodes.min(axis=0).tolist(), *flat, *mesh.nodes.max(axis=0).tolist(), *flat]
+    counts = [len(vertices), 0, 0, 0]
+    counts[d - 1], counts[d] = len(groups), 1
+    lines([counts])
+    lines([(tag, *mesh.nodes[node].tolist(), *flat, len(owners), *owners)
            for tag, (node, owners) in enumerate(vertices.items(), start=1)])
-    lines([(tag, *box, len(owners), *owners, 0) for tag, owners in enumerate(curves, start=1)])
+    lines([(tag, *box, len(owners), *owners, 0) for tag, owners in enumerate(groups, start=1)])
     lines([(1, *box, 1, 1, 0)])
-    count = len(mesh.nodes)
-    stream.write(f"$EndEntities\n$Nodes\n1 {count} 1 {count}\n2 1 0 {count}\n")
+    places = _with_middles(mesh)
+    count = len(places)
+    stream.write(f"$EndEntities\n$Nodes\n1 {count} 1 {count}\n{d} 1 0 {count}\n")
     lines([(tag,) for tag in range(1, count + 1)])
-    lines([(x, y, 0.0) for x, y in mesh.nodes.tolist()])
+    lines([(*place, *flat) for place in places.tolist()])
 
     blocks: list[tuple[int, int, int, list[Any]]] = [
         (0, tag, 15, [(node,)]) for tag, node in enumerate(vertices, start=1)]
-    blocks += [(1, tag, 1, pairs) for tag, pairs in enumerate(curves.values(), start=1)]
-    blocks += [(2, 1, 2 if mesh.cells.shape[1] == 3 else 3, mesh.cells.tolist())]
+    blocks += [(d - 1, tag, *_elements(mesh, np.array(rows), d - 1))
+               for tag, rows in enumerate(groups.values(), start=1)]
+    blocks += [(d, 1, *_elements(mesh, mesh.cells, d))]
     total = sum(len(rows) for *_, rows in blocks)
     stream.write(f"$EndNodes\n$Elements\n{len(blocks)} {total} 1 {total}\n")
     tag = 0
@@ -260,3 +282,21 @@ def write_msh(mesh: Mesh, stream: TextIO) -> None:
         lines([(tag + k, *(node + 1 for node in row)) for k, row in enumerate(rows, start=1)])
         tag += len(rows)
     stream.write("$EndElements\n")
+
+
+def _with_middles(mesh: Mesh) -> Array:
+    """Nodes, and of a curved mesh the middles of all edges behind them."""
+    curved = len(mesh.curved_edges) > 0
+    return np.concatenate([mesh.nodes, mesh.edge_middles]) if curved else mesh.nodes
+
+
+def _elements(mesh: Mesh, corners: Integers, dimension: int) -> tuple[int, list[Any]]:
+    """Gmsh's type and rows of nodes of elements (k, n), with the middles of a curved mesh."""
+    key = corners.shape[1], dimension
+    if not len(mesh.curved_edges):
+        return _CODES[key][0], corners.tolist()
+    ends = np.sort(corners[:, np.array(_EDGES[key])], axis=2)
+    known = mesh.edges[0]
+    keys = known[:, 0] * len(mesh.nodes) + known[:, 1]
+    middles = np.searchsorted(keys, ends[..., 0] * len(mesh.nodes) + ends[..., 1])
+    return _CODES[key][1], np.concatenate([corners, len(mesh.nodes) + middles], axis=1).tolist()

@@ -82,7 +82,7 @@ def _raw_mesh(step: Any, dimension: int, of_nodes: dict[int, list[str]],
         kind = _KINDS.get(code, "solid")
         if kind == "solid" and code.startswith(("TR", "QU", "PO")):
             raise MeshError(f"The mesh holds elements {code}, which are not read; mesh with "
-                            f"first-order triangles or quadrilaterals.")
+                            f"triangles, quadrilaterals, tetrahedra or hexahedra.")
         number = int(stored["NOD"].attrs["NBR"])
         members = values(stored["NOD"]).reshape(-1, number).T.astype(np.int64) - 1
         if kind == "vertex":

@@ -15,7 +15,7 @@ from fecontact.fem.elements.cell_kinds import HEXAHEDRON
 from fecontact.fem.mesh import Mesh
 
 _SAME = 1e-7  # of the solid's size: nodes that are closer are one
-_CURVED = 1e-9  # distance of a middle from its chord, per length
+_CURVED = 1e-6  # distance of a middle from its straight edge or face, per length
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,20 +75,43 @@ def swept_mesh(
     _, first = np.unique(ends[:, 0] * len(used) + ends[:, 1], return_index=True)
     ends, middle = ends[first], places[middles.ravel()[first]]
     nodes = places[used]
-    chord = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
-    bent = np.linalg.norm(middle - nodes[ends].mean(axis=1), axis=1) > _CURVED * chord
-    plain = Mesh(nodes, number[corners], {}, {}, ends[bent], middle[bent])
+    plain = Mesh(nodes, number[corners])
     faces = plain.outline
     at = plain.nodes[faces]
     across = (at[:, 2] - at[:, 0], at[:, -1] - at[:, 1]) if at.shape[1] == 4 else (
         at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
-    owner = names(at, 0.5 * np.cross(*across))
-    named = {name: int(np.argmin(np.linalg.norm(nodes - np.array(place), axis=1)))
+    areas = 0.5 * np.cross(*across)
+    owner = names(at, areas)
+    bent = _bent(nodes, ends, middle, faces, areas, owner)
+    named = {name: np.linalg.norm(nodes - np.array(place), axis=1).argmin(keepdims=True)
              for name, place in points.items()}
     sets = {name: np.flatnonzero(chosen(nodes)) for name, chosen in (groups or {}).items()}
     return Mesh(nodes, plain.cells, {str(name): faces[owner == name]
                                      for name in np.unique(owner) if name},
                 {**named, **sets}, ends[bent], middle[bent])
+
+
+def _bent(nodes: Array, ends: Integers, middles: Array, faces: Integers, areas: Array,
+          owner: Array) -> Array:
+    """Which edges (E,) are curved: those of curved faces, and those where two names meet.
+
+    All others stay straight: elements with straight edges represent products of coordinates, those
+    of bending and torsion, better.
+    """
+    off = middles - nodes[ends].mean(axis=1)
+    sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
+    edge = np.searchsorted(ends[:, 0] * len(nodes) + ends[:, 1],
+                           sides[..., 0] * len(nodes) + sides[..., 1])
+    normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
+    away = np.zeros(len(ends))
+    np.maximum.at(away, edge, np.abs(np.einsum("fex,fx->fe", off[edge], normals)))
+    _, name = np.unique(owner, return_inverse=True)
+    lowest, highest = np.full(len(ends), len(faces)), np.full(len(ends), -1)
+    np.minimum.at(lowest, edge, name[:, None])
+    np.maximum.at(highest, edge, name[:, None])
+    away = np.where(highest > lowest, np.linalg.norm(off, axis=1), away)
+    chord = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
+    return np.asarray(away > _CURVED * chord)
 
 
 def lines(count: int) -> Array:

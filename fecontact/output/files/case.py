@@ -28,7 +28,7 @@ from fecontact.system.powers import POWERS
 from fecontact.system.tables import system_from_tables, system_tables
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
+    import pandas
     import xarray
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")

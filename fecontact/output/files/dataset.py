@@ -13,7 +13,7 @@ from fecontact.output.files.frames import contact_forces
 from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
+    import pandas
     import xarray
 
 _NODES = {
@@ -203,7 +203,7 @@ def to_pandas(trajectory: Trajectory) -> "pandas.DataFrame":
         from pandas import DataFrame
     except ImportError:
         raise MissingLibraryError("pandas is not installed; install it with pip install "
-                                  "pandas.") from None
+                                  "'fecontact[pandas]'.") from None
 
     return DataFrame(columns(trajectory)).set_index("time [s]")
 

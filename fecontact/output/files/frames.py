@@ -150,6 +150,22 @@ def contact_owners(field: ModeShapes, n: int) -> tuple[NDArray[np.intp], NDArray
     return node[order][last].astype(np.intp), owner[order][last].astype(np.intp)
 
 
+def nodal_contact_states(
+    trajectory: Trajectory, which: Any,
+    owners: tuple[NDArray[np.intp], NDArray[np.intp]] | None = None,
+) -> NDArray[np.int8]:
+    """States (F, N) at the mesh nodes: 0 open, 1 stick, 2 slip, and -1 where no contact node is.
+
+    ``owners`` are those of :func:`contact_owners`, where they are needed again and again.
+    """
+    field = require_field(trajectory)
+    touching, owner = owners or contact_owners(field, trajectory.system.basis.contact_nodes)
+    found = trajectory.contact_state[which]
+    states = np.full((len(found), len(field.nodes)), -1, dtype=np.int8)
+    states[:, touching] = found[:, owner]
+    return states
+
+
 def blocks(indices: NDArray[np.intp], nodes: int) -> list[NDArray[np.intp]]:
     """Blocks of the chosen times, small enough for four doubles per node to stay in cache."""
     size = max(1, 2**20 // (4 * nodes))

@@ -11,9 +11,11 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.case import Case, read_case
 from fecontact.output.files.frames import (
     body_numbers,
+    contact_owners,
     displacement,
     frame_indices,
     nodal_contact_force,
+    nodal_contact_states,
     require_field,
     von_mises,
 )
@@ -25,9 +27,10 @@ def export_pvd(
 ) -> Path:
     """Write frames of a run into a folder of VTU files, and a PVD file that lists them.
 
-    Each frame holds ``displacement`` [m], ``von_mises`` [Pa] and ``contact_force`` [N] at the
-    nodes of the undeformed body, as in :func:`fecontact.write_case`, and with several bodies the
-    number ``body`` of each.
+    Each frame holds ``displacement`` [m], ``velocity`` [m/s], ``von_mises`` [Pa], ``contact_force``
+    [N] and ``contact_state`` (0 open, 1 stick, 2 slip, -1 no contact node) at the nodes of the
+    undeformed body, as in :func:`fecontact.write_case`, and with several bodies the number ``body``
+    of each.
 
     Parameters
     ----------
@@ -69,16 +72,19 @@ def export_pvd(
 
     basis = trajectory.system.basis
     body = {"body": body_numbers(basis)} if basis.parts else {}
+    owners = contact_owners(field, basis.contact_nodes)
     with output_folder(folder.parent), replaced_folder(folder) as part:
         names = []
         for number, index in enumerate(indices):
-            q = trajectory.modal_coordinates[index : index + 1]
+            now = slice(index, index + 1)
+            q, rate = trajectory.modal_coordinates[now], trajectory.modal_velocities[now]
             names.append(f"{name}_{number:04d}.vtu")
             write_fields(part / names[-1], field.nodes, field.cells, {
                 "displacement": displacement(field, q)[0].astype(np.float32),
+                "velocity": displacement(field, rate)[0].astype(np.float32),
                 "von_mises": von_mises(field, q)[0].astype(np.float32),
-                "contact_force": nodal_contact_force(
-                    trajectory, slice(index, index + 1))[0].astype(np.float32),
+                "contact_force": nodal_contact_force(trajectory, now)[0].astype(np.float32),
+                "contact_state": nodal_contact_states(trajectory, now, owners)[0],
                 **body,
             })
         times = trajectory.time[indices].tolist()

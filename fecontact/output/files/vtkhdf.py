@@ -15,6 +15,7 @@ from fecontact.output.files.frames import (
     contact_owners,
     displacement,
     nodal_contact_force,
+    nodal_contact_states,
     require_field,
     von_mises,
 )
@@ -93,17 +94,16 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
         data[one.name].attrs["unit"] = one.unit
         if one.components:
             data[one.name].attrs["component_names"] = list(one.components)
-    touching, owners = contact_owners(field, trajectory.system.basis.contact_nodes)
+    owners = contact_owners(field, trajectory.system.basis.contact_nodes)
     first = 0
     for which in blocks(indices, nodes):
         q, rate = (values[which] for values in (trajectory.modal_coordinates,
                                                 trajectory.modal_velocities))
-        states = np.full((len(which), nodes), -1, dtype=np.int8)
-        states[:, touching] = trajectory.contact_state[which][:, owners]
         found: dict[str, NDArray[Any]] = {
             "displacement": displacement(field, q), "velocity": displacement(field, rate),
             "von_mises": von_mises(field, q),
-            "contact_force": nodal_contact_force(trajectory, which), "contact_state": states,
+            "contact_force": nodal_contact_force(trajectory, which),
+            "contact_state": nodal_contact_states(trajectory, which, owners),
             "stress": cell_stress(field, q)}
         for one in _FIELDS:
             rows = slice(first * sizes[one.of], (first + len(which)) * sizes[one.of])

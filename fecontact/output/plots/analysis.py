@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.analysis.histories import Point, history, point_name
 from fecontact.analysis.periodicity import strobed_states
@@ -14,13 +15,13 @@ from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_densit
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
-from fecontact.core.units import count, suitable_unit
+from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.face_panels import abscissa_unit, face_panels
+from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import COLOURS, DASHES, add_note, distinct_colours
-from fecontact.reduction.assembly.contact_faces import touching_faces
+from fecontact.reduction.assembly.contact_faces import shown_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 
 _COLUMNS = 1000  # most points of a line
+_ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
 _DECADES = 5.0  # range of a logarithmic axis below its highest value
 _AXES = ("x", "y")
 
@@ -63,6 +65,8 @@ def plot_spectrum(
         For a quantity or a point that does not exist, uneven times, another suffix, or a file
         that cannot be written.
     """
+    from matplotlib.patheffects import withStroke
+
     require_kind("plot_spectrum", Trajectory, trajectory=trajectory)
     shown = history(trajectory, quantity, point, component)
     make = power_spectral_density if density else amplitude_spectrum
@@ -85,8 +89,12 @@ def plot_spectrum(
             apart = all(abs(peak.frequency_hz - other) > 0.06 * end for other in named)
             if peak.frequency_hz < end and apart and len(named) < 6:
                 named.append(peak.frequency_hz)
+                # Numbers near an end stand beside their peak, not on the axis.
+                ends = int(peak.frequency_hz < 0.04 * end) - int(peak.frequency_hz > 0.96 * end)
                 panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value / factor),
-                               xytext=(0, 4), textcoords="offset points", ha="center", fontsize=8.5)
+                               xytext=(3 * ends, 4), textcoords="offset points", fontsize=8.5,
+                               path_effects=[withStroke(linewidth=2.0, foreground="white")],
+                               ha={1: "left", 0: "center", -1: "right"}[ends])
         panel.set_xlabel("frequency [Hz]")
         panel.set_ylabel(f"{'density' if density else 'amplitude'} [{symbol}]")
         panel.set_title(shown.title)
@@ -131,7 +139,7 @@ def plot_spectrogram(
         line = history(drawn.trajectory, quantity, point, component).values
         upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
                    linewidth=0.8)
-        upper.set_ylabel(f"[{symbol}]")
+        upper.set_ylabel(f"{quantity.replace('_', ' ')} [{symbol}]")
         upper.set_title(shown.title)
         factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
         top = float(found.values.max()) / factor or 1.0
@@ -207,7 +215,8 @@ def plot_poincare(
 def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
     """Plot friction work per length [J/m] and slip distance [m] along the contact face.
 
-    Of several bodies along each interface, in columns of one scale.
+    Of several bodies along each interface, of one body along each contact group, in columns; those
+    of similar values have one scale.
 
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
     constant coefficient is the friction work over that coefficient.
@@ -225,7 +234,7 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     require_kind("plot_friction_work", Trajectory, trajectory=trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    faces = touching_faces(trajectory.system.basis, "friction work")
+    faces = shown_faces(trajectory.system.basis, "friction work")
     work = trajectory.friction_work[-1] / trajectory.system.basis.tributary
     touching = trajectory.normal_force != 0.0
     speed = np.abs(trajectory.slip_velocity) * touching
@@ -233,17 +242,17 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     with new_figure(max(9.0, 4.5 * len(faces)), 5.6, path) as figure:
         add_note(figure, drawn)
         panels = face_panels(figure, faces, 2)
-        for row, (values, name, base) in enumerate(((work, "friction work per length", "N"),
+        for row, (values, name, base) in enumerate(((work, "friction work per length", "J/m"),
                                                     (slip, "slip in contact", "m"))):
-            factor, label = suitable_unit(float(np.abs(values).max()), base)
-            for face, panel in zip(faces, panels[row], strict=True):
+            sizes = [float(np.abs(values[face.nodes]).max()) for face in faces]
+            factors = scale_row(panels[row], sizes, name, base)
+            for face, panel, factor in zip(faces, panels[row], factors, strict=True):
                 unit = abscissa_unit(face)
                 panel.bar(face.abscissa / unit, values[face.nodes] / factor,
                           width=0.92 * face.tributary / unit, color=COLOURS[0])
-            # Not before all of a row are drawn: its panels share their scale.
-            panels[row, 0].set_ylim(bottom=min(0.0, float(values.min()) / factor))
-            label = label.replace("N", "J/m") if base == "N" else label
-            panels[row, 0].set_ylabel(f"{name} [{label}]")
+            # Not before all of a row are drawn: its panels may share their scale.
+            for panel in panels[row]:
+                panel.set_ylim(bottom=min(0.0, panel.dataLim.y0))
         figure.align_ylabels(panels[:, 0])
     return figure
 
@@ -255,7 +264,8 @@ def plot_receptance(
     """Plot magnitude and phase of frequency responses; those of unstable states are dashed.
 
     What is linearised about an unstable state is not what a measurement would show: the legend
-    says so.
+    says so. Responses that stay below a billionth of the largest of their unit are round-off: they
+    are left out and named below the figure.
 
     Parameters
     ----------
@@ -283,28 +293,28 @@ def plot_receptance(
                          f"component.")
     with new_figure(9.0, 6.0, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-        number = 0
+        curves, still = _responses(responses, labels)
         many = len(responses) > 1 or responses[0].values[0].size > 1
-        colours = distinct_colours(sum(response.values[0].size for response in responses))
-        for index, response in enumerate(responses):
-            for r, seen in enumerate(response.responses):
-                for e, pushed in enumerate(response.excitations):
-                    colour = colours[number]
-                    number += 1
-                    name = f"{_place(seen)} by {_place(pushed)}"
-                    if index < len(labels):
-                        name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
-                            labels[index])
-                    style = "-" if response.stable else DASHES
-                    if not response.stable:
-                        name += f"\nUNSTABLE, not to be measured:\n{response.growth_in_words}"
-                    f = response.frequency_hz
-                    upper.semilogy(f, response.magnitude[:, r, e], color=colour, label=name,
-                                   linestyle=style)
-                    lower.plot(f, np.degrees(response.phase[:, r, e]), color=colour, linewidth=1.0,
-                               linestyle=style)
+        units = list(dict.fromkeys(curve.unit for curve in curves))
+        for number, (curve, colour) in enumerate(zip(curves, distinct_colours(len(curves)),
+                                                     strict=True)):
+            style = "-" if curve.of.stable else DASHES
+            name = f"{curve.name} [{curve.unit}]" if len(units) > 1 else curve.name
+            if not curve.of.stable:
+                name += f"\nUNSTABLE, not to be measured:\n{curve.of.growth_in_words}"
+            f = curve.of.frequency_hz
+            # The first is the widest: others on top do not hide it.
+            width = 3.0 if many and number == 0 else 1.2
+            upper.semilogy(f, np.abs(curve.values), color=colour, label=name, linestyle=style,
+                           linewidth=width)
+            # From the lower end of the axis on: what follows a force at 180 degrees does not leap.
+            degrees = (np.degrees(np.angle(curve.values)) + 190.0) % 360.0 - 190.0
+            lower.plot(f, degrees, color=colour, linewidth=width, linestyle=style)
+        if still:
+            figure.supxlabel(f"not drawn, as zero but for round-off: {listed(still)}", x=0.99,
+                             ha="right", fontsize=8.0, color="#6a6a6a")
         first = responses[0]
-        upper.set_ylabel(f"{first.kind} [{first.unit()}]")
+        upper.set_ylabel(f"{first.kind} [{units[0]}]" if len(units) == 1 else first.kind)
         if many or not first.stable:
             upper.legend(loc="best")
         else:
@@ -317,6 +327,33 @@ def plot_receptance(
         _whole_width(lower, first)
         figure.align_ylabels([upper, lower])
     return figure
+
+
+class _Response(NamedTuple):
+    name: str
+    unit: str
+    values: NDArray[np.complex128]
+    of: Receptance
+
+
+def _responses(
+    responses: Sequence[Receptance], labels: Sequence[str]
+) -> tuple[list[_Response], list[str]]:
+    """The curves to draw, and the names of those that are round-off."""
+    found, largest = [], dict[str, float]()
+    for index, response in enumerate(responses):
+        for r, seen in enumerate(response.responses):
+            for e, pushed in enumerate(response.excitations):
+                name = f"{_place(seen)} by {_place(pushed)}"
+                if index < len(labels):
+                    name = f"{labels[index]}, {name}" if response.values[0].size > 1 else (
+                        labels[index])
+                one = _Response(name, response.unit(r, e), response.values[:, r, e], response)
+                found.append(one)
+                largest[one.unit] = max(largest.get(one.unit, 0.0), float(np.abs(one.values).max()))
+    moves = [np.abs(one.values).max() > _ROUND_OFF * largest[one.unit] for one in found]
+    return ([one for one, moving in zip(found, moves, strict=True) if moving],
+            [one.name for one, moving in zip(found, moves, strict=True) if not moving])
 
 
 def _whole_width(panel: "Axes", response: Receptance) -> None:

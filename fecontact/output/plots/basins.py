@@ -8,6 +8,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.types import ArrayLike
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import name_axis
 from fecontact.output.plots.style import distinct_colours
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ def plot_basins(
     found : Basins
         Of :func:`fecontact.bifurcation.basins`; the first axis goes along x.
     x_label, y_label : str, optional
-        Labels of the axes, with units.
+        Labels of the axes, with SI units, such as ``y [m]``; ticks are in a unit that suits the
+        values.
     rows : (2, size) array, optional
         Rows that give the two quantities of the plane from a state
         (:meth:`fecontact.bifurcation.Axis.row`); with them the sections of the
@@ -73,7 +75,9 @@ def plot_basins(
                           markeredgecolor="#202020", linestyle="none")
             handles.append(Line2D([], [], color="#ffffff", marker="o", markeredgecolor="#202020",
                                   linestyle="none", label="its section"))
-        axis.set(xlim=box[0], ylim=box[1], xlabel=x_label or "", ylabel=y_label or "")
+        axis.set(xlim=box[0], ylim=box[1])
+        name_axis(axis, "x", x_label or "", found.first)
+        name_axis(axis, "y", y_label or "", found.second)
         axis.grid(False)
         axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure

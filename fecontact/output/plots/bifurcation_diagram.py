@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
-from fecontact.output.plots.diagram_insets import DOTS, draw_beneath, draw_insets, main_axis
+from fecontact.output.plots.diagram_insets import (
+    DOTS,
+    Label,
+    draw_beneath,
+    draw_insets,
+    main_axis,
+    place_labels,
+)
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis, parameter_label
 from fecontact.output.plots.style import DASHES, distinct_colours
@@ -56,7 +63,8 @@ def plot_branches(
         also 'observed_section' of :func:`fecontact.bifurcation.observe`, one curve
         for each period of the excitation.
     x_label, y_label : str, optional
-        Labels of the axes, with units.
+        Labels of the axes, with SI units, such as ``amplitude [m]``; ticks are in a unit that
+        suits the values.
     names : sequence of str
         Names of the branches for the legend, in which each name stands once; several branches
         without names are numbered there.
@@ -68,7 +76,7 @@ def plot_branches(
         :meth:`fecontact.bifurcation.PoincareScan.observed`.
     insets : sequence of Inset
         Phase planes of chosen points, drawn above the diagram; see
-        :func:`fecontact.plot.phase_inset`. A line joins each to its point.
+        :func:`fecontact.plot.phase_inset`. A letter names each and its point.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -110,18 +118,16 @@ def plot_branches(
             for index, point in enumerate(branch.points):
                 if point.kind is not None:
                     known.setdefault(point.kind, []).append((places[index], heights[index]))
-        if x_label is None:
-            name_axis(axis, "x", _label(x, branches[0].parameter_name),
-                      np.array(axis.dataLim.intervalx))
-        else:
-            axis.set_xlabel(x_label)
-        axis.set_ylabel(y_label or _label(y, branches[0].parameter_name))
+        axis.ticklabel_format(axis="y", scilimits=(-3, 5))
+        parameter, limits = branches[0].parameter_name, axis.dataLim
+        name_axis(axis, "x", x_label or _label(x, parameter), np.array(limits.intervalx))
+        name_axis(axis, "y", y_label or _label(y, parameter), np.array(limits.intervaly))
         axis.margins(x=0.02, y=0.06)
         axis.autoscale_view()
-        axis.ticklabel_format(axis="y", scilimits=(-3, 5))
-        _mark(axis, known)
-        draw_insets(figure, axis, insets, lambda at: (_value(at, x), _value(at, y)))
+        special = _mark(axis, known)
+        letters = draw_insets(figure, axis, insets, lambda at: (_value(at, x), _value(at, y)))
         _legend(axis, {name: colours[name] for name in names[: len(branches)]}, known, dashed, dots)
+        place_labels(figure, axis, [*letters, *special])
     return figure
 
 
@@ -175,9 +181,9 @@ def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
-    """Markers, with letters on a side where they overlap nothing, if there is one."""
-    special: list[tuple[str, str, float, float]] = []
+def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> list[Label]:
+    """Draw markers of special points; returns their letters and places."""
+    labels: list[Label] = []
     for kind, places in known.items():
         letters, marker = _SPECIAL.get(kind, ("", "."))
         # A point that two branches share is marked once.
@@ -187,28 +193,10 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> None:
                 distinct.append(place)
         for number, (x, y) in enumerate(distinct):
             count = str(number + 1) if letters and len(distinct) > 1 else ""
-            special.append((f"{letters or kind}{count}", marker, x, y))
-    from matplotlib.patheffects import withStroke
-
-    halo = [withStroke(linewidth=2.5, foreground="white")]
-    points = 72.0 / axis.figure.dpi
-    seen = axis.transData.transform([(x, y) for _, _, x, y in special] or np.empty((0, 2))) * points
-    taken: list[Array] = [np.concatenate([place - 4.0, place + 4.0]) for place in seen]
-    for (text, marker, x, y), place in zip(special, seen, strict=True):
-        axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
-                  linestyle="none", zorder=4)
-        size = np.array([6.5 * len(text), 10.0])
-        for right, above in ((1, 1), (0, 0), (0, 1), (1, 0)):
-            side = np.array([right, above])
-            corner = place + 6.0 * (2 * side - 1) - (1 - side) * size
-            box = np.concatenate([corner, corner + size])
-            if any((box[:2] < other[2:]).all() and (other[:2] < box[2:]).all() for other in taken):
-                continue
-            taken.append(box)
-            axis.annotate(text, (x, y), xytext=(12.0 * right - 6.0, 12.0 * above - 6.0),
-                          ha="left" if right else "right", va="bottom" if above else "top",
-                          textcoords="offset points", fontsize=9.0, zorder=5, path_effects=halo)
-            break
+            labels.append((f"{letters or kind}{count}", x, y))
+            axis.plot(x, y, marker, color="#303030", markerfacecolor="white", markersize=7.0,
+                      linestyle="none", zorder=4)
+    return labels
 
 
 def _legend(

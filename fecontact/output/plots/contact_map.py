@@ -12,10 +12,10 @@ from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.plots.face_panels import similar
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import STATE_COLOURS, add_note, state_names
-from fecontact.reduction.assembly.contact_faces import ContactFace, touching_faces
-from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.assembly.contact_faces import ContactFace, shown_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 _COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
 _COLUMNS = 1500
-_COMMON_SCALE = 0.2  # of the largest load, above which all maps have the same scale
 
 
 def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
@@ -35,9 +34,9 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
     without contact face stay blank. States are open, stick and slip, or open and contact if all
     friction forces of the run are zero.
 
-    Of several bodies each interface has a row of its own: over x on the ground and on faces along
-    x, else over the arc length of the face, which increases along its tangents. Maps of similar
-    loads share one scale.
+    Of several bodies each interface has a row of its own, of one body each contact group: over x on
+    the ground and on faces along x, else over the arc length of the face, which increases along its
+    tangents. Maps of similar loads share one scale.
 
     Parameters
     ----------
@@ -55,7 +54,7 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     basis = trajectory.system.basis
-    faces = touching_faces(basis, "contact map")
+    faces = shown_faces(basis, "contact map")
     single = not faces[0].name
     size = (10.0, 6.2) if single else (12.0, 0.9 + 2.6 * len(faces))
     with new_figure(*size, path) as figure:
@@ -66,13 +65,13 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
         starts = np.unique(np.searchsorted(trajectory.time, columns))
         edges = _time_edges(trajectory.time, starts)
         time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
-        rows = [_face_rows(face, basis) for face in faces]
+        rows = [_face_rows(face) for face in faces]
 
         name, unit, load = ("line load", "N/m", trajectory.line_load) if (
             basis.thickness is None) else ("contact pressure", "Pa", trajectory.pressure)
         highest = np.maximum.reduceat(load, starts, axis=0)
         limits = [float(highest[:, face.nodes].max()) for face in faces]
-        common = min(limits) >= _COMMON_SCALE * max(limits)
+        common = similar(limits)
         for number, (face, row) in enumerate(zip(faces, rows, strict=True)):
             limit = max(limits) if common else limits[number]
             factor, load_symbol = suitable_unit(limit, unit)
@@ -152,10 +151,9 @@ def _time_edges(time: Array, starts: NDArray[np.intp]) -> Array:
     return np.concatenate([time[:1], between, time[-1:]])
 
 
-def _face_rows(face: ContactFace, basis: ModalBasis) -> _FaceRows:
+def _face_rows(face: ContactFace) -> _FaceRows:
     x, n = face.abscissa, len(face.abscissa)
-    groups = [n] if face.name else [count for _, count in basis.groups]
-    low, high = _bands(x, face.tributary, groups)
+    low, high = _bands(x, face.tributary)
     order = np.argsort(low + high, kind="stable")
     low, high, x = low[order], high[order], x[order]
     tiny = 1e-6 * float(high.max() - low.min())
@@ -172,25 +170,22 @@ def _face_rows(face: ContactFace, basis: ModalBasis) -> _FaceRows:
     return _FaceRows(edges / factor, np.insert(order, apart, -1), f"{face.label} [{symbol}]")
 
 
-def _bands(x: Array, length: Array, groups: Sequence[int]) -> tuple[Array, Array]:
+def _bands(x: Array, length: Array) -> tuple[Array, Array]:
     """Lower and upper ends (n,) of the tributary lengths along the face [m].
 
     They lie centred about the nodes, but follow one another from end to end of a part whose
     outer nodes lie on its ends, as they do where the displacement nodes are the contact nodes.
     """
     low, high = x - 0.5 * length, x + 0.5 * length
-    first = 0
-    for count in groups:
-        group = first + np.argsort(x[first : first + count], kind="stable")
-        first += count
-        reach = length[group]
-        apart = np.diff(x[group]) > (1.0 + 1e-6) * (reach[1:] + reach[:-1])
-        for part in np.split(group, np.flatnonzero(apart) + 1):
-            ends = x[part[0]] + np.append(0.0, np.cumsum(length[part]))
-            beyond = abs(ends[-1] - x[part[-1]])
-            inside = np.minimum(x[part] - ends[:-1], ends[1:] - x[part])[1:-1]
-            if beyond < 0.05 * length[part].min() and (inside > 0.05 * length[part][1:-1]).all():
-                low[part], high[part] = ends[:-1], ends[1:]
+    order = np.argsort(x, kind="stable")
+    reach = length[order]
+    apart = np.diff(x[order]) > (1.0 + 1e-6) * (reach[1:] + reach[:-1])
+    for part in np.split(order, np.flatnonzero(apart) + 1):
+        ends = x[part[0]] + np.append(0.0, np.cumsum(length[part]))
+        beyond = abs(ends[-1] - x[part[-1]])
+        inside = np.minimum(x[part] - ends[:-1], ends[1:] - x[part])[1:-1]
+        if beyond < 0.05 * length[part].min() and (inside > 0.05 * length[part][1:-1]).all():
+            low[part], high[part] = ends[:-1], ends[1:]
     return low, high
 
 

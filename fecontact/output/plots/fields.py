@@ -11,15 +11,15 @@ from fecontact.core.units import suitable_unit
 from fecontact.fem.fields import BodyFields
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis
+from fecontact.output.plots.style import stress_limit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STRESSES = ("xx", "yy", "zz", "xy")
 _DRAWN_DISPLACEMENT = 0.07  # largest one by default, relative to the body's extent
-# Colours reach to this percentile if the peak is so much above it that they would show little.
-_PERCENTILE, _SHARP = 99.0, 0.7
-_WIDTH, _LARGEST, _LEAST = 9.0, 8.0, 2.0  # inches: width, and limits of the height
+# Inches: width, limits of the height, and what title and labels take of it.
+_WIDTH, _LARGEST, _LEAST, _WORDS = 9.0, 8.5, 2.5, 0.8
 
 
 def plot_stress(
@@ -67,16 +67,14 @@ def plot_stress(
     factor, unit = suitable_unit(float(np.abs(stress).max()), "Pa")
     peak = int(np.abs(stress).argmax())
     largest = float(np.abs(stress[peak]) / factor) or 1.0
-    # At clamped corners and below forces stresses grow with each refinement of the mesh.
-    usual = float(np.percentile(np.abs(stress), _PERCENTILE) / factor)
-    cut = 0.0 < usual < _SHARP * largest
-    top = usual if cut else largest
+    top = stress_limit(np.abs(stress)) / factor or 1.0
+    cut = top < largest
     name = "von Mises stress" if component == "von_mises" else f"stress {component}"
     signed = component != "von_mises"
     cells = fields.cells
     if cells.shape[1] == 4:
         cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    drawn_height = float(np.clip(0.75 * _WIDTH * height / width, _LEAST, _LARGEST))
+    drawn_height = float(np.clip(0.75 * _WIDTH * height / width + _WORDS, _LEAST, _LARGEST))
     with new_figure(_WIDTH, drawn_height + 0.35 * cut, path) as figure:
         axis = figure.subplots()
         drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress / factor,

@@ -49,7 +49,7 @@ def styled(style: str | Path | Mapping[str, Any]) -> Iterator[None]:
 
 
 def _settings(style: str | Path | Mapping[str, Any]) -> Any:
-    from matplotlib.style import library
+    from matplotlib.style import available, library
 
     if not isinstance(style, str | Path | Mapping):
         raise InputError(f"style = {shown(style)} must be the name of a matplotlib style, a file "
@@ -68,10 +68,9 @@ def _settings(style: str | Path | Mapping[str, Any]) -> Any:
         except (OSError, ValueError, KeyError) as error:
             raise InputError(f"{path} is no matplotlib style: {_first_line(error)}.") from None
     if str(style) not in library:
-        hint = nearest(str(style), library)
-        raise InputError(f"style = '{style}' is no style of matplotlib{hint}; "
-                         f"print(sorted(matplotlib.style.library)) lists them, or give a file "
-                         f"NAME.mplstyle.")
+        raise InputError(f"style = '{style}' is no style of matplotlib"
+                         f"{nearest(str(style), available)}; give a name that is one of "
+                         f"matplotlib.style.available, such as 'ggplot', or a file NAME.mplstyle.")
     return library[str(style)]
 
 

@@ -103,12 +103,18 @@ def plot_convergence(
         For another suffix, or a file that cannot be written.
     """
     require_kind("plot_convergence", (ModeConvergence, BodiesConvergence), result=result)
+    from matplotlib.ticker import NullLocator
+
     several = isinstance(result, BodiesConvergence)
     with new_figure(1.2 * _WIDTH, 5.0 if several else 4.0, path) as figure:
         meshes, modes = figure.subplots(1, 2)
         counts = (_bodies_convergence(meshes, modes, result)
                   if isinstance(result, BodiesConvergence)
                   else _body_convergence(meshes, modes, result))
+        sizes = (np.sum(list(result.unknowns.values()), axis=0)
+                 if isinstance(result, BodiesConvergence) else result.unknowns)[:-1]
+        meshes.set_xticks(sizes, [str(size) for size in sizes])
+        meshes.xaxis.set_minor_locator(NullLocator())
         meshes.set(xlabel="unknowns of the mesh" + "es" * several,
                    ylabel="relative distance from the finest mesh")
         meshes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0),

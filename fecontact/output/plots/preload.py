@@ -9,10 +9,10 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import quantity, suitable_unit
-from fecontact.output.plots.face_panels import abscissa_unit, face_panels
+from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS
-from fecontact.reduction.assembly.contact_faces import touching_faces
+from fecontact.reduction.assembly.contact_faces import several_bodies, shown_faces
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES
 
@@ -38,7 +38,8 @@ def plot_shear(
     The forces of each node are divided by its tributary length [N/m]; shear acts on the body in -x
     and lies within plus and minus mu times the normal force. Slip is the displacement relative to
     the ground. Of several bodies each interface has a column: there shear acts in the negative
-    direction of the tangents, and slip is relative to the other side.
+    direction of the tangents, and slip is relative to the other side. Of one body each contact
+    group has one. Columns of similar values have one scale.
 
     Parameters
     ----------
@@ -58,18 +59,21 @@ def plot_shear(
     require_kind("plot_shear", LoadHistory, history=history)
     early = vertex == -1 and history.status != "finished"
     row = len(history) - 1 if early else history.row(vertex)
-    length = history.system.basis.tributary
-    faces = touching_faces(history.system.basis, "contact at a load step")
+    basis = history.system.basis
+    faces, length = shown_faces(basis, "contact at a load step"), basis.tributary
     shear = history.friction_force[row] / length
     limit = history.friction_limit[row] / length
     slip, states = history.slip[row], history.state(row).contact_state
     with new_figure(max(8.0, 4.5 * len(faces)), 6.4, path) as figure:
         panels = face_panels(figure, faces, 2, label="place along the face")
-        largest = float(max(np.abs(limit).max(), np.abs(shear).max()))
-        (force, force_symbol), (factor, unit) = (
-            suitable_unit(largest, "N/m"), suitable_unit(float(np.abs(slip).max()), "m"))
+        other = "other side" if several_bodies(basis) else "ground"
+        largest = np.maximum(np.abs(limit), np.abs(shear))
+        forces = scale_row(panels[0], [float(largest[face.nodes].max()) for face in faces],
+                           "friction force per length", "N/m")
+        factors = scale_row(panels[1], [float(np.abs(slip[face.nodes]).max()) for face in faces],
+                            f"displacement relative\nto the {other}", "m")
         legend: dict[str, Any] = {}
-        for face, upper, lower in zip(faces, *panels, strict=True):
+        for face, upper, lower, force, factor in zip(faces, *panels, forces, factors, strict=True):
             order = np.argsort(face.abscissa, kind="stable")
             x, nodes = face.abscissa[order] / abscissa_unit(face), face.nodes.start + order
             _line(upper, x, np.stack([limit, -limit, shear])[:, nodes] / force)
@@ -81,9 +85,6 @@ def plot_shear(
             lower.plot(x, slip[nodes] / factor, color=COLOURS[0], marker="o", markersize=3.0)
             handles, names = upper.get_legend_handles_labels()
             legend = dict(zip(names, handles, strict=True)) | legend
-        other = "ground" if not faces[0].name else "other side"
-        panels[0, 0].set_ylabel(f"friction force per length [{force_symbol}]")
-        panels[1, 0].set_ylabel(f"displacement relative\nto the {other} [{unit}]")
         figure.legend(legend.values(), legend, loc="outside upper center", ncols=5)
         figure.align_ylabels(panels[:, 0])
     return figure
@@ -142,7 +143,8 @@ def plot_loop(
 
 
 def _unit(values: Array, unit: str) -> tuple[float, str]:
-    """Factor and symbol of a suitable unit; those of other units as they are."""
+    """Factor and symbol of a suitable unit; that of numbers without unit is a hyphen."""
     if unit == "N m":
-        return 1.0, unit
+        factor, symbol = suitable_unit(float(np.abs(values).max()), "J")
+        return factor, symbol.replace("J", "N m")
     return suitable_unit(float(np.abs(values).max()), unit) if unit else (1.0, "-")

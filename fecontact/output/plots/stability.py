@@ -33,7 +33,7 @@ def plot_eigenvalues(
     branch : Branch
         Of equilibria.
     x_label : str, optional
-        Label of the parameter, with its unit.
+        Label of the parameter, with its SI unit; ticks are in a unit that suits the values.
     range_hz : (float, float)
         Modes that are never in this range are left out.
     path : str or Path, optional
@@ -65,10 +65,7 @@ def plot_eigenvalues(
                            textcoords="offset points", fontsize=9.0)
         upper.set_ylabel("frequency [Hz]")
         lower.set_ylabel("growth rate [1/s]")
-        if x_label is None:
-            name_axis(lower, "x", parameter_label(branch.parameter_name), values)
-        else:
-            lower.set_xlabel(x_label)
+        name_axis(lower, "x", x_label or parameter_label(branch.parameter_name), values)
         if values.min() < values.max():
             lower.set_xlim(values.min(), values.max())
         figure.align_ylabels([upper, lower])
@@ -89,7 +86,7 @@ def plot_stability_map(
         Curves of :func:`fecontact.bifurcation.codim2_curve` over the same parameters, drawn
         instead of the border interpolated from the map.
     x_label, y_label : str, optional
-        Labels of the parameters, with their units.
+        Labels of the parameters, with their SI units; ticks are in units that suit the values.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -127,14 +124,8 @@ def plot_stability_map(
             centre = inside[np.argmin(((inside - inside.mean(axis=0)) ** 2).sum(axis=1))]
             axis.text(found.first[centre[1]], found.second[centre[0]], "stable", ha="center",
                       va="center")
-        if x_label is None:
-            name_axis(axis, "x", parameter_label(found.names[0]), found.first)
-        else:
-            axis.set_xlabel(x_label)
-        if y_label is None:
-            name_axis(axis, "y", parameter_label(found.names[1]), found.second)
-        else:
-            axis.set_ylabel(y_label)
+        name_axis(axis, "x", x_label or parameter_label(found.names[0]), found.first)
+        name_axis(axis, "y", y_label or parameter_label(found.names[1]), found.second)
         axis.grid(False)
     return figure
 

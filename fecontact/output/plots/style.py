@@ -4,8 +4,10 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from cycler import cycler
 
 from fecontact.analysis.resolved import Resolved
+from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -27,9 +29,14 @@ ENERGY_COLOURS = {
 # Colour-blind safe; 'open' takes the colour of the background.
 STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
 
+# Colours of a stress reach to this percentile if its peak is so much above it that they would show
+# little: at clamped corners and below forces stresses grow with each refinement of the mesh.
+_PERCENTILE, _SHARP = 99.0, 0.7
+
 STYLE: Any = {
     "font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0,
     "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#4d4d4d",
+    "axes.prop_cycle": cycler(color=COLOURS),
     "axes.grid": True, "grid.color": "#e4e2de", "grid.linewidth": 0.7, "axes.axisbelow": True,
     "lines.linewidth": 1.2, "legend.frameon": False, "axes.titleweight": "normal",
     "xtick.color": "#303030", "ytick.color": "#303030", "axes.formatter.useoffset": False,
@@ -51,6 +58,15 @@ def distinct_colours(count: int) -> list[str]:
     mixed = [""] * count
     mixed[::2], mixed[1::2] = shades[:half], shades[half:]
     return mixed
+
+
+def stress_limit(sizes: Array) -> float:
+    """Where the colours of a stress end, from its sizes at the nodes: their largest, or their 99th
+    percentile where few nodes have much more than all others.
+    """
+    largest = float(sizes.max(initial=0.0))
+    usual = float(np.percentile(sizes, _PERCENTILE)) if len(sizes) else 0.0
+    return usual if 0.0 < usual < _SHARP * largest else largest
 
 
 def add_note(figure: "Figure", drawn: Resolved) -> None:

@@ -9,9 +9,10 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.wear import WearHistory
+from fecontact.output.plots.face_panels import scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS
-from fecontact.reduction.assembly.contact_faces import ContactFace, touching_faces
+from fecontact.reduction.assembly.contact_faces import ContactFace, shown_faces
 from fecontact.reduction.modal_basis import ModalBasis
 
 if TYPE_CHECKING:
@@ -25,12 +26,14 @@ def plot_wear(
 ) -> "Figure":
     """Plot the worn profile and the line load along the face, and the depth over the cycles.
 
+    Columns of similar values have one scale.
+
     Parameters
     ----------
     history : WearHistory
         Of :func:`fecontact.integrate.wear_history`.
     basis : ModalBasis, optional
-        That of the worn system: with several bodies, each of its interfaces gets a column.
+        That of the worn system: each of its interfaces or contact groups gets a column.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -44,14 +47,18 @@ def plot_wear(
     require_kind("plot_wear", WearHistory, history=history)
     length, blocks = history.tributary, len(history.cycles) - 1
     faces = _faces(history, basis)
-    depth_unit, depth_symbol = suitable_unit(float(history.depth.max()), "m")
-    load_unit, load_symbol = suitable_unit(float(np.abs(history.line_load).max()), "N/m")
     shown = np.unique(np.linspace(1, blocks, _PROFILES).round().astype(int))
-    title = (f"{type(history.law).__name__}, {history.acceleration:.4g} cycles per computed "
+    title = (f"{type(history.law).__name__}, {_cycles(history.acceleration, 4)} per computed "
              f"period")
     with new_figure(max(9.0, 5.0 * len(faces)), 8.0, path) as figure:
-        panels = figure.subplots(3, len(faces), sharey="row", squeeze=False)
-        for face, (profile, load, growth) in zip(faces, panels.T, strict=True):
+        panels = figure.subplots(3, len(faces), squeeze=False)
+        deepest = [float(history.depth[:, face.nodes].max()) for face in faces]
+        loads = [float(np.abs(history.line_load[:, face.nodes]).max()) for face in faces]
+        depth_units = scale_row(panels[0], deepest, "worn profile", "m")
+        load_units = scale_row(panels[1], loads, "line load", "N/m")
+        scale_row(panels[2], deepest, "worn depth", "m")
+        for face, (profile, load, growth), depth_unit, load_unit in zip(
+                faces, panels.T, depth_units, load_units, strict=True):
             order = np.argsort(face.abscissa)
             x, width = face.abscissa[order], face.tributary[order]
             edges = np.append(x - 0.5 * width, x[-1] + 0.5 * width[-1])
@@ -60,7 +67,7 @@ def plot_wear(
             for k in shown:
                 colour = colormaps["viridis"](0.9 * (1.0 - k / blocks))
                 profile.stairs(-depth[k][order] / depth_unit, edges / unit, baseline=None,
-                               color=colour, label=f"{history.cycles[k]:.6g} cycles",
+                               color=colour, label=_cycles(history.cycles[k]),
                                linewidth=1.5)
                 load.stairs(history.line_load[k - 1][face.nodes][order] / load_unit, edges / unit,
                             baseline=None, color=colour, linewidth=1.5)
@@ -72,17 +79,19 @@ def plot_wear(
                 growth.plot(history.cycles, values / depth_unit, color=colour, label=name)
             growth.set_xlabel("cycles")
             profile.set_title(face.title or title)
-        panels[1, 0].set_ylim(bottom=0.0)  # not before all of the row are drawn
+        for panel in panels[1]:
+            panel.set_ylim(bottom=0.0)  # not before all of the row are drawn
         if faces[0].title:
             figure.suptitle(title)
-        for panel, label in zip(panels[:, 0], (f"worn profile [{depth_symbol}]",
-                                               f"line load [{load_symbol}]",
-                                               f"worn depth [{depth_symbol}]"), strict=True):
-            panel.set_ylabel(label)
         for panel in panels[[0, 2], -1]:
             panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         figure.align_ylabels(panels[:, 0])
     return figure
+
+
+def _cycles(number: float, digits: int = 6) -> str:
+    """``1 cycle``, ``2500 cycles``."""
+    return f"{number:.{digits}g} cycle" + ("" if number == 1.0 else "s")
 
 
 def _faces(history: WearHistory, basis: ModalBasis | None) -> tuple[ContactFace, ...]:
@@ -92,4 +101,4 @@ def _faces(history: WearHistory, basis: ModalBasis | None) -> tuple[ContactFace,
     if basis.contact_nodes != len(history.x):
         raise InputError(f"plot_wear: the basis has {basis.contact_nodes} contact nodes, but the "
                          f"wear history {len(history.x)}; give the basis of the worn system.")
-    return touching_faces(basis, "wear")
+    return shown_faces(basis, "wear")

@@ -86,14 +86,17 @@ class ForceChart:
         figure = Figure(figsize=(self.width / 100, self.height / 100), dpi=100, facecolor="white")
         canvas = FigureCanvasAgg(figure)
         left, below = 7.0 * self.font / self.width, 3.4 * self.font / self.height
-        axes: Any = figure.add_axes((left, below, 0.97 - left, 0.97 - below))
         motion, trajectory = self.motion, self.motion.trajectory
         first, last = float(motion.times[0]), float(motion.times[-1])
         if last > first:
             trajectory = resolved(trajectory.between(first, last)).trajectory
         part = (first <= trajectory.time) & (trajectory.time <= last)
-        time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
         totals = _totals(trajectory, part)
+        columns = 4 if len(totals) > 2 else 2
+        # The legend stands above the axes, where the cursor does not cross it.
+        above = 1.8 * self.font * -(-len(totals) // columns) / self.height
+        axes: Any = figure.add_axes((left, below, 0.97 - left, 0.98 - above - below))
+        time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
         largest = max(float(np.abs(line.values).max()) for line in totals)
         unit, force_symbol = suitable_unit(largest, "N")
         for line in totals:
@@ -102,8 +105,6 @@ class ForceChart:
                       label=line.name)
         if len(motion.times) > 1:
             axes.set_xlim(motion.times[0] / time_unit, motion.times[-1] / time_unit)
-        low, high = axes.get_ylim()
-        axes.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
         axes.set_ylabel(f"total [{force_symbol}]", fontsize=0.9 * self.font, color=_DARK)
         axes.set_xlabel(f"t [{symbol}]", fontsize=0.9 * self.font, color=_DARK, labelpad=0.0)
         axes.tick_params(labelsize=0.9 * self.font, colors=_DARK, length=0.3 * self.font)
@@ -111,12 +112,12 @@ class ForceChart:
         axes.grid(color=_GRID)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(loc="upper right", ncols=4 if len(totals) > 2 else 2,
-                    fontsize=0.9 * self.font, frameon=False, borderaxespad=0.0)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns,
+                    fontsize=0.9 * self.font, frameon=False, borderaxespad=0.0, borderpad=0.2)
         canvas.draw()
         image = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
         box = axes.get_window_extent()
-        columns = axes.transData.transform(
+        cursor = axes.transData.transform(
             np.column_stack([motion.times / time_unit, np.zeros(len(motion.times))]))[:, 0]
-        columns = np.clip(np.round(columns), 2, self.width - 3).astype(np.intp)
-        return image, (self.height - int(box.y1), self.height - int(box.y0)), columns
+        cursor = np.clip(np.round(cursor), 2, self.width - 3).astype(np.intp)
+        return image, (self.height - int(box.y1), self.height - int(box.y0)), cursor

@@ -20,7 +20,7 @@ from fecontact.output.files.frames import (
     require_field,
     von_mises,
 )
-from fecontact.output.plots.style import state_names
+from fecontact.output.plots.style import state_names, stress_limit
 from fecontact.reduction.assembly.contact_faces import contact_faces, contact_sides, several_bodies
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -190,8 +190,18 @@ class Motion:
 
     @cached_property
     def largest_colour(self) -> float:
-        """Upper end of the colour range, in SI units; the lower end is zero."""
-        return self._largest[self.colour]
+        """Upper end of the colour range, in SI units; the lower end is zero.
+
+        The largest value of all frames; where few nodes have much higher stresses than all others,
+        the 99th percentile of the largest stress of each node.
+        """
+        return stress_limit(self._stress) if self.colour == "von_mises" else self.peak
+
+    @cached_property
+    def peak(self) -> float:
+        """Largest value of what colours the body, of all nodes and frames, in SI units."""
+        return float(self._stress.max()) if self.colour == "von_mises" else (
+            self._largest["displacement"])
 
     @cached_property
     def box(self) -> tuple[float, float, float, float]:
@@ -307,7 +317,7 @@ class Motion:
 
     @cached_property
     def _largest(self) -> dict[str, float]:
-        largest = dict.fromkeys((*COLOURS, "shape"), 0.0)
+        largest = {"displacement": 0.0, "shape": 0.0}
         for which in blocks(self.indices, len(self.mode_shapes.nodes)):
             q = self.trajectory.modal_coordinates[which]
             motion = displacement(self.mode_shapes, q)
@@ -316,7 +326,13 @@ class Motion:
             motion[..., 0] -= self._wavy * self._drift(q)[:, None]
             size = np.linalg.norm(motion, axis=2).max()
             largest["shape"] = max(largest["shape"], float(size))
-            if self.colour == "von_mises":
-                stress = float(von_mises(self.mode_shapes, q).max())
-                largest["von_mises"] = max(largest["von_mises"], stress)
+        return largest
+
+    @cached_property
+    def _stress(self) -> Array:
+        """Largest von Mises stress (N,) of each node in all frames [Pa]."""
+        largest = np.zeros(len(self.mode_shapes.nodes))
+        for which in blocks(self.indices, len(largest)):
+            found = von_mises(self.mode_shapes, self.trajectory.modal_coordinates[which])
+            np.maximum(largest, found.max(axis=0), out=largest)
         return largest

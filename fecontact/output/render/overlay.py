@@ -22,6 +22,9 @@ Image = NDArray[np.uint8]
 
 _DPI = 100
 _FONT = 10.5  # points at 960 x 540
+_LEAST_CHART = 90.0  # pixels at 960 x 540
+_MOST_CHART = 0.6  # of the room between title and legend
+_SPARE = 1.04  # height of a scene below a chart, relative to what it needs
 
 
 class Strips:
@@ -76,8 +79,10 @@ class Strips:
                 drawn.set_text(text.rstrip() + "…")
         return pixels(canvas)
 
-    def colour_scale(self, figure: Any, label: str, largest: float, colours: str) -> None:
-        """Draw the colour scale from zero into the lower strip."""
+    def colour_scale(
+        self, figure: Any, label: str, largest: float, colours: str, beyond: bool = False
+    ) -> None:
+        """Draw the colour scale from zero into the lower strip, pointed if values lie beyond."""
         from matplotlib import colormaps
         from matplotlib.ticker import MaxNLocator
 
@@ -85,6 +90,10 @@ class Strips:
         axes.imshow(np.linspace(0.0, 1.0, 256)[None], aspect="auto", cmap=colormaps[colours],
                     extent=(0.0, largest, 0.0, 1.0))
         axes.set_yticks([])
+        if beyond:
+            axes.fill([1.0, 1.0, 1.025], [0.0, 1.0, 0.5], transform=axes.transAxes, clip_on=False,
+                      facecolor=colormaps[colours](1.0), edgecolor=DARK,
+                      linewidth=0.7 * self.size)
         axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         axes.tick_params(labelsize=0.9 * _FONT * self.size, colors=DARK, length=3 * self.size,
                          width=0.7 * self.size, pad=2 * self.size)
@@ -117,11 +126,11 @@ class Overlay(Strips):
     def chart_height(self) -> int:
         """Height of the force chart in pixels, from the room that a flat body leaves; or zero.
 
-        The scene keeps a third more than it needs, and at least half.
+        The scene keeps little more than it needs, and at least a third.
         """
         room = self.height - self.header_height - self.footer_height
-        left = min(room - 4.0 / 3.0 * needed_height(self.motion) * self.width, 0.5 * room)
-        return 2 * int(0.5 * left) if left >= 110.0 * self.size else 0
+        left = min(room - _SPARE * needed_height(self.motion) * self.width, _MOST_CHART * room)
+        return 2 * int(0.5 * left) if left >= _LEAST_CHART * self.size else 0
 
     @property
     def scene_height(self) -> int:
@@ -180,8 +189,9 @@ class Overlay(Strips):
         name, unit = COLOURS[self.motion.colour]
         largest = self.motion.largest_colour or 1.0
         factor, symbol = suitable_unit(largest, unit)
-        self.colour_scale(figure, f"{name} [{symbol}]", largest / factor,
-                          COLOUR_MAPS[self.motion.colour])
+        beyond = self.motion.peak > largest
+        label = f"{name} [{symbol}]" + (f", peak {self.motion.peak / factor:.3g}" if beyond else "")
+        self.colour_scale(figure, label, largest / factor, COLOUR_MAPS[self.motion.colour], beyond)
 
     def _legend(self, figure: Any) -> None:
         from matplotlib.lines import Line2D

@@ -24,7 +24,8 @@ _LAYERS = {"ground": 0.0, "marks": 0.01, "surface": 0.02, "body": 0.03, "referen
 
 _MARGIN = 0.05  # of the view, beside and above the body
 _DEPTH = 0.20  # of the view's height, for the ground
-_ARROW = 0.15  # longest arrow, of the view's height (in portrait of half its width)
+_LOW = 0.62  # of the height that body and waves leave, what is drawn of the ground
+_ARROW = 0.15  # longest arrow, of the unit of sizes
 _CORNERS = 20
 _COLUMNS, _MOST_COLUMNS = 2, 8  # of the ground per pixel
 _FOOT = 0.6  # radius of a foot on another body, of that of its contact node
@@ -196,15 +197,16 @@ class Scene(BodyScene):
         """Place the camera so that body and ground fill the picture in all frames."""
         if not self._motion.has_ground:
             super()._aim(aspect)
-            self._unit = self._height * min(1.0, 0.5 * aspect)
+            self._unit = _drawn_unit(self._height, aspect)
             return
         left, right, _, _ = self._motion.box
         level = self._motion.ground_level
         body, below = _reach(self._motion)
         height = max((right - left) / (1.0 - 2.0 * _MARGIN) / aspect, _needed(body, below))
-        depth = max(_DEPTH * height, 0.46 * (height - body), below + 2.0 * _MARGIN * height)
+        # What is left over goes to the ground: blank above the body it would look like a gap.
+        depth = max(_DEPTH * height, _LOW * (height - body), below + 2.0 * _MARGIN * height)
         middle = 0.5 * (left + right)
-        self._unit = height * min(1.0, 0.5 * aspect)  # sizes of arrows and marks
+        self._unit = _drawn_unit(height, aspect)
         self._x = (middle - 0.5 * aspect * height, middle + 0.5 * aspect * height)
         self._point_camera(middle, level - depth, height)
 
@@ -302,6 +304,11 @@ class Scene(BodyScene):
         shaft, wing = 0.0045 * thick * across, 0.014 * thick * across
         return np.stack([tail - shaft, neck - shaft, neck + shaft, tail + shaft,
                          neck - wing, tips, neck + wing], axis=1).reshape(-1, 2)
+
+
+def _drawn_unit(height: float, aspect: float) -> float:
+    """Size that those of arrows and marks relate to, for a view of this height and aspect."""
+    return height * float(np.clip(1.0, 0.25 * aspect, 0.5 * aspect))
 
 
 def needed_height(motion: Motion) -> float:

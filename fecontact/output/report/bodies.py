@@ -2,140 +2,211 @@
 
 What is shown is a sum ``sum_m s_m q_m``. Shape m has the step ``2 e / (M max|q_m|)`` of M modes and
 coordinate m the step ``2 e / (M max|s_m|)``, so that each adds at most e to the error of the sum,
-whatever cancels in it.
+whatever cancels in it. As modes are not at their largest all at once, both are then made as coarse
+as the bound ``sum_m step_m |q_m| / 2`` over all times, or ``|s_m|`` over all nodes, allows.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.output.files.frames import blocks, displacement, von_mises
-from fecontact.output.render.frames_data import body_labels
+from fecontact.output.report.drawing import DrawnBodies
 from fecontact.output.report.payload import Payload
-from fecontact.reduction.assembly.contact_faces import mode_names
-from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.mode_shapes import ModeShapes
-from fecontact.reduction.report import BasisReport
 
-# Of the largest displacement and von Mises stress: errors of shapes and of coordinates each.
-TOLERANCE = 3e-5
+# Of the largest displacement and von Mises stress: errors of coordinates, which are few, and of
+# shapes.
+TOLERANCE = 1e-5
+_SHAPES = 8e-5
 _ALONE = 1e-4  # error of a mode that is shown alone, of its largest value
-_VON_MISES = 3.0  # largest error of von Mises stress per error of the components xx, yy, zz, xy
-_COMPONENTS = ("xx", "yy", "zz", "xy")
+# Largest error of von Mises stress per error of its components, (4 + 3 k)^(1/2) with k shears.
+_VON_MISES = {4: 7.0**0.5, 6: 13.0**0.5}
 _PEAK = 0.98  # part of the nodes whose largest stress lies within the colour range
 _PEAKED = 1.5  # ratio of the peak to that stress above which the peak is left out of the range
+_BLOCK = 2**18  # numbers of a field over nodes and times that stay in cache
+
+
+@dataclass(frozen=True, eq=False)
+class _Reached:
+    """What a field reaches over time: its largest size (P,), lowest and highest values (P, c)."""
+
+    largest: Array
+    low: Array
+    high: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """What a page shows of modal coordinates (N, m): their ranges over bodies and time."""
+    """What a page shows of modal coordinates (N, m): their ranges over bodies and time.
 
-    basis: ModalBasis
+    ``drift`` (m,) is the motion along x that is not magnified.
+    """
+
+    bodies: DrawnBodies
     coordinates: Array
+    drift: Array | None = None
 
     @cached_property
-    def shapes(self) -> ModeShapes:
-        """Mode shapes over the bodies; rigid ones without the round-off of their stresses."""
-        found = self.basis.mode_shapes
-        assert found is not None
-        return replace(found, stress=found.stress * (self.basis.angular_frequencies > 0.0))
+    def _whole(self) -> _Reached:
+        return _reached(self.bodies.shapes, self.coordinates, _length)
 
     @cached_property
-    def _peaks(self) -> tuple[Array, Array]:
-        """Largest displacement and von Mises stress (P,) of each node over time."""
-        nodes = len(self.shapes.nodes)
-        largest = np.zeros((2, nodes))
-        for which in blocks(np.arange(len(self.coordinates)), nodes):
-            q = self.coordinates[which]
-            length = np.linalg.norm(displacement(self.shapes, q), axis=2)
-            for row, values in zip(largest, (length, von_mises(self.shapes, q)), strict=True):
-                np.maximum(row, values.max(axis=0), out=row)
-        return largest[0], largest[1]
+    def _magnified(self) -> _Reached:
+        """Without the drift."""
+        if self.drift is None or not self.drift.any():
+            return self._whole
+        shapes = self.bodies.shapes.copy()
+        shapes[:, 0] -= self.drift
+        return _reached(shapes, self.coordinates, _length)
+
+    @cached_property
+    def _stresses(self) -> Array:
+        """Largest von Mises stress (P,) of each node over time."""
+        stress = self.bodies.stress
+        used = np.flatnonzero(stress.any(axis=(0, 2)))
+        names = [self.bodies.components[k] for k in used]
+        if not names:
+            return np.zeros(len(stress))
+        return _reached(stress[:, used], self.coordinates,
+                        lambda values: von_mises(names, values)).largest
 
     @property
     def largest_displacement(self) -> float:
         """[m]."""
-        return float(self._peaks[0].max())
+        return float(self._whole.largest.max())
+
+    @property
+    def largest_magnified(self) -> float:
+        """Largest displacement without the drift [m]."""
+        return float(self._magnified.largest.max())
 
     @property
     def largest_stress(self) -> float:
         """Of von Mises [Pa]."""
-        return float(self._peaks[1].max())
+        return float(self._stresses.max())
 
     @property
     def peak_node(self) -> int:
         """Mesh node of the largest von Mises stress."""
-        return int(self._peaks[1].argmax())
+        return int(self._stresses.argmax())
 
     @property
     def stress_range(self) -> float:
         """End of the colour range [Pa]: singular corners do not darken all others."""
-        usual = float(np.quantile(self._peaks[1], _PEAK))
+        usual = float(np.quantile(self._stresses, _PEAK))
         return usual if 0.0 < _PEAKED * usual < self.largest_stress else self.largest_stress
+
+    def box(self, scale: float) -> list[float]:
+        """Smallest and largest x, y (and z) that the bodies reach, magnified [m]."""
+        nodes, moved = self.bodies.nodes, self._magnified
+        low = (nodes + scale * moved.low).min(axis=0)
+        high = (nodes + scale * moved.high).max(axis=0)
+        if self.drift is not None:
+            drift = self.coordinates @ self.drift
+            low[0], high[0] = low[0] + drift.min(), high[0] + drift.max()
+        ends = [np.minimum(low, nodes.min(axis=0)), np.maximum(high, nodes.max(axis=0))]
+        return [float(end) for end in np.stack(ends, axis=1).ravel()]
+
+    @property
+    def _errors(self) -> tuple[float, float]:
+        """Errors of displacement and stress components that an error of one stands for."""
+        return (self.largest_displacement / self.bodies.dimension**0.5,
+                self.largest_stress / _VON_MISES[self.bodies.stress.shape[1]])
 
     def coordinate_steps(self) -> Array:
         """Steps (m,) of the coordinates."""
-        fields = [(np.abs(self.shapes.shapes).max(axis=(0, 1)), self.largest_displacement),
-                  (np.abs(self.shapes.stress).max(axis=(0, 1)), self.largest_stress / _VON_MISES)]
-        return np.min([_steps(sizes, TOLERANCE * largest) for sizes, largest in fields], axis=0)
+        found = []
+        for field, error in zip((self.bodies.shapes, self.bodies.stress), self._errors,
+                                strict=True):
+            rows = np.abs(field).reshape(-1, field.shape[2])
+            found.append(_steps(rows, TOLERANCE * error))
+        return np.min(found, axis=0)
 
-    def shape_steps(self, field: Array, largest: float) -> Array:
-        """Steps (c, m) of a field (P, c, m) of the modes, of which ``largest`` is seen."""
-        sizes = np.abs(field).max(axis=(0, 1), initial=0.0)
-        used = np.abs(self.coordinates).max(axis=0, initial=0.0)
-        steps = np.minimum(_steps(used, TOLERANCE * largest),
-                           np.where(sizes > 0.0, _ALONE * sizes, 1.0))
-        return np.tile(steps, (field.shape[1], 1))
+    def shape_steps(self) -> tuple[Array, Array]:
+        """Steps (m,) of shapes and stresses."""
+        used = np.abs(self.coordinates)
+        found = []
+        for field, error in zip((self.bodies.shapes, self.bodies.stress), self._errors,
+                                strict=True):
+            sizes = np.abs(field).max(axis=(0, 1), initial=0.0)
+            found.append(np.minimum(_steps(used, _SHAPES * error),
+                                    np.where(sizes > 0.0, _ALONE * sizes, 1.0)))
+        return found[0], found[1]
 
 
-def _steps(sizes: Array, error: float) -> Array:
-    """Steps (m,) of what is multiplied with numbers up to ``sizes`` (m,), for an error in the sum.
+def _reached(field: Array, q: Array, size: Callable[[Any], Array]) -> _Reached:
+    """What the sums of a field (P, c, m) over the modes reach at coordinates q (N, m).
+
+    ``size`` gives one number of values (c, ...). Times are sought in single precision, in blocks of
+    nodes that stay in cache; the largest sizes are those of the sums in double precision there.
+    """
+    nodes, kinds, modes = field.shape
+    used = np.abs(q).max(axis=0, initial=0.0)
+    parts = field * used
+    unit = float(np.abs(parts).max(initial=0.0)) or 1.0
+    rows = np.ascontiguousarray((parts / unit).transpose(1, 0, 2), dtype=np.float32)
+    columns = (q / np.where(used > 0.0, used, 1.0)).T.astype(np.float32)
+    at = np.zeros(nodes, dtype=np.intp)
+    low, high = np.zeros((nodes, kinds)), np.zeros((nodes, kinds))
+    count = max(1, _BLOCK // (kinds * len(q)))
+    for first in range(0, nodes, count):
+        chosen = slice(first, first + count)
+        values = (rows[:, chosen].reshape(-1, modes) @ columns).reshape(kinds, -1, len(q))
+        at[chosen] = size(values).argmax(axis=1)
+        low[chosen], high[chosen] = values.min(axis=2).T, values.max(axis=2).T
+    largest = size(np.einsum("pcm,pm->cp", field, q[at]))
+    return _Reached(largest, unit * low, unit * high)
+
+
+def _length(values: Array) -> Array:
+    return np.sqrt(np.einsum("c...,c...->...", values, values))
+
+
+def von_mises(names: Sequence[str], values: Array) -> Array:
+    """Von Mises stress (...) of stresses (c, ...), of which those without a name are zero."""
+    parts = dict(zip(names, values, strict=True))
+    xx, yy, zz = (parts.get(name, 0.0) for name in ("xx", "yy", "zz"))
+    square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
+    for name in ("xy", "yz", "zx"):
+        square = square + 3.0 * parts[name] ** 2 if name in parts else square
+    return np.sqrt(square)
+
+
+def _steps(factors: Array, error: float) -> Array:
+    """Steps (m,) of what is multiplied with each row of factors (r, m) of zero or above and summed.
 
     Without any motion there is no error to keep to.
     """
     wide = np.finfo(float).max ** 0.25
+    sizes = factors.max(axis=0, initial=0.0)
     if error <= 0.0:
         return np.full(len(sizes), wide)
-    return 2.0 * error / (len(sizes) * np.maximum(sizes, error / wide))
+    steps = 2.0 * error / (len(sizes) * np.maximum(sizes, error / wide))
+    reached = 0.5 * float((factors @ steps).max(initial=0.0))
+    return steps * max(1.0, error / reached) if reached > 0.0 else steps
 
 
 def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
-    """Bodies of a page: places, triangles, outline, shapes and stresses of the modes.
-
-    All places have ``dimension`` coordinates, two for plane bodies; stresses are those of
-    ``components``.
-    """
-    basis, field = motions.basis, motions.shapes
-    extent = float(np.linalg.norm(np.ptp(field.nodes, axis=0)))
-    cells = field.cells
-    # Triangles of one cell after the other, so that overlapping bodies are drawn in turn.
-    triangles = cells if cells.shape[1] == 3 else cells[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    used = [k for k in range(len(_COMPONENTS)) if field.stress[:, k].any()]
-    stress = field.stress[:, used]
-    parts = [{"name": name, "label": node} for name, node in body_labels(basis)]
-    ratios = [f"{50.0 * rate / w:.3g} %" if w > 0.0 else ""
-              for rate, w in zip(np.diag(basis.damping), basis.angular_frequencies, strict=True)]
-    # The modes that complete the bases of several bodies are not told from vibrations.
-    kinds = [kind if kind == "rigid" or not basis.parts else ""
-             for kind in BasisReport(basis).kinds]
+    """Bodies of a page: places, triangles, outline, shapes and stresses of the modes."""
+    bodies = motions.bodies
+    used = [k for k in range(len(bodies.components)) if bodies.stress[:, k].any()]
+    steps = motions.shape_steps()
+    stress, names = bodies.stress[:, used], [bodies.components[k] for k in used]
     return {
-        "dimension": field.nodes.shape[1],
-        "points": payload.add(field.nodes, 1e-7 * extent),
-        "triangles": payload.add(triangles),
-        "edges": payload.add(field.outline),
-        "shapes": payload.add(field.shapes, motions.shape_steps(
-            field.shapes, motions.largest_displacement)),
-        "stress": payload.add(stress, motions.shape_steps(
-            stress, motions.largest_stress / _VON_MISES)),
-        "components": [_COMPONENTS[k] for k in used],
+        "dimension": bodies.dimension,
+        "points": payload.add(bodies.nodes, 1e-7 * bodies.extent),
+        "triangles": payload.add(bodies.triangles),
+        "edges": payload.add(bodies.edges),
+        "shapes": payload.add(bodies.shapes, np.tile(steps[0], bodies.dimension)),
+        "stress": payload.add(stress, np.tile(steps[1], len(used))),
+        "components": names,
         "paints": [*(["von Mises stress"] if used else []), "displacement",
-                   *(f"stress {_COMPONENTS[k]}" for k in used), "none"],
-        "parts": parts,
-        "modes": [[name, f"{hz:.6g}", ratio, kind] for name, hz, ratio, kind in zip(
-            mode_names(basis), basis.frequencies_hz, ratios, kinds, strict=True)],
+                   *(f"stress {name}" for name in names), "none"],
+        "parts": [{"name": name, "label": node} for name, node in bodies.labels],
+        "modes": bodies.modes,
         "largest": {"displacement": motions.largest_displacement,
                     "stress": motions.stress_range, "peak": motions.largest_stress},
         "peak": motions.peak_node,

@@ -18,6 +18,7 @@ from fecontact.output.plots.bifurcation_diagram import LETTERS, stable_pieces
 from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.plots.style import distinct_colours
 from fecontact.output.report.bodies import Motions, bodies_table
+from fecontact.output.report.drawing import drawn_bodies
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import SMALLEST, Payload
 from fecontact.output.report.run_report import colour_maps, require_page, study_tables
@@ -86,7 +87,8 @@ def report_branches(
     factor, symbol = suitable_unit(largest, "m") if y.startswith("observed") else (1.0, "")
     header: dict[str, Any] = {
         "format": 1, "title": title, "units": UNITS,
-        "status": "; ".join(f"{name}: {branch.status.value}" for name, branch in named.items()),
+        "status": "; ".join(f"{name}: {branch.status.value.removesuffix('.')}"
+                            for name, branch in named.items()) + ".",
         "good": all(branch.status.name != "STALLED" for branch in named.values()),
         "notes": [f"{name}: {branch.message}" for name, branch in named.items() if branch.message],
         "xLabel": parameter_label(next(iter(named.values())).parameter_name),
@@ -104,14 +106,11 @@ def report_branches(
     row = field.displacement_row(point, component)[: basis.modes]
     header["orbits"], q = _orbit_tables(motions, row, payload)
     if basis.mode_shapes is not None:
-        seen = Motions(basis, q)
-        extent = float(np.linalg.norm(np.ptp(basis.mode_shapes.nodes, axis=0)))
+        seen = Motions(drawn_bodies(basis), q)
         largest = seen.largest_displacement
-        scale = max(1.0, round_125(_VISIBLE * extent / largest)) if largest > 0.0 else 1.0
-        low, high = basis.mode_shapes.nodes.min(axis=0), basis.mode_shapes.nodes.max(axis=0)
-        reach = scale * largest
+        scale = max(1.0, round_125(_VISIBLE * seen.bodies.extent / largest)) if largest else 1.0
         header |= {"bodies": bodies_table(seen, payload), "scale": scale, "maps": colour_maps(),
-                   "box": [low[0] - reach, high[0] + reach, low[1] - reach, high[1] + reach]}
+                   "box": seen.box(scale)}
         header["orbits"]["coordinates"] = payload.add(q, seen.coordinate_steps())
     return write_page(path, title, payload.block(header), "branches")
 

@@ -5,6 +5,7 @@ import hashlib
 import re
 import warnings
 from collections.abc import Mapping
+from functools import cache
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -12,22 +13,18 @@ from typing import Literal
 
 from fecontact.core.errors import ModelWarning
 from fecontact.core.files.atomic_write import write_text
+from fecontact.output.report.payload import as_text
+from fecontact.output.report.shorten import shortened
 
-Kind = Literal["run", "branches", "sweep"]
+Kind = Literal["run", "branches", "sweep", "widget"]
 # In the order in which they need each other; together one script.
 _COMMON = ("payload.js", "chart.js", "widgets.js")
 SCRIPTS: Mapping[Kind, tuple[str, ...]] = {
     "run": (*_COMMON, "map.js", "player.js", "run.js", "start.js"),
     "branches": (*_COMMON, "player.js", "branches.js", "start.js"),
     "sweep": (*_COMMON, "sweep.js", "start.js"),
+    "widget": (*_COMMON, "map.js", "player.js", "run.js", "widget.js"),
 }
-_COMMENTS = re.compile(r"^\s*//.*$", re.MULTILINE)
-_LITERALS = re.compile(r"""("(?:\\.|[^"\\])*"|`(?:\\.|[^`\\])*`)""")
-# Beside these letters no blank matters, unless a + or a - meets another.
-_BLANKS = re.compile(r"\s*([{}()\[\];,:?=*/<>&|!%])\s*|(?<![-+]) *([-+]) *(?![-+ ])")
-_INDENTS = re.compile(r"\n\s*")
-_SHORTER = tuple((re.compile(pattern), instead) for pattern, instead in (
-    (r"\bconst\b", "let"), (r";}", "}"), (r"\((\w+)\)=>", r"\1=>"), (r"(?<![\w.])0\.(?=\d)", ".")))
 LARGE = 20e6  # bytes of a file that mail and browsers take without complaint
 
 _PAGE = """<!doctype html>
@@ -49,32 +46,31 @@ content="default-src 'none'; script-src 'sha256-{seal}'; style-src 'sha256-{styl
 """
 
 
+@cache
 def script(kind: Kind) -> str:
-    """The script of a page, without comments and needless letters."""
-    text = _COMMENTS.sub("", "\n".join(_asset(name) for name in SCRIPTS[kind]))
-    return "".join(_INDENTS.sub("\n", part) if part[0] in "\"`" else _shortened(part)
-                   for part in _LITERALS.split(text) if part)
+    """The script of a page, in few letters."""
+    return shortened("\n".join(_asset(name) for name in SCRIPTS[kind]))
 
 
-def _shortened(code: str) -> str:
-    code = _BLANKS.sub(r"\1\2", code)
-    for pattern, instead in _SHORTER:
-        code = pattern.sub(instead, code)
-    return code
+@cache
+def styles() -> str:
+    """The styles of all pages."""
+    return re.sub(r"\s*\n\s*", "\n", _asset("report.css"))
 
 
-def page(title: str, block: str, kind: Kind = "run") -> str:
+def page(title: str, block: bytes, kind: Kind = "run") -> str:
     """A page with a block of data.
 
     All text of a study lies in the block, which has no letters that HTML knows, and is written by
     the script as text; the policy of the page runs no other script and loads nothing.
     """
-    code, style = script(kind), _asset("report.css")
-    return _PAGE.format(title=escape(title), style=style, block=block, script=code,
+    code, style = script(kind), styles()
+    return _PAGE.format(title=escape(title), style=style, script=code,
+                        block=as_text(block),
                         seal=_seal(code), style_seal=_seal(style))
 
 
-def write_page(path: Path, title: str, block: str, kind: Kind = "run") -> Path:
+def write_page(path: Path, title: str, block: bytes, kind: Kind = "run") -> Path:
     """Write a page, whole or not at all; a ModelWarning tells of a file that is large."""
     text = page(title, block, kind)
     if len(text) > LARGE:

@@ -12,18 +12,26 @@ from fecontact.analysis.histories import Point
 from fecontact.analysis.run_facts import notes, run_facts
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
-from fecontact.core.units import UNITS
+from fecontact.core.units import UNITS, round_125
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.case import library_versions
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.scene import COLOUR_MAPS
 from fecontact.output.report.bodies import Motions, bodies_table
 from fecontact.output.report.charts import chart_tables, energy_charts
-from fecontact.output.report.contact import contact_table, ground_table
+from fecontact.output.report.contact import (
+    contact_table,
+    drawn_contact,
+    drawn_ground,
+    drift_rows,
+    ground_table,
+)
+from fecontact.output.report.drawing import DrawnGround, drawn_bodies
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 
 _SHADES = 64  # of a colour map
+_VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
 _NOT_OF_RUNS = ("branch", "sweep", "wear", "preload", "render", "output")  # sections of a study
 
 
@@ -80,7 +88,7 @@ def report(
 def run_block(
     run: Trajectory, title: str, study: str | None = None, points: Sequence[Point] = (),
     scale: float | None = None, versions: Mapping[str, str] | None = None,
-) -> str:
+) -> bytes:
     """The data of the report of a run; see :func:`report`."""
     require_kind("report", Sequence, points=points)
     if isinstance(points, str):
@@ -96,7 +104,7 @@ def run_block(
     drawn = system.basis.mode_shapes is not None
     if not drawn:
         told.append("The modal basis holds no shapes over the body, so that no body is drawn.")
-    motion = Motion(found, np.arange(len(found.time)), given_scale=scale) if drawn else None
+    motion = Motion(found, np.arange(len(found.time))) if drawn else None
     charts, phases = chart_tables(found, points, payload)
     header: dict[str, Any] = {
         "format": 1,
@@ -113,18 +121,36 @@ def run_block(
         "balance": f"error of the energy balance: {found.energies.imbalance:.1e} of the largest "
                    f"term",
         "units": UNITS,
-        "contact": contact_table(found, motion, payload) if system.basis.contact_nodes else None,
+        "contact": None, "ground": None, "maps": colour_maps(),
     }
+    if system.basis.contact_nodes:
+        header["contact"] = contact_table(drawn_contact(found, motion), payload)
     if motion is not None:
-        motions = Motions(system.basis, found.modal_coordinates)
-        header |= {
-            "bodies": bodies_table(motions, payload),
-            "coordinates": payload.add(found.modal_coordinates, motions.coordinate_steps()),
-            "ground": ground_table(motion, payload),
-            "scale": motion.scale, "box": list(motion.box),
-            "maps": colour_maps(),
-        }
+        motions = Motions(drawn_bodies(system.basis), found.modal_coordinates, drift_rows(motion))
+        scale = _visible_scale(motions, motion) if scale is None else float(scale)
+        box = motions.box(scale)
+        header |= moving_tables(motions, scale, box, drawn_ground(motion, (box[0], box[1])),
+                                payload)
     return payload.block(header)
+
+
+def moving_tables(
+    motions: Motions, scale: float, box: list[float], ground: DrawnGround | None, payload: Payload
+) -> dict[str, Any]:
+    """What the player needs besides the contact."""
+    return {
+        "bodies": bodies_table(motions, payload),
+        "coordinates": payload.add(motions.coordinates, motions.coordinate_steps()),
+        "ground": None if ground is None else ground_table(ground, payload),
+        "scale": scale, "box": box,
+    }
+
+
+def _visible_scale(motions: Motions, motion: Motion) -> float:
+    """A round factor of at least one that makes the largest motion well visible."""
+    low, high = motion.trajectory.system.ground.height_range if motion.has_ground else (0.0, 0.0)
+    size = max(motions.largest_magnified, 0.5 * (high - low), motion.gap)
+    return max(1.0, round_125(_VISIBLE * motions.bodies.extent / size)) if size > 0.0 else 1.0
 
 
 def study_tables(study: str | None) -> list[dict[str, Any]]:

@@ -11,103 +11,25 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError, choices, nearest, shown
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array, Integers
+from fecontact.fem.faces.frames import frames_of
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.assembly.links import Links, NonlinearSpring, linked
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
+from fecontact.reduction.assembly.point_pairing import PointPairing
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
 
 
 @dataclass(frozen=True, eq=False)
-class PointPairing:
-    """Contact nodes between named points of two bodies, or of a body and the ground.
-
-    Parameters
-    ----------
-    body : str
-        Name of the body.
-    points : str, int, or sequence of them
-        The contact nodes: named points of its basis, or numbers of contact nodes of it.
-    other : str, optional
-        Name of the other body; by default the ground.
-    other_points : str, int, or sequence of them, optional
-        As many points of the other body, the feet.
-    normals : (2,) or (n, 2) numbers
-        Normal out of the other side into ``body``, of any length.
-    gaps : float or (n,) numbers
-        Distance of each point from its foot along the normal, zero or above [m]; the places of the
-        points do not matter.
-    tributary : (n,) numbers, optional
-        Length that each contact node represents [m]; by default equal, with sum one.
-
-    Raises
-    ------
-    InputError
-        For no points, arrays that do not fit them, gaps that are negative, and normals of length
-        zero.
-    """
-
-    body: str
-    points: str | int | Sequence[str | int]
-    other: str | None = None
-    other_points: str | int | Sequence[str | int] = ()
-    normals: ArrayLike = (0.0, 1.0)
-    gaps: ArrayLike = 0.0
-    tributary: ArrayLike | None = None
-
-    @property
-    def passes(self) -> "tuple[PointPairing, ...]":
-        """The pairing itself."""
-        return (self,)
-
-    def __post_init__(self) -> None:
-        require_kind("PointPairing", str, body=self.body)
-        require_kind("PointPairing", (str, type(None)), other=self.other)
-        for name in ("points", "other_points"):
-            given = getattr(self, name)
-            require_kind("PointPairing", (str, int, Sequence), **{name: given})
-            object.__setattr__(self, name, (given,) if isinstance(given, str | int)
-                               else tuple(given))
-        points, feet = tuple(self.points), tuple(self.other_points)  # type: ignore[arg-type]
-        n = len(points)
-        if not n:
-            raise InputError("PointPairing: points is empty; name at least one contact node.")
-        wanted = 0 if self.other is None else n
-        if len(feet) != wanted:
-            raise InputError(f"PointPairing: other_points must be {wanted} points, "
-                             f"{'none on the ground' if self.other is None else 'one a node'}, "
-                             f"not {len(feet)}.")
-        normals = np.broadcast_to(_numbers("normals", self.normals, ((2,), (n, 2))), (n, 2))
-        lengths = np.linalg.norm(normals, axis=1)
-        if not (lengths > 0.0).all():
-            raise InputError("PointPairing: normals must be longer than zero.")
-        gaps = np.broadcast_to(_numbers("gaps", self.gaps, ((), (n,))), (n,))
-        lengths_of_nodes = np.full(n, 1.0 / n) if self.tributary is None else _numbers(
-            "tributary", self.tributary, ((n,),))
-        if (gaps < 0.0).any() or not (lengths_of_nodes > 0.0).all():
-            raise InputError("PointPairing: gaps must be zero or above, tributary above zero.")
-        for name, value in (("normals", normals / lengths[:, None]), ("gaps", gaps),
-                            ("tributary", lengths_of_nodes)):
-            value = np.array(value)
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
-
-
-def _numbers(name: str, given: ArrayLike, shapes: Sequence[tuple[int, ...]]) -> Array:
-    values = as_floats(given, f"PointPairing: {name}")
-    if values.shape not in shapes or not np.isfinite(values).all():
-        raise InputError(f"PointPairing: {name} = {shown(given)} must be finite numbers of shape "
-                         f"{' or '.join(map(str, shapes))}, one a node.")
-    return values
-
-
-@dataclass(frozen=True, eq=False)
 class _Side:
-    """Rows (3 n, m_k) of places of one body over its modes, and (3 n, 2 N_k) over its nodes."""
+    """Rows (3 n, m_k) of places of one body over its modes, and (3 n, 2 N_k) over its nodes.
+
+    Those of solids are (6 n, m_k) and (6 n, 3 N_k).
+    """
 
     body: str
     modal: Array
@@ -130,9 +52,18 @@ class _Contact:
 
     @property
     def frames(self) -> Any:
-        """Sparse (3 n, 3 n): x, y, rotation to tangent, normal, rotation; springs: normal alone."""
+        """Sparse (3 n, 3 n): x, y, rotation to tangent, normal, rotation; springs: normal alone.
+
+        In space (6 n, 6 n), to t, t2, n and rotations about these.
+        """
         import scipy.sparse as sp
 
+        if self.normals.shape[1] == 3:
+            axes = frames_of(self.normals)
+            whole = np.zeros((len(axes), 6, 6))
+            whole[:, :3, :3] = axes * ([[0.0], [0.0], [1.0]] if self.spring else 1.0)
+            whole[:, 3:, 3:] = axes * (0.0 if self.spring else 1.0)
+            return sp.csr_array(sp.block_diag(list(whole), format="csr"))
         x, y = self.normals.T
         zero, one = np.zeros_like(x), np.full_like(x, 0.0 if self.spring else 1.0)
         frames = np.array([[y * one, -x * one, zero], [x, y, zero],
@@ -192,12 +123,14 @@ def assembled_basis(
         contacts.append(_spring_contact(bases, name, spring))
         counts.append(1)
     places = _Places(bases)
+    d = places.dimension
+    each = 3 * (d - 1)
     named = [_named_point(bases, point) for point in ("B", "C")]
     extra = [(name, point) for name, basis in bases.items()
              for point in (*(end for end in ("B", "C") if _has(basis, end)), *basis.extra)]
     further = [_points(bases[name], name, [point]) for name, point in extra]
-    T = [places.modal([(1.0, side)] if side else [], 3) for side in named]
-    nodal = [places.nodal([(1.0, side)] if side else [], 3) for side in named]
+    T = [places.modal([(1.0, side)] if side else [], each) for side in named]
+    nodal = [places.nodal([(1.0, side)] if side else [], each) for side in named]
     for contact in contacts:
         frames = contact.frames
         sides = [(frames, contact.side)]
@@ -205,13 +138,13 @@ def assembled_basis(
             sides.append((-frames, contact.other))
         T.append(places.modal(sides, frames.shape[0]))
         nodal.append(places.nodal(sides, frames.shape[0]))
-    T += [places.modal([(1.0, side)], 3) for side in further]
-    nodal += [places.nodal([(1.0, side)], 3) for side in further]
+    T += [places.modal([(1.0, side)], each) for side in further]
+    nodal += [places.nodal([(1.0, side)], each) for side in further]
     sizes = [len(contact.tributary) for contact in contacts]
     whole = ModalBasis(
         angular_frequencies=np.concatenate([one.angular_frequencies for one in bases.values()]),
         damping=places.blocks([one.damping for one in bases.values()]),
-        T=np.concatenate(T).reshape(-1, 3, places.modes),
+        T=np.concatenate(T).reshape(-1, each, places.modes),
         positions=np.concatenate([
             *(_position(bases, side, point) for side, point in zip(named, ("B", "C"), strict=True)),
             *(contact.places for contact in contacts),
@@ -227,7 +160,7 @@ def assembled_basis(
         boundary_rows=_boundary_rows(bases, places),
         stiffness=places.blocks([one.stiffness_matrix for one in bases.values()]) if any(
             one.stiffness is not None for one in bases.values()) else None,
-        contact_normals=np.concatenate([np.zeros((0, 2)), *(one.normals for one in contacts)]),
+        contact_normals=np.concatenate([np.zeros((0, d)), *(one.normals for one in contacts)]),
         on_ground=np.repeat([contact.other is None and not contact.spring for contact in contacts],
                             sizes).astype(bool),
         parts=places.parts,
@@ -244,6 +177,7 @@ class _Places:
 
     def __init__(self, bases: Mapping[str, ModalBasis]) -> None:
         self.bases = bases
+        self.dimension = next(iter(bases.values())).dimension
         mode = node = 0
         parts = []
         for name, basis in bases.items():
@@ -267,10 +201,10 @@ class _Places:
         return found
 
     def nodal(self, sides: Sequence[tuple[Any, _Side]], rows: int) -> Any:
-        """The same over the nodes, sparse (rows, 2 N)."""
+        """The same over the nodes, sparse (rows, d N)."""
         import scipy.sparse as sp
 
-        found = sp.csr_array((rows, 2 * self.nodes))
+        found = sp.csr_array((rows, self.dimension * self.nodes))
         for factor, side in sides:
             first, count = self._of[side.body].nodes
             if not count:
@@ -278,7 +212,7 @@ class _Places:
             part = sp.coo_array(factor * side.nodal if isinstance(factor, float)
                                 else factor @ side.nodal)
             found = found + sp.csr_array(sp.coo_array(
-                (part.data, (part.row, part.col + 2 * first)), shape=found.shape))
+                (part.data, (part.row, part.col + self.dimension * first)), shape=found.shape))
         return found
 
     def blocks(self, matrices: Sequence[Array]) -> Array:
@@ -297,8 +231,9 @@ class _Places:
                  if (shapes := self.bases[part.name].mode_shapes) is not None]
         if not given:
             return None
-        moved = np.zeros((self.nodes, 2, self.modes))
-        stress = np.zeros((self.nodes, 4, self.modes))
+        d = self.dimension
+        moved = np.zeros((self.nodes, d, self.modes))
+        stress = np.zeros((self.nodes, 4 if d == 2 else 6, self.modes))
         for part, one in given:
             nodes = slice(part.nodes[0], sum(part.nodes))
             moved[nodes, :, self.columns(part.name)] = one.shapes
@@ -307,9 +242,11 @@ class _Places:
         alike = len({array.shape[1] for array in elements}) == 1
         cells = [one.cells for _, one in given]
         if len({array.shape[1] for array in cells}) > 1:
-            # Quadrilaterals beside triangles: both as triangles.
-            cells = [array if array.shape[1] == 3 else
-                     np.concatenate([array[:, [0, 1, 2]], array[:, [0, 2, 3]]]) for array in cells]
+            # Quadrilaterals beside triangles: both as triangles. Likewise hexahedra.
+            cells = [_simplices(array, d) for array in cells]
+        outlines = [one.outline for _, one in given]
+        if len({array.shape[1] for array in outlines}) > 1:
+            outlines = [_simplices(array, 2) for array in outlines]
         first = [part.nodes[0] for part, _ in given]
 
         def together(arrays: Sequence[Any]) -> Any:
@@ -318,9 +255,18 @@ class _Places:
 
         return ModeShapes(
             nodes=np.concatenate([one.nodes for _, one in given]), cells=together(cells),
-            outline=together([one.outline for _, one in given]), shapes=moved, stress=stress,
+            outline=together(outlines), shapes=moved, stress=stress,
             restriction=sp.csr_array(sp.vstack(list(restriction))),
             elements=together(elements) if alike else None)
+
+
+def _simplices(cells: Integers, dimension: int) -> Integers:
+    """Triangles or tetrahedra in the place of quadrilaterals or hexahedra."""
+    if cells.shape[1] == dimension + 1:
+        return cells
+    parts = ((0, 1, 2), (0, 2, 3)) if dimension == 2 else (
+        (0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
+    return np.concatenate([cells[:, list(part)] for part in parts])
 
 
 def _contact(bases: Mapping[str, ModalBasis], pairing: Pairing | PointPairing) -> _Contact:
@@ -338,7 +284,13 @@ def _contact(bases: Mapping[str, ModalBasis], pairing: Pairing | PointPairing) -
         places = pairing.places
         side = _faces(bases[body], body, pairing.nodes)
         feet = None if other is None else _faces(bases[other], other, pairing.feet)
-    return _Contact(places, np.asarray(pairing.normals), np.asarray(pairing.tributary), side, feet)
+    d = bases[body].dimension
+    normals = np.eye(d)[[-1] * len(places)] if pairing.normals is None else np.asarray(
+        pairing.normals)
+    if normals.shape[1] != d:
+        raise InputError(f"normals must have {d} components, as body '{body}' is "
+                         f"{'one of the plane' if d == 2 else 'a solid'}, not {normals.shape[1]}.")
+    return _Contact(places, normals, np.asarray(pairing.tributary), side, feet)
 
 
 def _spring_contact(
@@ -352,7 +304,8 @@ def _spring_contact(
 
 def _points(basis: ModalBasis, name: str, points: Any) -> _Side:
     index = np.array([basis.point_index(point) for point in points])
-    rows = (3 * index[:, None] + np.arange(3)).ravel()
+    each = basis.T.shape[1]
+    rows = (each * index[:, None] + np.arange(each)).ravel()
     shapes = basis.mode_shapes
     return _Side(name, basis.T[index].reshape(-1, basis.modes),
                  None if shapes is None else shapes.restriction.tocsr()[rows])
@@ -363,10 +316,10 @@ def _faces(basis: ModalBasis, name: str, rows: Any) -> _Side:
     if shapes is None:
         raise InputError(f"the basis of body '{name}' holds no shapes over the body, which a "
                          f"pairing of faces needs; give a PointPairing between named points.")
-    if rows.shape[1] != 2 * len(shapes.nodes):
+    if rows.shape[1] != shapes.nodes.size:
         raise InputError(f"the pairing was made for another mesh of body '{name}', of "
-                         f"{rows.shape[1] // 2} nodes, not {len(shapes.nodes)}; pair the faces of "
-                         f"the same bodies.")
+                         f"{rows.shape[1] // basis.dimension} nodes, not "
+                         f"{len(shapes.nodes)}; pair the faces of the same bodies.")
     return _Side(name, np.asarray(rows @ shapes.shapes.reshape(rows.shape[1], -1)), rows)
 
 
@@ -389,6 +342,11 @@ def _check_bodies(bases: Mapping[str, ModalBasis]) -> None:
         if basis.parts:
             raise InputError(f"Body '{name}' consists of several bodies itself; give these one by "
                              f"one.")
+    kinds = {name: basis.dimension for name, basis in bases.items()}
+    if len(set(kinds.values())) > 1:
+        plane, solid = (choices([name for name, d in kinds.items() if d == one]) for one in (2, 3))
+        raise InputError(f"Several bodies must be all in the plane or all in space, but {plane} "
+                         f"and {solid} are mixed; model them alike.")
 
 
 def _has(basis: ModalBasis, point: str) -> bool:
@@ -407,7 +365,7 @@ def _named_point(bases: Mapping[str, ModalBasis], point: str) -> _Side | None:
 
 def _position(bases: Mapping[str, ModalBasis], side: _Side | None, point: str) -> Array:
     if side is None:
-        return np.zeros((1, 2))
+        return np.zeros((1, next(iter(bases.values())).dimension))
     return bases[side.body].positions[[bases[side.body].point_index(point)]]
 
 
@@ -421,9 +379,10 @@ def _beside(rows: Sequence[Array | None]) -> Array | None:
 
 
 def _boundary_rows(bases: Mapping[str, ModalBasis], places: _Places) -> Array:
-    found = [np.zeros((0, 2, places.modes))]
+    d = places.dimension
+    found = [np.zeros((0, d, places.modes))]
     for name, basis in bases.items():
-        rows = np.zeros((len(basis.boundaries), 2, places.modes))
+        rows = np.zeros((len(basis.boundaries), d, places.modes))
         rows[:, :, places.columns(name)] = basis.boundary_rows
         found.append(rows)
     return np.concatenate(found)

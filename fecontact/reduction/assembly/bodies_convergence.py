@@ -33,12 +33,12 @@ class BodiesConvergence:
         The lowest elastic frequencies of the bodies together on each mesh [Hz].
     joined : str
         What joins them.
-    compliance : mapping of interface to (L, 2) array
+    compliance : mapping of interface to (L, 2) array, in space (L, 3)
         Mean relative displacement under uniform traction and pressure of 1 N in all, of the
         finite-element bodies on each mesh [m/N].
     modes : mapping of body to (K,) array
         Numbers of modes on the first mesh, those of residual vectors included.
-    missing : mapping of interface to (K, 2) array
+    missing : mapping of interface to (K, 2) array, in space (K, 3)
         Largest fraction of the tangential and normal compliance that is missing with them, for
         uniform loads and forces at single nodes.
     """
@@ -67,12 +67,18 @@ class BodiesConvergence:
             lines.append("")
         for name, compliance in self.compliance.items():
             lines += [f"interface '{name}', displacement under uniform loads:", *_rows(
-                "unknowns", sizes, ["t [m/N]", "n [m/N]"], compliance, "11.5g"), ""]
+                "unknowns", sizes, [f"{way} [m/N]" for way in _ways(compliance)], compliance,
+                "11.5g"), ""]
         counts = np.sum(list(self.modes.values()), axis=0)
         for name, missing in self.missing.items():
             lines += [f"interface '{name}', missing compliance, most of all loads:", *_rows(
-                "modes", counts, ["tangential", "normal"], missing, "11.2%"), ""]
+                "modes", counts, ["tangential", "normal"] if missing.shape[1] == 2
+                else _ways(missing), missing, "11.2%"), ""]
         return "\n".join(lines[:-1])
+
+
+def _ways(columns: Array) -> list[str]:
+    return ["t", "n"] if columns.shape[1] == 2 else ["t", "t2", "n"]
 
 
 def bodies_convergence(

@@ -5,6 +5,7 @@ direction, whose rows in ``T`` are those of the motion relative to the other sid
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -23,18 +24,18 @@ class ContactFace:
     Attributes
     ----------
     name : str
-        Name of the interface; empty for all nodes of a single body.
+        Name of the interface, or of a contact group of a single body; empty for all its nodes.
     bodies : tuple of str
         Names of the bodies that meet there, and 'ground'; empty for a single body.
     nodes : slice
         Its nodes among those of the basis.
     abscissa : (k,) array
         Places of the nodes [m]: x on the ground and on faces along x, else the arc length from the
-        beginning of the face, which increases along the tangents.
+        beginning of the face, which increases along the tangents; x in space.
     axis : 'x' or 's'
         Which of them.
     tributary : (k,) array
-        Lengths of the face that the nodes represent [m].
+        Lengths of the face that the nodes represent [m], in space areas [m^2].
     spring : bool
         Whether it is no face, but a nonlinear spring between two points.
     nodes_on : str
@@ -72,9 +73,12 @@ def several_bodies(basis: ModalBasis) -> bool:
 def contact_directions(basis: ModalBasis) -> tuple[Array, Array]:
     """Tangents (n, 2) and normals (n, 2) of the contact nodes in global axes.
 
-    Normals point out of the other side; a tangent is its normal turned clockwise by 90 degrees.
+    Normals point out of the other side; a tangent is its normal turned clockwise by 90 degrees. In
+    space tangents (n, 2, 3), t and t2, and normals (n, 3).
     """
     normals = basis.normals
+    if basis.dimension == 3:
+        return basis.tangents, normals
     return np.column_stack([normals[:, 1], -normals[:, 0]]), normals
 
 
@@ -106,7 +110,8 @@ def _passes(basis: ModalBasis) -> tuple[ContactFace, ...]:
         nodes = slice(first, first + size)
         first += size
         length[nodes] *= 2.0 if name in halves else 1.0
-        flat = bool(ground[nodes].all() or np.abs(normals[nodes, 0]).max(initial=0.0) < _FLAT)
+        flat = basis.dimension == 3 or bool(
+            ground[nodes].all() or np.abs(normals[nodes, 0]).max(initial=0.0) < _FLAT)
         abscissa = x[nodes] if flat else _arc_length(places[nodes], normals[nodes],
                                                      tangents[nodes], length[nodes])
         bodies = _bodies_at(basis, nodes) + ["ground"] * bool(ground[nodes].any())
@@ -133,6 +138,17 @@ def touching_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
     return found
 
 
+def shown_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
+    """As :func:`touching_faces`, of a single body one for each of several contact groups."""
+    found = touching_faces(basis, what)
+    if several_bodies(basis) or len(basis.groups) < 2:
+        return found
+    ends = np.cumsum([0, *(count for _, count in basis.groups)])
+    parts = [slice(int(first), int(end)) for first, end in pairwise(ends)]
+    return tuple(ContactFace(name, (), nodes, basis.contact_x[nodes], "x", basis.tributary[nodes])
+                 for (name, _), nodes in zip(basis.groups, parts, strict=True))
+
+
 def node_name(basis: ModalBasis, node: int) -> str:
     """``contact node 3``, or ``shoe: node 3`` with its interface; numbers as in the basis."""
     if not several_bodies(basis):
@@ -156,8 +172,8 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
 
     Returns
     -------
-    (sparse (2 n, 2 N), sparse (2 n, 2 N))
-        Along x and y, node by node. What lies on the other side enters the relative rows with
+    (sparse (d n, d N), sparse (d n, d N))
+        Along the axes, node by node. What lies on the other side enters the relative rows with
         weights below zero; rows of feet on the ground are zero.
     """
     import scipy.sparse as sp
@@ -165,19 +181,23 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
 
     field, n = basis.mode_shapes, basis.contact_nodes
     assert field is not None
-    rows = field.restriction.tocsr()[6 : 6 + 3 * n]
-    local = rows[np.flatnonzero(np.arange(3 * n) % 3 < 2)]
+    d, each = basis.dimension, basis.T.shape[1]
+    rows = field.restriction.tocsr()[2 * each : (2 + n) * each]
+    local = rows[np.flatnonzero(np.arange(each * n) % each < d)]
     tangents, normals = contact_directions(basis)
-    turned = sp.bsr_array((np.stack([tangents, normals], axis=2), np.arange(n), np.arange(n + 1)),
-                          shape=(2 * n, 2 * n))
+    axes = (np.stack([tangents, normals], axis=2) if d == 2 else
+            np.swapaxes(np.concatenate([tangents, normals[:, None]], axis=1), 1, 2))
+    turned = sp.bsr_array((axes, np.arange(n), np.arange(n + 1)), shape=(d * n, d * n))
     both = sp.csr_array(turned @ local)
     # Of nonlinear springs only the parts along their direction.
-    weights = sp.coo_array(both[::2][:, ::2] + both[1::2][:, 1::2])
+    weights = sp.coo_array(sum(both[axis::d][:, axis::d] for axis in range(d)))
     weights.sum_duplicates()
     row, node = weights.coords
     # Mesh nodes of one side hang together along the outline, also where a body touches itself.
     entry = sp.csr_array((np.arange(1, len(row) + 1), (row, node)), shape=weights.shape)
-    start, end = field.outline.T
+    sides = field.outline
+    start, end = sides.T if d == 2 else np.stack(
+        [sides, np.roll(sides, -1, axis=1)], axis=2).reshape(-1, 2).T
     used = sp.csr_array((np.ones(len(row)), (row, node)), shape=weights.shape)
     at, edge = (used[:, start] * used[:, end]).nonzero()
     links = sp.coo_array((np.ones(len(at)), (np.asarray(entry[at, start[edge]]).ravel() - 1,
@@ -186,7 +206,7 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
     _, side = connected_components(links, directed=False)
     own = np.bincount(side, weights.data)[side] > 0.0
     masks = [sp.kron(sp.coo_array((chosen.astype(float), (row, node)), shape=weights.shape),
-                     np.ones((2, 2))) for chosen in (own, ~own)]
+                     np.ones((d, d))) for chosen in (own, ~own)]
     return sp.csr_array(both * masks[0]), sp.csr_array(-(both * masks[1]))
 
 
@@ -194,8 +214,10 @@ def _bodies_at(basis: ModalBasis, nodes: slice) -> list[str]:
     """Names of the bodies with a part in the motion of some contact nodes."""
     moving: Any = ()
     if basis.mode_shapes is not None:
-        rows = basis.mode_shapes.restriction.tocsr()[6 + 3 * nodes.start : 6 + 3 * nodes.stop]
-        moving = np.unique(rows.indices[rows.data != 0.0] // 2)
+        each = basis.T.shape[1]
+        rows = basis.mode_shapes.restriction.tocsr()[
+            each * (2 + nodes.start) : each * (2 + nodes.stop)]
+        moving = np.unique(rows.indices[rows.data != 0.0] // basis.dimension)
     found = []
     for part in basis.parts:
         if part.nodes[1]:
@@ -211,8 +233,9 @@ def _bodies_at(basis: ModalBasis, nodes: slice) -> list[str]:
 def _owner(basis: ModalBasis, nodes: slice) -> str:
     """The body that contact nodes lie on: its part of their motion has weights of sum one."""
     assert basis.mode_shapes is not None, "faces with two passes have meshes"
-    row = basis.mode_shapes.restriction.tocsr()[[6 + 3 * nodes.start + 1]].toarray()[0]
-    along = row.reshape(-1, 2) @ basis.normals[nodes.start]
+    d, each = basis.dimension, basis.T.shape[1]
+    row = basis.mode_shapes.restriction.tocsr()[[each * (2 + nodes.start) + d - 1]].toarray()[0]
+    along = row.reshape(-1, d) @ basis.normals[nodes.start]
     return max(basis.parts, key=lambda part: along[part.nodes[0] : sum(part.nodes)].sum()).name
 
 

@@ -51,9 +51,9 @@ class FaceWeld:
                              f"boundary of its body, fixed={{...: 'xy'}}.")
         worst = int(np.argmax(self.pairing.gaps / self.pairing.tributary))
         if self.pairing.gaps[worst] > _APART * self.pairing.tributary[worst]:
-            x, y = self.pairing.places[worst]
+            where = ", ".join(f"{x:.4g}" for x in self.pairing.places[worst])
             raise InputError(f"FaceWeld: '{self.first}' is {self.pairing.gaps[worst]:.4g} m apart "
-                             f"from '{self.second}' at ({x:.4g}, {y:.4g}) m; put the bodies where "
+                             f"from '{self.second}' at ({where}) m; put the bodies where "
                              f"they touch, or make the pairing's reach smaller.")
 
     @property
@@ -67,13 +67,13 @@ class FaceWeld:
         return self.pairing.report.other
 
     def rows(self, body: str) -> list[Any]:
-        """Rows over the nodes of a body (2 n, 2 N), sparse, on which the weld's forces act."""
+        """Rows over the nodes of a body (d n, d N), sparse, on which the weld's forces act."""
         found = [(self.pairing.body, self.pairing.nodes), (self.pairing.other, self.pairing.feet)]
-        return [_along(rows, (0, 1)) for name, rows in found if name == body]
+        return [_displacements(rows, self.pairing) for name, rows in found if name == body]
 
 
 def welded_rows(basis: ModalBasis, weld: FaceWeld) -> Array:
-    """Displacements (2 n, m) of the nodes of a welded face relative to the other one.
+    """Displacements (d n, m) of the nodes of a welded face relative to the other one.
 
     Raises
     ------
@@ -84,27 +84,38 @@ def welded_rows(basis: ModalBasis, weld: FaceWeld) -> Array:
     assert pairing.other is not None, "checked by the weld"
     first, here = _part(basis, pairing.body, pairing.nodes)
     second, there = _part(basis, pairing.other, pairing.feet)
-    arms = (_along(pairing.nodes, (0, 1)) @ here - _along(pairing.feet, (0, 1)) @ there).reshape(
-        -1, 2)
-    own = np.asarray(_along(pairing.nodes, (0, 1)) @ first)
-    other = np.asarray(_along(pairing.feet, (0, 1)) @ second)
-    turns = np.asarray(_along(pairing.feet, (2,)) @ second)
-    other += (np.stack([-arms[:, 1], arms[:, 0]], axis=1)[:, :, None] * turns[:, None, :]).reshape(
-        other.shape)
+    d = pairing.places.shape[1]
+    nodes, feet = (_displacements(rows, pairing) for rows in (pairing.nodes, pairing.feet))
+    arms = (nodes @ here - feet @ there).reshape(-1, d)
+    own, other = np.asarray(nodes @ first), np.asarray(feet @ second)
+    turns = np.asarray(_rotations(pairing.feet, pairing) @ second)
+    if d == 2:
+        swept = np.stack([-arms[:, 1], arms[:, 0]], axis=1)[:, :, None] * turns[:, None, :]
+    else:
+        swept = np.cross(turns.reshape(len(arms), 3, -1), arms[:, :, None], axis=1)
+    other += swept.reshape(other.shape)
     for name, rows in ((pairing.body, own), (pairing.other, other)):
         _require_modes(basis, name, rows)
     return own - other
 
 
-def _along(rows: Any, which: tuple[int, ...]) -> Any:
-    """Those of the rows x, y, rotation of each node."""
-    return rows[np.flatnonzero(np.isin(np.arange(rows.shape[0]) % 3, which))]
+def _displacements(rows: Any, pairing: Pairing) -> Any:
+    """Of the rows of each node those of displacements."""
+    d = pairing.places.shape[1]
+    return rows[np.flatnonzero(np.arange(rows.shape[0]) % (3 * (d - 1)) < d)]
+
+
+def _rotations(rows: Any, pairing: Pairing) -> Any:
+    """Of the rows of each node those of rotations."""
+    d = pairing.places.shape[1]
+    return rows[np.flatnonzero(np.arange(rows.shape[0]) % (3 * (d - 1)) >= d)]
 
 
 def _part(basis: ModalBasis, name: str, rows: Any) -> tuple[Array, Array]:
     """Shapes (2 N, m) and coordinates (2 N,) of the nodes of one body."""
     part = {one.name: one for one in basis.parts}.get(name)
-    if part is None or basis.mode_shapes is None or 2 * part.nodes[1] != rows.shape[1]:
+    if part is None or basis.mode_shapes is None or (
+            basis.dimension * part.nodes[1] != rows.shape[1]):
         raise InputError(f"FaceWeld: the pairing was made for a mesh of body '{name}' that is none "
                          f"of the assembled bodies; pair the faces of the same bodies.")
     nodes = slice(part.nodes[0], sum(part.nodes))

@@ -24,7 +24,7 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.assembly.contact_faces import contact_faces
 from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.static_modes.residual_vectors import Flexibility
+from fecontact.reduction.static_modes.residual_vectors import flexibility_of
 
 # Part of the compliance that should be resolved; laws of contact are not known better.
 _ENOUGH = 0.9
@@ -41,8 +41,8 @@ class InterfaceCompliance(Summarised):
 
     .. math:: \frac{p^T C\, p}{p^T C_\mathrm{FE}\, p} \le 1
 
-    Columns are those of tangential and of normal forces. What the supports do not hold is balanced
-    by inertia.
+    Columns are those of tangential and of normal forces: c = 2, in space 3, both tangents first.
+    What the supports do not hold is balanced by inertia.
 
     Attributes
     ----------
@@ -50,13 +50,13 @@ class InterfaceCompliance(Summarised):
         The interface.
     bodies : tuple of str
         The bodies that meet there, and 'ground'; empty for a single body.
-    uniform : (2,) array
+    uniform : (c,) array
         Resolved part for uniform traction and for uniform pressure.
-    nodes : (n, 2) array
+    nodes : (n, c) array
         Resolved part for a force at each single node.
-    uniform_compliance : (2,) array
+    uniform_compliance : (c,) array
         Mean displacement under a uniform load of 1 N in all, of the finite-element bodies [m/N].
-    node_compliance : (n, 2) array
+    node_compliance : (n, c) array
         Displacement of each node per unit force there, of the finite-element bodies [m/N].
     stiffest : str
         The body that lacks most where the resolved part is least; empty for a single body, and
@@ -87,9 +87,10 @@ class InterfaceCompliance(Summarised):
         if self.enough:
             return ""
         axis = int(np.argmin(np.minimum(self.uniform, self.nodes.min(axis=0))))
-        way = ("tangential", "normal")[axis]
+        last = len(self.uniform) - 1
+        way = "normal" if axis == last else "tangential"
         if self.uniform[axis] <= self.nodes[:, axis].min():
-            load = ("uniform traction", "uniform pressure")[axis]
+            load = "uniform pressure" if axis == last else "uniform traction"
         else:
             load = f"a {way} force at node {int(np.argmin(self.nodes[:, axis]))}"
         of = f" of body '{self.stiffest}'" if self.stiffest else ""
@@ -102,7 +103,13 @@ class InterfaceCompliance(Summarised):
         """Resolved parts, mean and worst over the nodes."""
         rows = [] if not self.bodies else [("bodies", " and ".join(self.bodies))]
         rows.append(("nodes", f"{len(self.nodes)}"))
-        for axis, load, way in ((1, "pressure", "normal"), (0, "traction", "tangential")):
+        ways = [(len(self.uniform) - 1, "pressure", "normal")]
+        if len(self.uniform) == 2:
+            ways.append((0, "traction", "tangential"))
+        else:
+            ways += [(axis, f"traction along {name}", f"tangential ({name})")
+                     for axis, name in enumerate(("t", "t2"))]
+        for axis, load, way in ways:
             nodes = self.nodes[:, axis]
             rows += [(f"uniform {load}", f"{percent(self.uniform[axis])} of "
                                          f"{self.uniform_compliance[axis]:.4g} m/N resolved"),
@@ -142,17 +149,17 @@ def interface_compliance(
     require_kind("interface_compliance", ModalBasis, basis=basis)
     require_kind("interface_compliance", (ElasticBody, Mapping), bodies=bodies)
     rows = _elastic_rows(basis, bodies)
-    n, w = basis.contact_nodes, basis.angular_frequencies
-    T = basis.contact_T[:, :2].reshape(2 * n, -1)
+    n, d, w = basis.contact_nodes, basis.dimension, basis.angular_frequencies
+    T = basis.contact_T[:, :d].reshape(d * n, -1)
     elastic = np.where(w > 0.0, 1.0, 0.0) / np.where(w > 0.0, w, 1.0)
-    whole, missing = np.zeros((2 * n, 2 * n)), {}
+    whole, missing = np.zeros((d * n, d * n)), {}
     for name, (body, nodal, modes) in rows.items():
         used = np.flatnonzero(np.diff(nodal.indptr))
         own = T[:, modes] * elastic[modes]
         kept = full = own @ own.T
         if body is not None and len(used):
             full = np.zeros_like(kept)
-            full[np.ix_(used, used)] = Flexibility(
+            full[np.ix_(used, used)] = flexibility_of(
                 FreeSystem.of(body), nodal[used] @ body.expansion).compliance
         whole += full
         missing[name] = full - kept
@@ -173,14 +180,15 @@ def _compared(
     name: str, bodies: tuple[str, ...], whole: Array, missing: Mapping[str, Array],
     tributary: Array, nodes: slice,
 ) -> InterfaceCompliance:
-    """Uniform loads and single nodes of one interface; compliances of all rows (2 n, 2 n)."""
+    """Uniform loads and single nodes of one interface; compliances of all rows (c n, c n)."""
     n = len(tributary)
+    c = len(whole) // n
     share = np.zeros(n)
     share[nodes] = tributary[nodes] / tributary[nodes].sum()
 
     def works(compliance: Array) -> Array:
-        """``p^T C p`` (1 + k, 2) of uniform loads, then of each node."""
-        blocks = compliance.reshape(n, 2, n, 2)
+        """``p^T C p`` (1 + k, c) of uniform loads, then of each node."""
+        blocks = compliance.reshape(n, c, n, c)
         uniform = np.einsum("i,iaja,j->a", share, blocks, share)
         return np.vstack([uniform, np.einsum("iaia->ia", blocks)[nodes]])
 
@@ -199,7 +207,7 @@ def _compared(
 def _elastic_rows(
     basis: ModalBasis, bodies: ElasticBody | Mapping[str, ElasticBody]
 ) -> dict[str, tuple[ElasticBody | None, Any, slice]]:
-    """Of each body the finite-element model, rows (2 n, 2 N_k) of the contact, and modes."""
+    """Of each body the finite-element model, rows (d n, d N_k) of the contact, and modes."""
     import scipy.sparse as sp
 
     field, n = basis.mode_shapes, basis.contact_nodes
@@ -218,8 +226,9 @@ def _elastic_rows(
     if field is None:
         raise InputError("interface_compliance: the basis holds no shapes over the body, which "
                          "alone can be compared with its mesh; make it with modal_basis.")
-    local = np.flatnonzero(np.arange(3 * n) % 3 < 2)
-    rows = sp.csr_array(field.restriction)[6 : 6 + 3 * n][local]
+    d, each = basis.dimension, basis.T.shape[1]
+    local = np.flatnonzero(np.arange(each * n) % each < d)
+    rows = sp.csr_array(field.restriction)[2 * each : (2 + n) * each][local]
     if isinstance(bodies, ElasticBody):
         _require_mesh(bodies, len(field.nodes), "the body")
         return {"": (bodies, rows, slice(0, basis.modes))}
@@ -234,7 +243,7 @@ def _elastic_rows(
             require_kind("interface_compliance", ElasticBody, **{f"bodies['{part.name}']": body})
             _require_mesh(body, part.nodes[1], f"body '{part.name}'")
         found[part.name] = (
-            body, sp.csr_array(rows[:, 2 * part.nodes[0] : 2 * sum(part.nodes)]),
+            body, sp.csr_array(rows[:, d * part.nodes[0] : d * sum(part.nodes)]),
             slice(part.modes[0], sum(part.modes)))
     return found
 

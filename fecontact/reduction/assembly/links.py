@@ -19,7 +19,7 @@ from fecontact.core.errors import (
     require_not_negative,
     shown,
 )
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw
 from fecontact.reduction.assembly.face_weld import FaceWeld, welded_rows
@@ -50,7 +50,7 @@ class Spring:
         c, zero or above [N/m].
     damping : float
         b, zero or above [N s/m].
-    direction : (x, y), optional
+    direction : (x, y) or (x, y, z), optional
         d, of any length; by default along the line between the points.
     preload : float
         N_0 [N].
@@ -67,7 +67,7 @@ class Spring:
     second: str | None = None
     stiffness: Annotated[float, Unit("N/m")] = 0.0
     damping: Annotated[float, Unit("N s/m")] = 0.0
-    direction: tuple[float, float] | None = None
+    direction: Coordinates | None = None
     preload: Annotated[float, Unit("N")] = 0.0
     shortening: Annotated[float, Unit("m")] = 0.0
 
@@ -85,7 +85,7 @@ class NonlinearSpring:
 
     first: str
     second: str | None
-    direction: tuple[float, float] | None
+    direction: Coordinates | None
 
     @property
     def law(self) -> NormalLaw:
@@ -95,7 +95,7 @@ class NonlinearSpring:
 
 @dataclass(frozen=True)
 class Bushing:
-    """Stiffness and damping of the relative motion of two points in x, y and rotation.
+    """Stiffness and damping of the relative motion of two points along axes and in rotation.
 
     Parameters
     ----------
@@ -103,10 +103,10 @@ class Bushing:
         ``body.point``.
     second : str, optional
         Another point; by default the base, which does not move.
-    stiffness : (c_x, c_y, c_phi)
-        Zero or above [N/m, N/m, N m].
-    damping : (b_x, b_y, b_phi)
-        Zero or above [N s/m, N s/m, N m s].
+    stiffness : (c_x, c_y, c_phi), in space six numbers, for x, y, z and rotations about these
+        Zero or above [N/m, N m].
+    damping : (b_x, b_y, b_phi), in space six numbers
+        Zero or above [N s/m, N m s].
 
     Raises
     ------
@@ -116,23 +116,32 @@ class Bushing:
 
     first: str
     second: str | None = None
-    stiffness: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stiffness: tuple[float, ...] = ()
+    damping: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         _check_points(self)
         for name in ("stiffness", "damping"):
             given = getattr(self, name)
             values = as_floats(given, f"Bushing: {name}")
-            if values.shape != (3,) or not np.isfinite(values).all() or (values < 0.0).any():
+            if values.shape not in ((0,), (3,), (6,)) or not np.isfinite(values).all() or (
+                    values < 0.0).any():
                 raise InputError(f"Bushing: {name} = {shown(given)} must be three numbers, for x, "
-                                 f"y and rotation, zero or above.")
+                                 f"y and rotation (of solids six), zero or above.")
             object.__setattr__(self, name, tuple(values.tolist()))
+        for name, other in (("stiffness", self.damping), ("damping", self.stiffness)):
+            if not getattr(self, name):
+                object.__setattr__(self, name, (0.0,) * (len(other) or 3))
+        if len(self.stiffness) != len(self.damping):
+            raise InputError(f"Bushing: stiffness and damping must have as many numbers as each "
+                             f"other, not {len(self.stiffness)} and {len(self.damping)}.")
 
 
 @dataclass(frozen=True)
 class Hinge:
     """Two points at one place have the same displacement; or one is held by the base.
+
+    Between solids it turns about all axes, as a ball joint does.
 
     Parameters
     ----------
@@ -145,7 +154,7 @@ class Hinge:
     first: str
     second: str | None = None
 
-    held: ClassVar[tuple[int, ...]] = (0, 1)
+    turning: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         _check_points(self)
@@ -166,7 +175,7 @@ class Weld(Hinge):
         Another point; by default the base, which does not move.
     """
 
-    held: ClassVar[tuple[int, ...]] = (0, 1, 2)
+    turning: ClassVar[bool] = False
 
 
 Link = Spring | Bushing | Hinge | FaceWeld | NonlinearSpring
@@ -221,7 +230,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
         feels, and links that leave no motion at all.
     """
     require_kind("Links", Sequence, links=links)
-    m = basis.modes
+    m, d = basis.modes, basis.dimension
     held, springs, stiffness = [np.zeros((0, m))], [np.zeros((0, m))], [np.zeros(0)]
     damping = np.array(basis.damping)
     load = np.zeros(m) if basis.link_load is None else np.array(basis.link_load)
@@ -236,16 +245,19 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
         relative = _relative_rows(basis, link)
         if isinstance(link, Hinge):
             _require_one_place(basis, link)
-            held.append(_felt(link, relative[list(link.held)]))
+            held.append(_felt(link, relative[: d if link.turning else None]))
             continue
         if isinstance(link, Spring):
             ends = [end for end in (link.first, link.second) if end is not None]
             rows = spring_direction(link, *(basis.positions[basis.point_index(end)]
-                                            for end in ends))[None] @ relative[:2]
+                                            for end in ends))[None] @ relative[:d]
             c, b = np.array([link.stiffness]), np.array([link.damping])
             load -= (link.preload + link.stiffness * link.shortening) * rows[0]
         else:
             rows, c, b = relative, np.array(link.stiffness), np.array(link.damping)
+            if len(c) != len(rows):
+                raise InputError(f"{_described(link)} has {len(c)} stiffnesses, but its points "
+                                 f"have {len(rows)} motions; give as many.")
         _felt(link, rows)
         springs.append(rows)
         stiffness.append(c)
@@ -316,7 +328,7 @@ def _units(rows: Array) -> Array:
 
 
 def _relative_rows(basis: ModalBasis, link: Link) -> Array:
-    """Displacement x, y and rotation (3, m) of the first point relative to the second."""
+    """Displacements and rotations (3, m) or (6, m) of the first point relative to the second."""
     rows = basis.T[basis.point_index(link.first)]
     return rows if link.second is None else rows - basis.T[basis.point_index(link.second)]
 
@@ -329,7 +341,7 @@ def _felt(link: Link, rows: Array) -> Array:
 
 
 def spring_direction(link: Spring | NonlinearSpring, first: Array, *second: Array) -> Array:
-    """Unit vector (2,) of a spring between two places (2,), or from one to the base.
+    """Unit vector (d,) of a spring between two places (d,), or from one to the base.
 
     Raises
     ------
@@ -337,6 +349,9 @@ def spring_direction(link: Spring | NonlinearSpring, first: Array, *second: Arra
         If it has neither a direction nor a length.
     """
     if link.direction is not None:
+        if len(link.direction) != len(first):
+            raise InputError(f"{_described(link)} has direction = {link.direction!r}; it must have "
+                             f"{len(first)} components, as the places of its points.")
         return np.array(link.direction)
     length = float(np.linalg.norm(first - second[0]))
     if not length > 0.0:

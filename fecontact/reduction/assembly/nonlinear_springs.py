@@ -12,7 +12,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.tables import located
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.laws.normal.bilateral import (
     BilateralCubic,
@@ -66,7 +66,7 @@ class CubicSpring(_LawSpring):
         c_3 [N/m^3]; above zero for a spring that hardens, below for one that softens.
     damping : float
         b, zero or above [N s/m].
-    direction : (x, y), optional
+    direction : (x, y) or (x, y, z), optional
         d, of any length; by default along the line between the points.
     preload : float
         N_0 [N].
@@ -85,7 +85,7 @@ class CubicSpring(_LawSpring):
     stiffness: Annotated[float, Unit("N/m")] = 0.0
     cubic_stiffness: Annotated[float, Unit("N/m^3")] = 0.0
     damping: Annotated[float, Unit("N s/m")] = 0.0
-    direction: tuple[float, float] | None = None
+    direction: Coordinates | None = None
     preload: Annotated[float, Unit("N")] = 0.0
     shortening: Annotated[float, Unit("m")] = 0.0
 
@@ -123,7 +123,7 @@ class PlaySpring(_LawSpring):
         h: play to either side, zero or above [m].
     damping : float
         b beyond the clearance, zero or above [N s/m].
-    direction : (x, y), optional
+    direction : (x, y) or (x, y, z), optional
         d, of any length; by default along the line between the points.
     preload : float
         N_0, a constant tension [N].
@@ -141,7 +141,7 @@ class PlaySpring(_LawSpring):
     stiffness: Annotated[float, Unit("N/m")] = 0.0
     clearance: Annotated[float, Unit("m")] = 0.0
     damping: Annotated[float, Unit("N s/m")] = 0.0
-    direction: tuple[float, float] | None = None
+    direction: Coordinates | None = None
     preload: Annotated[float, Unit("N")] = 0.0
     shortening: Annotated[float, Unit("m")] = 0.0
 
@@ -169,7 +169,7 @@ class PiecewiseSpring(_LawSpring):
         Tension at each of them [N].
     damping : float
         b, zero or above [N s/m].
-    direction : (x, y), optional
+    direction : (x, y) or (x, y, z), optional
         d, of any length; by default along the line between the points.
     preload : float
         N_0 [N].
@@ -188,7 +188,7 @@ class PiecewiseSpring(_LawSpring):
     elongations: Annotated[tuple[float, ...], Unit("m")] = ()
     forces: Annotated[tuple[float, ...], Unit("N")] = ()
     damping: Annotated[float, Unit("N s/m")] = 0.0
-    direction: tuple[float, float] | None = None
+    direction: Coordinates | None = None
     preload: Annotated[float, Unit("N")] = 0.0
     shortening: Annotated[float, Unit("m")] = 0.0
 
@@ -239,7 +239,7 @@ def spring_row(bases: Mapping[str, ModalBasis], name: str, spring: NonlinearSpri
             index = bases[body].point_index(point)
             ends.append((body, point))
             places.append(bases[body].positions[index])
-            felt.append(bases[body].T[index, :2])
+            felt.append(bases[body].T[index, : bases[body].dimension])
         direction = spring_direction(spring, *places)
         if not any((direction @ rows).any() for rows in felt):
             raise InputError("the spring has no effect, as its points move in no mode of the "

@@ -14,7 +14,11 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem
-from fecontact.reduction.static_modes.residual_vectors import Flexibility, diagonalised
+from fecontact.reduction.static_modes.residual_vectors import (
+    Flexibility,
+    diagonalised,
+    flexibility_of,
+)
 
 
 def craig_bampton(
@@ -39,7 +43,7 @@ def craig_bampton(
         First the rigid modes, with frequency exactly zero, then the modes of the reduced body;
         m is at most ``count`` plus the numbers of independent rows, of loads and of rigid modes.
     """
-    flexibility = Flexibility(system, rows)
+    flexibility = flexibility_of(system, rows)
     patterns = _independent(flexibility)
     motion = patterns.T @ (flexibility.rows @ system.rigid)
     deflections = flexibility.deflections(patterns)

@@ -70,12 +70,11 @@ class Diagram extends Chart {
   }
 }
 
-async function build(host) {
-  const data = await readBlock(document.getElementById("payload").textContent);
+async function build(host, data, told) {
   units = data.units;
   const { orbits } = data, samples = data.samples;
   const phases = Float64Array.from({ length: samples }, (_, k) => k / (samples - 1));
-  const clock = new Clock(phases);
+  const clock = new Clock(phases, told);
   const part = ({ values, columns }, number) => values.slice(number * samples * columns, (number + 1) * samples * columns);
   if (data.bodies) data.coordinates = { columns: data.bodies.modes.length, values: [] };
   const line = (name) => ({ name: "", colour: data.branches[0].colour, [name]: phases });
@@ -93,7 +92,7 @@ async function build(host) {
     history.lines[0].colour = phase.lines[0].colour = branch.colour;
     facts.replaceChildren(table([], [["branch", branch.name], ...data.columns.map((name, k) =>
       [name, branch.rows[place][k]]).filter(([, text]) => text)]));
-    root.dataset.orbit = number;
+    told.orbit = number;
     player?.draw();
     history.resize();
     phase.resize();
@@ -114,5 +113,5 @@ async function build(host) {
   phase.lines[0].x = part(orbits.displacement, 0);
   refresh();
   diagram.clock.set({ line: diagram.lines[0], index: diagram.lines[0].kept[0], number: 0 });
-  ready(refresh);
+  return { close: ready(host, told, refresh, player, timing), clock };
 }

@@ -1,10 +1,10 @@
 // Charts on two layers: curves, drawn once for each size, and the cursor, drawn for each instant.
 
 const { abs, floor, hypot, max, min, round } = Math;
-const root = document.documentElement;
-// Looked up once: a page that changes between light and dark is loaded anew.
-const palette = {};
-const css = (name) => palette[name] ??= getComputedStyle(root).getPropertyValue(name).trim();
+// Colours are those of the element that was built last, looked up once: a page that changes between
+// light and dark is built anew.
+let palette = {}, styled;
+const css = (name) => palette[name] ??= getComputedStyle(styled).getPropertyValue(name).trim();
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const clamp = (x, low, high) => min(max(x, low), high);
 

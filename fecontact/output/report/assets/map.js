@@ -10,8 +10,22 @@ class ContactMap extends Chart {
     this.node.firstChild.append(pick);
   }
 
+  // State or size of a force at a node and an instant.
+  reader() {
+    const { state, forces } = this.contact, { rows, values } = forces, d = forces.columns / state.columns;
+    if (this.what === "state") return (node, i) => state.values[node * state.rows + i];
+    if (this.what === "normal force") return (node, i) => abs(values[(node * d + d - 1) * rows + i]);
+    return (node, i) => hypot(values[node * d * rows + i], d > 2 ? values[(node * d + 1) * rows + i] : 0);
+  }
+
+  painted(value) {
+    if (this.what !== "state") return value === 0 ? null : this.shades[round(63 * min(1, value / this.contact.largest))];
+    const colour = this.contact.colours[value];
+    return colour ? [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16)) : null;
+  }
+
   draw() {
-    const { contact, face, what } = this, { left, right, top, bottom } = this.inner;
+    const { face, what } = this, { left, right, top, bottom } = this.inner;
     const c = this.context, times = this.clock.times, n = face.abscissa.length;
     const x = this.clock.shown(), [i0, i1] = this.clock.window();
     this.range = { x };
@@ -20,23 +34,16 @@ class ContactMap extends Chart {
     const columns = max(1, round(right - left)), rows = round(bottom - top);
     const order = face.abscissa.map((_, k) => k).sort((a, b) => face.abscissa[b] - face.abscissa[a]);
     const image = new ImageData(columns, n);
-    const colours = contact.colours.map((colour) => colour
-      ? [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16)) : null);
-    const source = what === "state" ? contact.state : what === "normal force" ? contact.normal
-      : contact.along;
+    const value = this.reader();
     for (let column = 0; column < columns; column++) {
       const edge = (k) => (x[0] + (x[1] - x[0]) * k / columns) * this.clock.unit;
       const from = clamp(before(times, edge(column + 0.5)), i0, i1);
       const until = clamp(before(times, edge(column + 1.5)), from + 1, i1 + 1);
       order.forEach((node, row) => {
         const at = face.first + node;
-        let value = source.values[from * source.columns + at];
-        for (let i = from + 1; what !== "state" && i < until; i++) {
-          const next = source.values[i * source.columns + at];
-          if (abs(next) > abs(value)) value = next;
-        }
-        const colour = what === "state" ? colours[value] : value === 0 ? null
-          : this.shades[round(63 * min(1, abs(value) / contact.largest))];
+        let most = value(at, from);
+        for (let i = from + 1; what !== "state" && i < until; i++) most = max(most, value(at, i));
+        const colour = this.painted(most);
         if (colour) image.data.set([...colour, 255], 4 * (row * columns + column));
       });
     }
@@ -55,5 +62,40 @@ class ContactMap extends Chart {
     c.fillText(millimetres(n - 1), left - 6, bottom - 8);
     if (n > 1) c.fillText(`${face.label.slice(-1)} [mm]`, left - 6, 0.5 * (top + bottom));
     this.bottomLabels(c, ticks(...x, clamp((right - left) / 80, 2, 10)));
+  }
+}
+
+// The face itself at the drawn instant, in its tangent plane.
+class Footprint extends ContactMap {
+  constructor(...given) {
+    super(...given);
+    this.height = 220;
+    this.node.querySelector("b").textContent += " at the time shown";
+    this.top.onpointerdown = this.top.onpointermove = null;
+  }
+
+  draw() { this.point(); }
+
+  point() {
+    const c = this.context, { plan, sizes, first } = this.face, { width, height } = this, n = sizes.length;
+    const [left, right, low, high] = plan.flatMap((one) => [min(...one), max(...one)]);
+    // Nodes of a grid fill it; others are squares of their size.
+    const sides = plan.map((one, k) => {
+      const lines = new Set(one.map((x) => x.toFixed(9))).size, span = k ? high - low : right - left;
+      return lines > 1 && lines * lines <= 9 * n && lines < n ? span / (lines - 1) : Math.sqrt(max(...sizes));
+    });
+    const size = min((width - 20) / (right - left + sides[0]), (height - 28) / (high - low + sides[1]));
+    const value = this.reader(), [w, h] = sides.map((side) => size * side);
+    c.clearRect(0, 0, width, height);
+    plan[0].forEach((x, k) => {
+      const colour = this.painted(value(first + k, this.clock.index));
+      c.fillStyle = colour ? `rgb(${colour})` : css("--open");
+      c.fillRect(width / 2 + size * (x - (left + right) / 2) - w / 2 + 0.5,
+        (height - 20) / 2 - size * (plan[1][k] - (low + high) / 2) - h / 2 + 0.5, w - 1, h - 1);
+    });
+    c.font = `11px ${css("--font")}`;
+    c.fillStyle = css("--soft");
+    c.textAlign = "center";
+    c.fillText(`${quantity(right - left + sides[0], "m")} × ${quantity(high - low + sides[1], "m")}`, width / 2, height - 6);
   }
 }

@@ -7,7 +7,7 @@ function modesTable(data, player, timing) {
       const stop = player.mode === k;
       for (const row of rows) row.at(-1).textContent = "shake";
       button.textContent = stop ? "shake" : "stop";
-      player.mode = root.dataset.mode = stop ? -1 : k;
+      player.mode = stop ? -1 : k;
       player.phase = 0;
       if (timing.on === stop) timing.toggle();
       player.draw();
@@ -32,10 +32,9 @@ function columns({ values, lines, title, unit }, clock) {
     y: Float64Array.from({ length: rows }, (_, i) => all[i * count + k]) })) };
 }
 
-async function build(host) {
-  const data = await readBlock(document.getElementById("payload").textContent);
+async function build(host, data, told) {
   units = data.units;
-  const clock = new Clock(data.time.values);
+  const clock = new Clock(data.time.values, told);
   const player = data.bodies ? new Player(data, clock) : null;
   const charts = data.charts.map((one) => new Chart(clock, columns(one, clock)));
   const phases = data.phases.map(({ title, x, y }) => {
@@ -43,8 +42,8 @@ async function build(host) {
     return new Chart(clock, { title: `${title}: velocity [${other.unit}] over displacement [${one.unit}]`, xLabel: "",
       height: 220, kind: "phase", lines: [{ name: "", colour: other.colour, x: one.y, y: other.y }] });
   });
-  const maps = data.contact ? data.contact.faces.map((face) => new ContactMap(clock, data.contact, face,
-    data.maps?.von_mises ?? Array.from({ length: 64 }, (_, k) => [255 - 3 * k, 255 - 3 * k, 255]))) : [];
+  const maps = data.contact ? data.contact.faces.flatMap((face) => (face.plan ? [Footprint, ContactMap] : [ContactMap])
+    .map((kind) => new kind(clock, data.contact, face, data.maps.von_mises))) : [];
   const energies = data.energies.map((one) => new Chart(clock, columns(one, clock)));
   const all = [...charts, ...phases, ...maps, ...energies];
   const resize = () => { for (const one of all) one.resize(); };
@@ -66,5 +65,12 @@ async function build(host) {
     () => { for (const one of all) one.point(); });
   refresh();
   clock.set(clock.time);
-  ready(refresh);
+  const close = ready(host, told, refresh, player, timing);
+  data.rest().then(() => {
+    data.whole = true;
+    told.whole = round(performance.now());
+    for (const one of maps) one.resize();
+    clock.set(clock.time);
+  });
+  return { close, clock };
 }

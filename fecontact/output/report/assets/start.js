@@ -1,7 +1,3 @@
-// Each kind of page has its own `build`.
+// The page of a file.
 
-build(document.body).catch((error) => {
-  document.body.append(el("p.missing", {}, typeof DecompressionStream === "undefined"
-    ? "This browser is too old for this report; take one of 2023 or later."
-    : `This report cannot be read: ${error.message}`));
-});
+show(document.body, bytesOf(document.getElementById("payload").textContent), document.documentElement);

@@ -86,13 +86,12 @@ class Cases extends Chart {
   }
 }
 
-async function build(host) {
-  const data = await readBlock(document.getElementById("payload").textContent);
+async function build(host, data, told) {
   units = data.units;
   for (const column of data.columns) column.values = column.values.map((value) => value ?? NaN);
   const facts = el("div");
   const cases = new Cases(data, (index) => {
-    root.dataset.case = index;
+    told.case = index;
     facts.replaceChildren(table([], data.rows[index].map((text, k) => [data.headings[k], text])
       .filter(([, text]) => text)));
   });
@@ -101,5 +100,5 @@ async function build(host) {
   ...cards("Study", data.study), foot(data));
   cases.resize();
   cases.clock.set(0);
-  ready(() => cases.resize());
+  return { close: ready(host, told, () => cases.resize()) };
 }

@@ -10,8 +10,9 @@ function quantity(value, unit, digits = 3) {
 }
 
 class Clock {
-  constructor(times) {
+  constructor(times, told) {
     this.watchers = [];
+    this.told = told;
     this.load(times);
   }
 
@@ -34,7 +35,7 @@ class Clock {
   set(time) {
     this.put(time);
     for (const watch of this.watchers) watch();
-    root.dataset.time = this.time;
+    this.told.time = this.time;
   }
 
   shown() { return this.range.map((time) => time / this.unit); }
@@ -78,12 +79,14 @@ function slider(ariaLabel, min, max, value, oninput) {
 function controls(data, clock, player, resize, lap = 12) {
   const play = el("button.play", { textContent: "▶", ariaLabel: "play" });
   const now = el("output"), pace = el("output");
+  let last = 0;
   const timing = { on: false, toggle() {
     timing.on = !timing.on;
     play.textContent = timing.on ? "❚❚" : "▶";
     play.ariaLabel = timing.on ? "pause" : "play";
+    last = performance.now();
+    if (timing.on) requestAnimationFrame(frame);
   } };
-  let last = 0;
   const span = () => clock.range[1] - clock.range[0];
   const scrub = slider("time", 0, 1000, 0, () => clock.set(clock.range[0] + scrub.value / 1000 * span()));
   scrub.className = "scrub";
@@ -95,8 +98,8 @@ function controls(data, clock, player, resize, lap = 12) {
   const speeds = slider("speed", -3, 2, 0, () => clock.set(clock.time));
   const speed = () => clock.whole / lap * 10 ** speeds.value;
   play.onclick = timing.toggle;
-  window.onkeydown = (event) => {
-    if (/INPUT|SELECT|BUTTON/.test(event.target.tagName)) return;
+  timing.key = (event) => {
+    if (/INPUT|SELECT|BUTTON/.test(event.composedPath()[0].tagName)) return;
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (event.key === " ") { event.preventDefault(); timing.toggle(); }
     if (step) clock.set(clock.times[clamp(clock.index + step, 0, clock.times.length - 1)]);
@@ -108,19 +111,19 @@ function controls(data, clock, player, resize, lap = 12) {
   timing.more = el("div.controls", {}, field("speed", speeds), pace);
   if (player) addPlayer(data, player, timing.more);
   const frame = (at) => {
-    const passed = min(0.1, (at - last) / 1000);
+    if (!timing.on) return;
+    const passed = clamp((at - last) / 1000, 0, 0.1);
     last = at;
-    if (timing.on && player?.mode >= 0) {
+    if (player?.mode >= 0) {
       player.phase += 5 * passed;
       player.draw();
-    } else if (timing.on) {
+    } else {
       const next = clock.time + passed * speed();
       clock.set(next > clock.range[1] ? clock.range[0] : next);
     }
-    if (timing.on && player) root.dataset.frame = player.cost.toFixed(2);
+    if (player) clock.told.frame = player.cost.toFixed(2);
     requestAnimationFrame(frame);
   };
-  requestAnimationFrame(frame);
   return timing;
 }
 
@@ -139,6 +142,11 @@ function addPlayer(data, player, more) {
     onchange() { player.arrows = arrows.checked; player.draw(); } });
   more.append(field("deformation", magnify), factor, field("colour", colour),
     ...data.contact ? [field("forces", arrows)] : []);
+  if (player.d < 3) return;
+  const view = el("select", { ariaLabel: "view", onchange() { player.look(view.value); player.draw(); } },
+    ...Object.keys(VIEWS).map((name) => el("option", {}, name)));
+  const through = el("input", { type: "checkbox", onchange() { player.through = through.checked; player.draw(); } });
+  more.append(field("view", view), field("see-through", through));
 }
 
 function cards(title, sections) {
@@ -150,9 +158,44 @@ function foot(data) {
   return el("footer", {}, data.versions.map((pair) => pair.join(" ")).join(" · "));
 }
 
-function ready(refresh) {
-  let width = innerWidth;
-  window.onresize = () => { if (innerWidth !== width) { width = innerWidth; refresh(); } };
-  dark.onchange = () => location.reload();
-  root.dataset.ready = round(performance.now());
+// What goes on while a page is there, and what ends it.
+function ready(host, told, refresh, player, timing) {
+  let width = host.clientWidth;
+  const watch = new ResizeObserver(() => {
+    if (host.clientWidth !== width) { width = host.clientWidth; refresh(); }
+  });
+  watch.observe(host);
+  const keys = styled === document.documentElement ? window : styled;
+  if (timing) keys.addEventListener("keydown", timing.key);
+  told.ready = round(performance.now());
+  return () => {
+    watch.disconnect();
+    if (timing) keys.removeEventListener("keydown", timing.key);
+    if (timing?.on) timing.toggle();
+    player?.close();
+  };
+}
+
+// Builds a page in a host, which its `root` gives colours and is told what it shows, and again where
+// the page changes between light and dark; returns what ends it.
+async function show(host, block, root, built) {
+  let close;
+  const again = async () => {
+    close?.();
+    palette = {};
+    styled = root;
+    host.replaceChildren();
+    try {
+      const page = await build(host, await readBlock(block), root.dataset);
+      close = page.close;
+      built?.(page.clock);
+    } catch (error) {
+      host.append(el("p.missing", {}, typeof DecompressionStream === "undefined"
+        ? "This browser is too old for this report; take one of 2023 or later."
+        : `This report cannot be read: ${error.message}`));
+    }
+  };
+  await again();
+  dark.addEventListener("change", again);
+  return () => { dark.removeEventListener("change", again); close?.(); };
 }

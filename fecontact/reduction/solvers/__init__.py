@@ -1,0 +1,1 @@
+"""Solvers for modes and deflections: factors, and multigrid for large solids."""
