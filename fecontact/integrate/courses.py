@@ -29,8 +29,8 @@ from fecontact.system.nodes import (
     in_space,
     moved_across,
     moved_along,
-    surface_under,
 )
+from fecontact.system.space_nodes import surface_under
 
 # Entries of Control.ground: bounds of the ground.
 LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)
@@ -153,8 +153,10 @@ def _height_at(j, along, across, moved, s):
     """Height of the ground under node j, displaced so far along both tangents."""
     place = s.abscissa[j] + along - moved_along(j, moved.travel, moved.second_travel, s)
     if in_space(s):
-        return surface_under(place, s.ordinate[j] + across - moved_across(
-            j, moved.travel, moved.second_travel, s), s)[0]
+        return surface_under(
+            place, s.ordinate[j] + across - moved_across(j, moved.travel, moved.second_travel, s),
+            s.wave_direction[0], s.wave_direction[1], s.profile, s.surface,
+            s.profile_parameters)[0]
     return ground_at(s.profile)(place, s.profile_parameters)[0]
 
 

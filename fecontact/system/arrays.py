@@ -15,6 +15,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.interfaces import PrescribedMotion
 from fecontact.system.loads import load_rows
 from fecontact.system.nodes import SystemArrays
+from fecontact.system.space_nodes import SIDES, space_node
 
 LawGroup = tuple[slice, Array, Any]
 
@@ -44,7 +45,7 @@ def system_arrays(
     scale, surface = ground.friction_scale_kernel, ground.surface_kernel
     first, second = motion.motions[0], motion.motions[-1]
     rows = basis.contact_T
-    return SystemArrays(
+    return with_sides(SystemArrays(
         stiffness=stiffness,
         damping=damping,
         modal_damping=basis.damping.copy(),
@@ -63,6 +64,7 @@ def system_arrays(
         sliding=np.array(motion.factors[0] if d == 2 else motion.factors[0, :, 0]),
         sliding_across=_sliding_across(motion.factors) if d == 3 else np.zeros((3, 0)),
         wave_direction=np.array(ground.wave_direction) if d == 3 else np.zeros(0),
+        sides=np.zeros((0, SIDES)),
         bristle_stiffness=_bristles(friction_groups, n, d - 1),
         normal_parameters=normal_parameters,
         friction_parameters=friction_parameters,
@@ -86,7 +88,21 @@ def system_arrays(
         ground_motion=first.motion_kernel.address,
         second_motion=0 if second is first else second.motion_kernel.address,
         leans=int(ground.normal == "surface"),
-    )
+        space_node=0,
+    ))
+
+
+def with_sides(arrays: SystemArrays) -> SystemArrays:
+    """The arrays with what functions of nodes in space take from them, if they are in space."""
+    if not len(arrays.T2):
+        return arrays
+    n = len(arrays.gap)
+    columns = [arrays.gap, arrays.abscissa, arrays.ordinate, arrays.sliding,
+               arrays.sliding_across[1], arrays.sliding_across[0], arrays.sliding_across[2],
+               arrays.on_ground, arrays.leans, *arrays.wave_direction]
+    sides = np.column_stack([np.broadcast_to(np.asarray(column, dtype=float), n)
+                             for column in columns])
+    return arrays._replace(sides=sides, space_node=space_node.address)
 
 
 def _sliding_across(factors: Array) -> Array:

@@ -23,7 +23,7 @@ import numpy as np
 from numba import types
 
 from fecontact.core.compiled import block, borrowed, f8, helper, integers, kernel, matrix, vector
-from fecontact.laws.signatures import friction_at, memory_at, normal_at, planar_at, signal_at
+from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 from fecontact.system.nodes import (
     SYSTEM,
     SystemArrays,
@@ -35,8 +35,8 @@ from fecontact.system.nodes import (
     node_contact,
     node_motion,
     pressing_force,
-    scale_under,
 )
+from fecontact.system.space_nodes import tell, told_gradients
 
 # Columns of the per-node results of `contact_state`; the last two in space only.
 (NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE,
@@ -62,15 +62,14 @@ def node_forces(j, motion, moved, z, s, force, rates):
     ``force`` and ``rates`` are filled by friction with memory and, in space, by all friction; see
     the contract in :mod:`fecontact.laws.signatures`.
     """
+    if in_space(s):
+        F, contact = tell(j, motion, moved, z, s, force, rates)
+        return F, force[0], contact
     contact = node_contact(j, motion, moved, s)
     F = normal_at(s.normal[j])(contact.penetration, contact.rate, s.normal_parameters[j])[0]
     pressing = pressing_force(j, contact, F, s)
     R = 0.0
-    if in_space(s):
-        planar_at(s.planar[j])(s.friction[j], contact.slip, contact.slip_across, pressing, z,
-                               s.friction_parameters[j], force, rates)
-        R = force[0]
-    elif s.memory[j] > 0:
+    if s.memory[j] > 0:
         memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
         R = force[0]
     elif F != 0.0:
@@ -82,7 +81,7 @@ def node_forces(j, motion, moved, z, s, force, rates):
 def normal_gradients(j, contact, s, out):
     """F of node j and the force that friction sees under it.
 
-    Fills out[0] and out[2] with their derivatives to x, y, x', y' of the node, and across.
+    Fills out[0] and out[2] with their derivatives to x, y, x', y' of the node.
     """
     slope = contact.slope
     F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
@@ -91,25 +90,15 @@ def normal_gradients(j, contact, s, out):
     out[0, 1] = -F_u
     out[0, 2] = F_v * slope
     out[0, 3] = -F_v
-    columns = out.shape[1]
-    if columns > 4:
-        out[0, 0] += F_v * contact.twist * contact.slip_across
-        out[0, 4] = F_u * contact.slope_across + F_v * (
-            contact.twist * contact.slip + contact.curvature_across * contact.slip_across)
-        out[0, 5] = F_v * contact.slope_across
     sign = 1.0 if F >= 0.0 else -1.0
     pressing = abs(F)
-    for k in range(columns):
+    for k in range(4):
         out[2, k] = sign * out[0, k]
     if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        scale, slope = scale_under(contact, s)
-        for k in range(columns):
+        scale, scale_x, _ = ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)
+        for k in range(4):
             out[2, k] *= scale
-        if columns > 4:
-            out[2, 0] += s.wave_direction[0] * slope * pressing
-            out[2, 4] += s.wave_direction[1] * slope * pressing
-        else:
-            out[2, 0] += slope * pressing
+        out[2, 0] += scale_x * pressing
         pressing *= scale
     return F, pressing
 
@@ -122,13 +111,12 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
     (4, 6), with the force against the second tangent and derivatives to the motion across.
     ``force`` begins with R and its derivatives to slip velocity and pressing force for all laws.
     """
+    if in_space(s):
+        F, contact = tell(j, motion, moved, z, s, force, rates)
+        told_gradients(force, rates, out)
+        return F, leaning(F, force[0], contact.slope, s), contact
     contact = node_contact(j, motion, moved, s)
     F, pressing = normal_gradients(j, contact, s, out)
-    if in_space(s):
-        planar_at(s.planar[j])(s.friction[j], contact.slip, contact.slip_across, pressing, z,
-                               s.friction_parameters[j], force, rates)
-        _gradients_in_space(F, contact, s.leans, force, len(rates), out)
-        return F, leaning(F, force[0], contact.slope, s), contact
     R, R_v, R_F = 0.0, 0.0, 0.0
     if s.memory[j] > 0:
         memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
@@ -144,27 +132,6 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
             out[1, k] += contact.slope * out[0, k]
         out[1, 0] += F * contact.curvature
     return F, leaning(F, R, contact.slope, s), contact
-
-
-@helper
-def _gradients_in_space(F, contact, leans, force, states, out):
-    """Fill the rows of ``out`` (4, 6) of the forces against both tangents."""
-    second = 4 + states
-    for k in range(6):
-        out[1, k] = force[2] * out[2, k]
-        out[3, k] = force[second + 2] * out[2, k]
-    out[1, 2] += force[1]
-    out[1, 5] += force[3 + states]
-    out[3, 2] += force[second + 1]
-    out[3, 5] += force[second + 3 + states]
-    if leans:
-        for k in range(6):
-            out[1, k] += contact.slope * out[0, k]
-            out[3, k] += contact.slope_across * out[0, k]
-        out[1, 0] += F * contact.curvature
-        out[1, 4] += F * contact.twist
-        out[3, 0] += F * contact.twist
-        out[3, 4] += F * contact.curvature_across
 
 
 @kernel(types.void(f8, vector, SYSTEM, matrix))

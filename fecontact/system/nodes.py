@@ -10,7 +10,7 @@ from numba import types
 
 from fecontact.core.compiled import block, f8, helper, i8, integers, matrix, vector
 from fecontact.core.types import Array, Integers
-from fecontact.laws.signatures import ground_at, signal_at, surface_at
+from fecontact.laws.signatures import ground_at, signal_at
 
 
 class SystemArrays(NamedTuple):
@@ -23,8 +23,9 @@ class SystemArrays(NamedTuple):
     In space, else of length zero: rows ``T2`` (n, m) and reference places ``ordinate`` (n,) along
     the second tangent; ``sliding_across`` (3, n), factors of the first motion for the second
     tangent, of the second motion for the first and for the second one; ``planar`` (n,), addresses
-    of friction in two directions. Heights of the ground are those of ``surface``, or where that is
-    0 of ``profile`` along the unit vector ``wave_direction`` (2,).
+    of friction in two directions; ``sides`` (n, 11), what :mod:`fecontact.system.space_nodes`
+    evaluates, and ``space_node``, its address. Heights of the ground are those of ``surface``, or
+    where that is 0 of ``profile`` along the unit vector ``wave_direction`` (2,).
     """
 
     stiffness: Array
@@ -44,6 +45,7 @@ class SystemArrays(NamedTuple):
     sliding: Array
     sliding_across: Array
     wave_direction: Array
+    sides: Array
     bristle_stiffness: Array
     normal_parameters: Array
     friction_parameters: Array
@@ -66,13 +68,18 @@ class SystemArrays(NamedTuple):
     ground_motion: int
     second_motion: int
     leans: int
+    space_node: int
 
 
 SYSTEM = types.NamedTuple(
     [matrix, matrix, matrix, vector, matrix, vector, vector, matrix, matrix, matrix, matrix, vector,
-     vector, vector, vector, matrix, vector, block, matrix, matrix, vector, vector, vector, vector,
-     matrix, matrix, integers, integers, integers, integers, integers, integers, integers,
-     i8, i8, i8, i8, i8, i8], SystemArrays)
+     vector, vector, vector, matrix, vector, matrix, block, matrix, matrix, vector, vector, vector,
+     vector, matrix, matrix, *[integers] * 7, *[i8] * 7], SystemArrays)
+
+# Entries that tell of a node in space: its NodeContact, F, and derivatives (4, 6).
+CONTACT_FIELDS, SPACE_ROWS, SPACE_COLUMNS = 11, 4, 6
+TOLD = CONTACT_FIELDS + 1 + SPACE_ROWS * SPACE_COLUMNS
+
 
 class GroundMotion(NamedTuple):
     """How far the ground has travelled, and its speed, or what slides in its place; two motions."""
@@ -95,6 +102,9 @@ class NodeMotion(NamedTuple):
     height_rate: float
     across: float
     across_rate: float
+
+
+NODE_MOTION = types.NamedUniTuple(f8, 6, NodeMotion)
 
 
 class NodeContact(NamedTuple):
@@ -167,37 +177,16 @@ def node_motion(j, y, s):
 
 
 @helper
-def surface_under(place, across, s):
-    """Height of the ground in space with its derivatives: along, across; twice, mixed, twice."""
-    if s.surface != 0:
-        return surface_at(s.surface)(place, across, s.profile_parameters)
-    a, b = s.wave_direction[0], s.wave_direction[1]
-    height, slope, bend = ground_at(s.profile)(a * place + b * across, s.profile_parameters)
-    return height, a * slope, b * slope, a * a * bend, a * b * bend, b * b * bend
-
-
-@helper
 def node_contact(j, motion, moved, s):
-    """Where node j is above the other side, under the prescribed motion ``moved``."""
-    place = s.abscissa[j] + motion.along - moved_along(j, moved.travel, moved.second_travel, s)
-    slip = motion.along_rate - moved_along(j, moved.speed, moved.second_speed, s)
+    """Where node j of a plane body is above the other side, which has ``moved`` as prescribed."""
+    place = s.abscissa[j] + motion.along - s.sliding[j] * moved.travel
     ground, slope, curvature = 0.0, 0.0, 0.0
-    if not in_space(s):
-        if s.on_ground[j]:
-            ground, slope, curvature = ground_at(s.profile)(place, s.profile_parameters)
-        return NodeContact(place, ground - motion.height - s.gap[j],
-                           slope * slip - motion.height_rate, slip, slope, curvature,
-                           0.0, 0.0, 0.0, 0.0, 0.0)
-    across = (s.ordinate[j] + motion.across
-              - moved_across(j, moved.travel, moved.second_travel, s))
-    slip_across = motion.across_rate - moved_across(j, moved.speed, moved.second_speed, s)
-    slope_across, twist, curvature_across = 0.0, 0.0, 0.0
     if s.on_ground[j]:
-        ground, slope, slope_across, curvature, twist, curvature_across = surface_under(
-            place, across, s)
+        ground, slope, curvature = ground_at(s.profile)(place, s.profile_parameters)
+    slip = motion.along_rate - s.sliding[j] * moved.speed
     return NodeContact(place, ground - motion.height - s.gap[j],
-                       slope * slip + slope_across * slip_across - motion.height_rate, slip, slope,
-                       curvature, across, slip_across, slope_across, curvature_across, twist)
+                       slope * slip - motion.height_rate, slip, slope, curvature,
+                       0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @helper
@@ -209,22 +198,11 @@ def memory_of(j, y, s):
 
 
 @helper
-def scale_under(contact, s):
-    """Variation of friction along the ground at a node, and its derivative along that direction."""
-    place = contact.place
-    if in_space(s):
-        place = (s.wave_direction[0] * contact.place
-                 + s.wave_direction[1] * contact.place_across)
-    scale, slope, _ = ground_at(s.friction_scale)(place, s.friction_scale_parameters)
-    return scale, slope
-
-
-@helper
 def pressing_force(j, contact, F, s):
     """The force that friction sees under a normal force: |F| times the ground's variation."""
     pressing = abs(F)
     if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        pressing *= scale_under(contact, s)[0]
+        pressing *= ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)[0]
     return pressing
 
 
@@ -236,5 +214,8 @@ def leaning(F, R, slope, s):
 
 @helper
 def force_room(states, space):
-    """Lengths of ``force`` and of a row of ``rates`` for so many internal variables."""
-    return (2 * (4 + states), 4 + states) if space else (3 + states, 3 + states)
+    """Lengths of ``force`` and of a row of ``rates`` for so many internal variables.
+
+    In space what :mod:`fecontact.system.space_nodes` says of a node follows the friction.
+    """
+    return (2 * (4 + states) + TOLD, 4 + states) if space else (3 + states, 3 + states)

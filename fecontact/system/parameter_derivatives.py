@@ -27,7 +27,6 @@ from fecontact.system.nodes import (
     moved_across,
     moved_along,
     node_motion,
-    scale_under,
 )
 
 # Fourth-order differences: offsets in steps, and weights in twelfths of a step.
@@ -226,12 +225,12 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
     size, pressing_p = abs(F), F_p if F >= 0.0 else -F_p
     pressing = size
     if s.friction_scale != 0 and s.on_ground[j]:
-        scale, scale_x = scale_under(contact, s)
         place, shift = contact.place, shifts[0]
         if space:
             a, b = s.wave_direction[0], s.wave_direction[1]
             place = a * contact.place + b * contact.place_across
             shift = a * shifts[0] + b * shifts[4]
+        scale, scale_x, _ = ground_at(s.friction_scale)(place, s.friction_scale_parameters)
         pressing = scale * size
         pressing_p = scale * pressing_p + size * (
             scale_x * shift + _ground_rates(s.friction_scale, place, laws.friction_scale, h)[0])

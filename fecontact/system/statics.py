@@ -12,6 +12,7 @@ from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
 from fecontact.system import kernels
+from fecontact.system.arrays import with_sides
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.friction_memory import settled
 from fecontact.system.jacobian import jacobian
@@ -105,7 +106,7 @@ def equilibrium(
     # On level ground, and with its normal vertical, contact forces do not lean.
     slides = bool(arrays.leans and ground.wavy and (arrays.Tx.any() or arrays.T2.any())
                   and not standing)
-    problem = Balance(arrays._replace(leans=0), time, system.penetration_scale)
+    problem = Balance(with_sides(arrays._replace(leans=0)), time, system.penetration_scale)
     solution = problem.equilibrium()
     if system.basis.springs:
         solution = _among_springs(system, problem, solution, friction)
@@ -137,14 +138,14 @@ def at_rest(
     arrays: SystemArrays, travel: float, second_travel: float = 0.0
 ) -> SystemArrays:
     """Arrays of a system without friction, on ground at rest that has travelled [m]."""
-    return arrays._replace(
+    return with_sides(arrays._replace(
         friction=np.full_like(arrays.friction, _frictionless.address),
         memory=np.zeros_like(arrays.memory),
         bristle_stiffness=np.zeros((2, len(arrays.gap), 0)), ground_motion=_still.address,
         planar=np.full_like(arrays.planar, along_slip.address),
         ground_motion_parameters=np.array([travel], dtype=float),
         second_motion=_still.address if len(arrays.planar) else 0,
-        second_motion_parameters=np.array([second_travel], dtype=float))
+        second_motion_parameters=np.array([second_travel], dtype=float)))
 
 
 def resting(

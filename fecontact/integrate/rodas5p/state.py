@@ -11,7 +11,7 @@ from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks
-from fecontact.system.nodes import GROUND_MOTION, SYSTEM, GroundMotion
+from fecontact.system.nodes import GROUND_MOTION, SYSTEM, TOLD, GroundMotion
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
@@ -203,7 +203,8 @@ ROOM = types.NamedTuple(
 
 def gradients_for(nodes: int, states: int, dimension: int) -> motion.Gradients:
     """Zeros for so many contact nodes with so many internal variables each."""
-    length, width = (2 * (4 + states), 4 + states) if dimension == 3 else (3 + states, 3 + states)
+    length, width = (2 * (4 + states) + TOLD, 4 + states) if dimension == 3 else (
+        3 + states, 3 + states)
     return motion.Gradients(np.zeros((nodes, 1 + dimension, 2 * dimension)),
                             np.zeros((nodes, length)), np.zeros((nodes, states, width)))
 

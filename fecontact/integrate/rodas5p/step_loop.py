@@ -38,7 +38,13 @@ from fecontact.integrate.rodas5p.state import (
     Step,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
-from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, propagate_at
+from fecontact.integrate.rodas5p.variational import (
+    VARY,
+    begin_anew,
+    friction_length,
+    keep,
+    propagate_at,
+)
 from fecontact.laws.signatures import signal_at
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, powers
@@ -312,8 +318,9 @@ def _go_on(step, problem, progress, room, output):
         for row in range(here.partial.shape[1]):
             for k in range(here.partial.shape[2]):
                 here.partial[j, row, k] = there.partial[j, row, k]
-        for k in range(width):
+        for k in range(friction_length(here)):
             here.force[j, k] = there.force[j, k]
+        for k in range(width):
             for row in range(states):
                 here.rates[j, row, k] = there.rates[j, row, k]
     keep_ends(n, room)

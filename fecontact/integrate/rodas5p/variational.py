@@ -41,6 +41,7 @@ from fecontact.system.nodes import (
     moved_along,
     node_contact,
 )
+from fecontact.system.space_nodes import contact_in_space, laws_of
 
 # Differences are taken over this part of the scales of the laws.
 _PART = 1e-4
@@ -83,6 +84,13 @@ def _difference(ahead, here, behind, factor, forward, usual):
 
 
 @helper
+def friction_length(g):
+    """Number of entries of ``force`` that tell of friction."""
+    width = g.rates.shape[2]
+    return 2 * width if g.partial.shape[1] > 3 else width
+
+
+@helper
 def learn(here, usual):
     """Let the usual sizes be the largest seen."""
     n, states, width = here.rates.shape
@@ -91,8 +99,9 @@ def learn(here, usual):
             for k in range(here.partial.shape[2]):
                 usual.partial[j, row, k] = max(usual.partial[j, row, k],
                                                abs(here.partial[j, row, k]))
-        for k in range(width):
+        for k in range(friction_length(here)):
             usual.force[j, k] = max(usual.force[j, k], abs(here.force[j, k]))
+        for k in range(width):
             for row in range(states):
                 usual.rates[j, row, k] = max(usual.rates[j, row, k], abs(here.rates[j, row, k]))
 
@@ -106,10 +115,14 @@ def set_sinking(t, y, s, blocks, v, out):
     moved = ground_motion(t, s)
     dynamics.project(blocks, y, v.nodes[0], v.nodes[1])
     for j in range(len(s.abscissa)):
-        contact = node_contact(j, dynamics.motion_of(j, v.nodes, s), moved, s)
-        out[0, j], out[1, j] = contact.slope, contact.rate
-        if len(out) > 2:
+        motion = dynamics.motion_of(j, v.nodes, s)
+        if in_space(s):
+            contact = contact_in_space(motion, moved, laws_of(j, s), s.sides[j],
+                                       s.profile_parameters)
             out[2, j] = contact.slope_across
+        else:
+            contact = node_contact(j, motion, moved, s)
+        out[0, j], out[1, j] = contact.slope, contact.rate
 
 
 @helper
@@ -133,10 +146,11 @@ def differences(ahead, here, behind, usual, factor, u, travelled, sinking, s, bl
                 ahead.partial[j, row, k] = _difference(
                     ahead.partial[j, row, k], here.partial[j, row, k], behind.partial[j, row, k],
                     factor, forward, usual.partial[j, row, k])
-        for k in range(width):
+        for k in range(friction_length(ahead)):
             ahead.force[j, k] = _difference(ahead.force[j, k], here.force[j, k],
                                             behind.force[j, k], factor, forward,
                                             usual.force[j, k])
+        for k in range(width):
             for row in range(states):
                 ahead.rates[j, row, k] = _difference(
                     ahead.rates[j, row, k], here.rates[j, row, k], behind.rates[j, row, k], factor,
