@@ -46,3 +46,18 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.long)
         if name in SLOW:
             item.add_marker(pytest.mark.slow)
+
+
+@pytest.fixture
+def cli(capsys):
+    """Run a command line in this process: exit code, stdout, stderr."""
+
+    from fecontact.cli import execute
+
+    def run(*tokens):
+        code = execute([str(token) for token in tokens])
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        return code, said.out, said.err
+
+    return run

@@ -192,13 +192,8 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
 
 
 def helper(function: Callable[..., Any]) -> Any:
-    """Compile a function that kernels share, and that becomes part of each of them.
-
-    Only kernels can call it: the wrappers for calls from Python, which would hold a copy of it and
-    of all that it calls, take a third of the time of compilation.
-    """
-    return njit(error_model="numpy", fastmath=_FASTMATH, forceinline=True,
-                no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    """Compile a function that kernels share, and that becomes part of each of them."""
+    return njit(error_model="numpy", fastmath=_FASTMATH, forceinline=True)(function)
 
 
 def routine(function: Callable[..., Any]) -> Any:

@@ -1,22 +1,7 @@
-"""Command lines run in this process, and a small study to run them on."""
+"""A small study to run command lines on."""
 
 import pytest
 from tiny_study import TINY
-
-from fecontact.cli import execute
-
-
-@pytest.fixture
-def cli(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def run(*tokens):
-        code = execute([str(token) for token in tokens])
-        said = capsys.readouterr()
-        assert "Traceback" not in said.err
-        return code, said.out, said.err
-
-    return run
 
 
 @pytest.fixture

@@ -213,7 +213,6 @@ MISTAKES = [
     (["mesh", "tiny.toml", "--set", "body.thickness=-1"], "thickness = -1.0 must be"),
     (["mesh", "tiny.toml", "--set", "normal.roughness_height=-1"], "roughness_height = -1.0"),
     (["mesh", "text.toml"], "no complete section"),
-    (["mesh", "solid.toml"], "solid"),
     (["mesh", "absent.toml"], "there is no such file"),
     (["run", "tiny.toml", "--set", "simulation.solver=euler"], "solver = 'euler' must be"),
     (["render", "tiny.toml"], "run the study first: fecontact run tiny.toml"),
@@ -231,10 +230,7 @@ MISTAKES = [
 def test_mistakes_are_one_sentence_and_leave_nothing_behind(tokens, message, cli, study, tmp_path):
     (tmp_path / "bad.toml").write_text("[ground]\nspeed = = 1\n")
     (tmp_path / "text.msh").write_text("hello")
-    (tmp_path / "solid.msh").write_text(
-        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
-        "$EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n")
-    for name in ("text", "solid", "absent"):
+    for name in ("text", "absent"):
         (tmp_path / f"{name}.toml").write_text(f'[geometry]\nfile = "{name}.msh"\n')
     before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
     code, _, err = cli(*tokens)

@@ -11,7 +11,6 @@ import pytest
 from sweep_study import Serial, write_study
 
 from fecontact import InputError, sweep
-from fecontact.cli import execute
 from fecontact.cli.commands import sweep as command
 from fecontact.core.progress import clock
 from fecontact.io import read_table
@@ -29,17 +28,10 @@ friction.static_coefficient = [0.6, 0.7, 0.8]
 
 
 @pytest.fixture
-def cli(capsys, monkeypatch):
+def cli(cli, monkeypatch):
     """Run a command line, sweeps in this process: exit code, stdout, stderr."""
     monkeypatch.setattr(executors, "Processes", lambda count: executors.Pool(Serial()))
-
-    def run(*tokens):
-        code = execute([str(token) for token in tokens])
-        said = capsys.readouterr()
-        assert "Traceback" not in said.err
-        return code, said.out, said.err
-
-    return run
+    return cli
 
 
 def test_cases_beyond_the_limits_of_the_model_are_named(cli, tmp_path):
