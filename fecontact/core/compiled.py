@@ -23,6 +23,7 @@ from numba.core import cgutils, sigutils
 from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
 from fecontact.core.errors import InputError
@@ -191,14 +192,39 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
     return compile_
 
 
+class _Part(CPUDispatcher):
+    """A compiled function that becomes part of kernels.
+
+    It has no entry for Python and none for C, which take a third of the time of compilation.
+    Where Python calls it after all, a second one that has them is compiled.
+    """
+
+    @cached_property
+    def _callable(self) -> Any:
+        options = {key: value for key, value in self.targetoptions.items() if key not in _NO_ENTRY}
+        return CPUDispatcher(self.py_func, targetoptions=options)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._callable(*arguments)
+
+
+_NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+def _part(function: Callable[..., Any], **options: Any) -> Any:
+    return _Part(function, targetoptions={"nopython": True, "boundscheck": None,
+                                          "error_model": "numpy", "fastmath": _FASTMATH,
+                                          **_NO_ENTRY, **options})
+
+
 def helper(function: Callable[..., Any]) -> Any:
     """Compile a function that kernels share, and that becomes part of each of them."""
-    return njit(error_model="numpy", fastmath=_FASTMATH, forceinline=True)(function)
+    return _part(function, forceinline=True)
 
 
 def routine(function: Callable[..., Any]) -> Any:
     """As :func:`helper`, for long functions that are called seldom: they are not copied."""
-    return njit(error_model="numpy", fastmath=_FASTMATH)(function)
+    return _part(function)
 
 
 @intrinsic
