@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from fecontact import ContactSystem, ModalBasis, basis_from_matrices, basis_from_modes
+from fecontact import ModalBasis, basis_from_matrices, basis_from_modes
 from fecontact.core.errors import InputError
 from fecontact.fem.faces.frames import turned
-from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.reduction import point_masses, rows_from_dofs
 
 MASS, SIDES = 3.0, np.array([0.2, 0.3, 0.1])
@@ -117,8 +116,3 @@ def test_what_does_not_fit_space_is_named(change, message):
     given = {"dimension": 3, "contact_places": CORNERS, **change}
     with pytest.raises(InputError, match=message):
         basis_from_matrices(np.eye(6), np.zeros((6, 6)), {"contact": rigid_rows(CORNERS)}, **given)
-
-
-def test_contact_of_solids_is_refused_in_a_sentence():
-    with pytest.raises(InputError, match="the basis is that of a solid"):
-        ContactSystem(block(), normal=LinearContact(stiffness=1e6), friction=ConstantFriction(0.3))
