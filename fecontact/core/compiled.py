@@ -23,10 +23,10 @@ from numba.core import cgutils, sigutils
 from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
-from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
 from fecontact.core.errors import InputError
+from fecontact.core.kernel_parts import part
 
 f8 = types.float64
 i8 = types.int64
@@ -192,67 +192,14 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
     return compile_
 
 
-class _Part(CPUDispatcher):
-    """A compiled function that becomes part of kernels.
-
-    It has no entry for Python and none for C, which take a third of the time of compilation.
-    Where Python calls it after all, a second one that has them is compiled.
-    """
-
-    @cached_property
-    def _callable(self) -> Any:
-        options = {key: value for key, value in self.targetoptions.items() if key not in _NO_ENTRY}
-        return CPUDispatcher(self.py_func, targetoptions=options)
-
-    def __call__(self, *arguments: Any) -> Any:
-        return self._callable(*arguments)
-
-
-_NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
-
-def _part(function: Callable[..., Any], **options: Any) -> Any:
-    return _Part(function, targetoptions={"nopython": True, "boundscheck": None,
-                                          "error_model": "numpy", "fastmath": _FASTMATH,
-                                          **_NO_ENTRY, **options})
-
-
 def helper(function: Callable[..., Any]) -> Any:
     """Compile a function that kernels share, and that becomes part of each of them."""
-    return _part(function, forceinline=True)
+    return part(function, error_model="numpy", fastmath=_FASTMATH, forceinline=True)
 
 
 def routine(function: Callable[..., Any]) -> Any:
     """As :func:`helper`, for long functions that are called seldom: they are not copied."""
-    return _part(function)
-
-
-@intrinsic
-def borrowed(typingctx: Any, array: Any) -> Any:
-    """The same array, or tuple of arrays, without reference counts.
-
-    Only for what the caller of the kernel holds: an array made inside it is freed after its last
-    use under its own name.
-    """
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _without_owner(context, builder, signature.args[0], args[0])
-
-    return array(array), codegen
-
-
-def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    if isinstance(kind, types.BaseTuple):
-        items = [_without_owner(context, builder, item,
-                                builder.extract_value(value, index))
-                 for index, item in enumerate(kind)]
-        return context.make_tuple(builder, kind, items)
-    if not isinstance(kind, types.Array):
-        return value
-    array = context.make_array(kind)(context, builder, value)
-    array.meminfo = cgutils.get_null_value(array.meminfo.type)
-    array.parent = cgutils.get_null_value(array.parent.type)
-    return array._getvalue()
+    return part(function, error_model="numpy", fastmath=_FASTMATH)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,8 @@
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, borrowed, f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, helper, kernel, matrix, routine, vector
+from fecontact.core.references import borrowed
 from fecontact.system.kernels import (
     body_rates,
     friction_across,
@@ -88,8 +89,8 @@ def _add_across(j, count, s, partial, gradients, active):
                 + partial[3, 4 + part] * across)
 
 
-@kernel(types.i8(f8, vector, SYSTEM, block, matrix, matrix))
-def contact_gradients(t, y, s, gradients, active, out):
+@routine
+def _contact_gradients(t, y, s, gradients, active, out):
     """Rows of the Jacobian's contact part, for the nodes whose normal force is not zero.
 
     Fills ``active`` (n, 2 m) with the rows Tx, Ty of these nodes and ``gradients`` (4, n, m) with
@@ -98,7 +99,6 @@ def contact_gradients(t, y, s, gradients, active, out):
     along the second tangent last. Returns their number. The parts of friction with memory are put
     into the Jacobian ``out`` at once.
     """
-    y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
     moved = ground_motion(t, s)
     states = s.memory.max()
@@ -134,7 +134,7 @@ def jacobian(t, y, s, out):
     rows = 3 if in_space(s) else 2
     gradients, active = np.empty((2 * rows, n, m)), np.empty((n, rows * m))
     out[:] = 0.0
-    count = contact_gradients(t, y, s, gradients, active, out)
+    count = _contact_gradients(t, y, s, gradients, active, out)
     _body_jacobian(s, out)
     if count:
         Tx = np.ascontiguousarray(active[:count, :m].T)

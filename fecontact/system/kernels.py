@@ -22,7 +22,8 @@ for the second tangent has them last, so that the first ones are the same in the
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, borrowed, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.references import borrowed
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 from fecontact.system.nodes import (
     SYSTEM,

@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, f8, helper, kernel, vector
+from fecontact.core.compiled import f8, helper, kernel, routine, vector
+from fecontact.core.references import borrowed
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system.kernels import friction_across, node_forces
 from fecontact.system.nodes import (
@@ -136,13 +137,12 @@ def add_node_powers(j, motion, moved, z, stick_speed, s, force, rates, out, node
     nodes[len(s.gap) + j] = lost if slip < stick_speed else 0.0
 
 
-@kernel(types.void(f8, vector, SYSTEM, vector, vector, vector))
-def powers(t, y, s, stick_speed, out, nodes):
+@routine
+def set_powers(t, y, s, stick_speed, out, nodes):
     """Fill out (p,) with the powers and ``nodes`` (2 n,) with those of each node.
 
     Its friction's losses, then those by creep, at slip velocities below ``stick_speed`` (n,).
     """
-    y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)
     moved = ground_motion(t, s)
     states = s.memory.max()
@@ -152,3 +152,9 @@ def powers(t, y, s, stick_speed, out, nodes):
     for j in range(n):
         add_node_powers(j, node_motion(j, y, s), moved, memory_of(j, y, s), stick_speed[j], s,
                         force, rates, out, nodes)
+
+
+@kernel(types.void(f8, vector, SYSTEM, vector, vector, vector))
+def powers(t, y, s, stick_speed, out, nodes):
+    """As :func:`set_powers`."""
+    set_powers(t, borrowed(y), borrowed(s), stick_speed, out, nodes)

@@ -9,8 +9,9 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Linearisation, Problem
-from fecontact.core.compiled import borrowed, f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import f8, helper, i8, kernel, matrix, vector
 from fecontact.core.errors import AnalysisError, FecontactError
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from fecontact.core.compiled import (
     block,
-    borrowed,
     f8,
     function_at,
     helper,
@@ -18,6 +17,7 @@ from fecontact.core.compiled import (
     matrix,
     vector,
 )
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 
 c16 = types.complex128

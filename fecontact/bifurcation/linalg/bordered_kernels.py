@@ -12,9 +12,10 @@ from numba import types
 from fecontact.bifurcation.linalg.condensation import FACTORS
 from fecontact.bifurcation.linalg.lane_lu import back_lanes, forward_lanes, reduce_row_lanes
 from fecontact.bifurcation.linalg.simd import WIDTH, gather, read, spread, write
-from fecontact.core.compiled import borrowed, f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import f8, helper, kernel, matrix, vector
 from fecontact.core.dense_lu import backward, factorise, forward, reduce_row
 from fecontact.core.dense_lu import solve as solve_dense
+from fecontact.core.references import borrowed
 
 
 @helper

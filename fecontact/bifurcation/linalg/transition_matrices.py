@@ -6,8 +6,9 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.linalg.condensation import FACTORS
-from fecontact.core.compiled import block, borrowed, kernel
+from fecontact.core.compiled import block, kernel
 from fecontact.core.dense_lu import factorise, solve_rows
+from fecontact.core.references import borrowed
 
 
 @kernel(types.void(FACTORS, block))

@@ -6,7 +6,8 @@ slopes are (m, m + 1).
 
 from numba import types
 
-from fecontact.core.compiled import borrowed, f8, kernel, matrix, vector
+from fecontact.core.compiled import f8, kernel, matrix, vector
+from fecontact.core.references import borrowed
 
 
 @kernel(types.void(vector, vector, vector, vector, vector, vector))

@@ -10,7 +10,8 @@ from functools import cache
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, i8, kernel, matrix, vector
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 

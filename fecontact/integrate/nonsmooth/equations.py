@@ -14,16 +14,9 @@ node].
 
 from numba import types
 
-from fecontact.core.compiled import (
-    borrowed,
-    compile_law,
-    f8,
-    function_at,
-    helper,
-    integers,
-    vector,
-)
+from fecontact.core.compiled import compile_law, f8, function_at, helper, integers, vector
 from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.references import Reference, borrowed
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
     CURVED,
@@ -54,7 +47,8 @@ from fecontact.system.powers import (
 )
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
-DERIVATIVE = types.void(f8, vector, PROBLEM, integers, integers, WORKSPACE, vector)
+DERIVATIVE = types.void(f8, vector, Reference(PROBLEM), integers, integers, Reference(WORKSPACE),
+                        vector)
 _derivative_at = function_at(DERIVATIVE)
 
 
@@ -287,9 +281,9 @@ def hold_clusters(t, p, status, w, acceleration):
             acceleration[i] -= p.rows[c, i] * w.right[a]
 
 
-def _derivative(t, held_Y, held_p, held_status, held_closed, held_w, held_out):
+def _derivative(t, held_Y, p, held_status, held_closed, w, held_out):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
-    Y, p, w, out = borrowed(held_Y), borrowed(held_p), borrowed(held_w), borrowed(held_out)
+    Y, out = borrowed(held_Y), borrowed(held_out)
     status, closed = borrowed(held_status), borrowed(held_closed)
     s = p.system
     n, m = s.Tx.shape

@@ -10,7 +10,8 @@ import math
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, helper, i8, kernel
+from fecontact.core.compiled import helper, i8, kernel
+from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at

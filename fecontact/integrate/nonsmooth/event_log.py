@@ -8,7 +8,8 @@ whose changes of sign are found however close.
 
 # Compiled functions: their types are those of their signatures for numba.
 
-from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8, routine
+from fecontact.core.compiled import compile_law, f8, function_at, helper, i8, routine
+from fecontact.core.references import Reference
 from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
 from fecontact.integrate.courses import MOST
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
@@ -32,7 +33,8 @@ from fecontact.integrate.rodas5p.event_kernels import STICK as STICK_BEGINS
 
 # What is noted: the state at the start, a step or a part of it, a change of contact.
 BEGIN, WITHIN, CHANGED = range(3)
-NOTE = f8(STEP, f8, i8, PROBLEM, PROGRESS, WORKSPACE, ROOM, WATCH)
+NOTE = f8(STEP, f8, i8, Reference(PROBLEM), Reference(PROGRESS), Reference(WORKSPACE),
+          Reference(ROOM), Reference(WATCH))
 note_at = function_at(NOTE)
 
 _LOOKS, _HALVINGS = 16, 44
@@ -205,13 +207,11 @@ def _note_change(t, begin, p, progress, w, room, watch):
         watch.own_values[k] = new
 
 
-def _note_events(step, upto, what, held_p, held_progress, held_w, held_room, held_watch):
+def _note_events(step, upto, what, p, progress, w, room, watch):
     """Note events; the part of the step after which the run ends, or NOWHERE.
 
     Events after the first at which the run ends are dropped.
     """
-    p, progress, w = borrowed(held_p), borrowed(held_progress), borrowed(held_w)
-    room, watch = borrowed(held_room), borrowed(held_watch)
     begun = watch.counts[FOUND]
     if what == WITHIN:
         _note_step(upto, step, p, progress, w, room, watch)

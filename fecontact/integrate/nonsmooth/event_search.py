@@ -16,7 +16,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import borrowed, helper, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel, matrix, vector
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import (
     DEPTH,

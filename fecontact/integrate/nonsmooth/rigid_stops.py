@@ -26,7 +26,8 @@ import math
 
 import numpy as np
 
-from fecontact.core.compiled import borrowed, compile_law, f8, function_at, routine, vector
+from fecontact.core.compiled import compile_law, f8, function_at, routine, vector
+from fecontact.core.references import Reference, borrowed
 from fecontact.integrate.nonsmooth.contact_conditions import (
     Conditions,
     new_case,
@@ -75,7 +76,8 @@ NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 # Slip velocities below this part of the largest are none, energies gained rounding.
 _NEAR, _GAIN = 1e-9, 1e-10
 
-CHANGE = f8(f8, PROBLEM, PROGRESS, ROOM, WORKSPACE, f8, f8, f8, vector)
+CHANGE = f8(f8, Reference(PROBLEM), Reference(PROGRESS), Reference(ROOM), Reference(WORKSPACE), f8,
+            f8, f8, vector)
 change_contacts_at = function_at(CHANGE)
 
 
@@ -306,7 +308,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
     return flight
 
 
-def _change_contacts(t, held_p, held_progress, held_room, held_w, slow, height, brief, held_out):
+def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
     """Impact of the ``room.touched`` nodes, then which stops stay closed and what sticks.
 
     ``room.parting`` nodes were closed and lift off, ``room.released`` clusters begin to slip in
@@ -316,8 +318,7 @@ def _change_contacts(t, held_p, held_progress, held_room, held_w, slow, height, 
     the longest flight that a rebound may take [s], infinite if none, NO_ACCELERATION or
     NO_IMPULSES, and fills ``out`` with Y'.
     """
-    p, progress, room = borrowed(held_p), borrowed(held_progress), borrowed(held_room)
-    w, out = borrowed(held_w), borrowed(held_out)
+    out = borrowed(held_out)
     Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest
     n, count = len(p.cluster), 0
     touching = np.zeros(n, np.bool_)

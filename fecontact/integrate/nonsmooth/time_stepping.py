@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, i8, kernel, matrix, vector
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH, NOWHERE, first_below, fit
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe

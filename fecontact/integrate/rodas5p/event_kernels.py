@@ -14,24 +14,23 @@ import numpy as np
 from numba import types
 
 from fecontact.core.compiled import (
-    borrowed,
     compile_law,
     f8,
     function_at,
     helper,
     i8,
     integers,
-    kernel,
     matrix,
+    routine,
     vector,
 )
+from fecontact.core.references import Reference
 from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein
 from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, Course, changes
-from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p import tableau
 from fecontact.system import kernels, nodes
-from fecontact.system.nodes import SYSTEM
 
 EVENT = f8(f8, vector, vector)
 event_at = function_at(EVENT)
@@ -104,7 +103,8 @@ class Watch(NamedTuple):
 WATCH = types.NamedTuple(
     [vector, vector, matrix, integers, integers, matrix, vector, integers, integers, matrix,
      integers, vector, i8, integers, matrix, matrix, integers], Watch)
-NOTE = f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM, WATCH)
+NOTE = f8(run_arrays.STEP_TYPE, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
+          Reference(run_arrays.ROOM), Reference(WATCH))
 note_events_at = function_at(NOTE)
 
 
@@ -264,22 +264,18 @@ def _end(step, begun, watch):
     return (stop - step.t) / step.h
 
 
-@kernel(types.void(f8, vector, SYSTEM, vector, WATCH, dynamics.GRADIENTS))
-def begin(t, y, held_s, depth, held_watch, scratch):
+@routine
+def begin(t, y, s, depth, watch, scratch):
     """Take the state at the start of a run for that from which things change."""
-    s, watch = borrowed(held_s), borrowed(held_watch)
     for j in range(len(watch.zones)):
         watch.zones[j] = _zone_of(j, t, y, s, depth, scratch.force[0], scratch.rates[0], watch)
     for k in range(len(watch.own)):
         watch.own_values[k] = event_at(watch.own[k])(t, y, watch.own_parameters[k])
 
 
-@kernel(types.f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM,
-                 WATCH))
-def next_switch(step, held_problem, held_progress, held_room, held_watch):
+@routine
+def next_switch(step, problem, progress, room, watch):
     """Part of the step until a normal force begins, ends or passes its depth; 1 if none does."""
-    problem, progress = borrowed(held_problem), borrowed(held_progress)
-    room, watch = borrowed(held_room), borrowed(held_watch)
     view = _view(step, problem, progress, room)
     first = 1.0
     for j in range(len(watch.zones)):
@@ -411,10 +407,8 @@ def _note_node(j, left, right, view, watch):
     _look(right, view)
 
 
-def _note_events(step, held_problem, held_progress, held_room, held_watch):
+def _note_events(step, problem, progress, room, watch):
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
-    problem, progress = borrowed(held_problem), borrowed(held_progress)
-    room, watch = borrowed(held_room), borrowed(held_watch)
     view = _view(step, problem, progress, room)
     begun = watch.counts[FOUND]
     looks = _MORE_LOOKS if nodes.in_space(view.system) else _LOOKS

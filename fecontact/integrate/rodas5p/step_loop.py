@@ -3,7 +3,8 @@
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, helper, i8, kernel
+from fecontact.core.compiled import helper, i8, kernel
+from fecontact.core.references import borrowed
 from fecontact.integrate.courses import doubtful, keep_ends, restless, set_courses, set_ends
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
@@ -47,7 +48,7 @@ from fecontact.integrate.rodas5p.variational import (
 )
 from fecontact.laws.signatures import signal_at
 from fecontact.system.nodes import ground_motion
-from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, powers
+from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
@@ -65,7 +66,7 @@ def _start(t, problem, progress, room, output, watch):
     dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
                                     room.nodes, progress.gradients, progress.rate)
     if control.work:
-        powers(t, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
+        set_powers(t, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
                progress.power[POWER_COUNT:])
     if _watched(watch) or watch.counts[KINKS]:
         begin(t, progress.state, s, control.depth, watch, room.scratch)
@@ -300,7 +301,7 @@ def _go_on(step, problem, progress, room, output):
     if problem.control.work:
         work_until(1.0, step.h, progress.work, room.power, progress.work)
         if step.at_break:
-            powers(step.target, room.after, problem.system, problem.control.stick_speed,
+            set_powers(step.target, room.after, problem.system, problem.control.stick_speed,
                    progress.power[:POWER_COUNT], progress.power[POWER_COUNT:])
             jump = drive_jump(step.latest, step.target, room.after, problem.system)
             progress.work[DRIVE] += jump

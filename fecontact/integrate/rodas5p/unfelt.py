@@ -9,7 +9,8 @@ The step is then taken anew to a place within that stretch: its end feels the fo
 estimate of the error sees it.
 """
 
-from fecontact.core.compiled import borrowed, compile_law, f8, function_at, helper, i8
+from fecontact.core.compiled import compile_law, f8, function_at, helper, i8
+from fecontact.core.references import Reference
 from fecontact.integrate.courses import (
     COEFFICIENTS,
     DOUBT,
@@ -23,7 +24,8 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.nodes import in_space
 
-_UNFELT = f8(run_arrays.STEP_TYPE, i8, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM)
+_UNFELT = f8(run_arrays.STEP_TYPE, i8, Reference(run_arrays.PROBLEM),
+             Reference(run_arrays.PROGRESS), Reference(run_arrays.ROOM))
 first_unfelt_at = function_at(_UNFELT)
 
 # An unfelt impulse counts from this part of the tolerance on.
@@ -104,15 +106,13 @@ def _normal_force(place, course, height):
     return abs(_push(course.node, -at(place, height, gap), 0.0, s))
 
 
-def _first_unfelt(step, again, held_problem, held_progress, held_room):
+def _first_unfelt(step, again, problem, progress, room):
     """Part of the step at which to end it because of what it did not feel; 2 if there is nothing.
 
     It is the earliest such place of all nodes: just past the begin of the stretch, or, when this
     is not the first attempt (``again``) or the begin is that of the step, where the force is
     largest.
     """
-    problem, progress = borrowed(held_problem), borrowed(held_progress)
-    room = borrowed(held_room)
     s, blocks, control = problem.system, problem.blocks, problem.control
     levels, places = control.levels, room.places
     b, height, row = room.bound[0], room.bound[1], room.bound[2]

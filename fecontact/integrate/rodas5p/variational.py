@@ -18,17 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import (
-    block,
-    borrowed,
-    compile_law,
-    f8,
-    function_at,
-    helper,
-    i8,
-    matrix,
-    vector,
-)
+from fecontact.core.compiled import block, compile_law, f8, function_at, helper, i8, matrix, vector
+from fecontact.core.references import Reference
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
@@ -236,8 +227,8 @@ class Vary(NamedTuple):
 
 
 VARY = types.NamedTuple([SYSTEM, SYSTEM, f8, VARIATION, block, i8], Vary)
-_PROPAGATE = f8(run_arrays.STEP_TYPE, run_arrays.PROBLEM, run_arrays.PROGRESS, run_arrays.ROOM,
-                VARY)
+_PROPAGATE = f8(run_arrays.STEP_TYPE, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
+                Reference(run_arrays.ROOM), Reference(VARY))
 propagate_at = function_at(_PROPAGATE)
 
 
@@ -298,15 +289,13 @@ def _largest_error(scale, v):
     return largest
 
 
-def _propagate(step, held_problem, held_progress, held_room, held_vary):
+def _propagate(step, problem, progress, room, vary):
     """Carry the columns over the step whose stages and factors the room holds.
 
     Returns the largest error of a column in units of its size, or of the part ``faded`` of the
     largest it has been, with ``room.right`` (size,) as the units of the state; columns of a
     parameter that are still faint count as if they were not.
     """
-    problem, progress = borrowed(held_problem), borrowed(held_progress)
-    room, vary = borrowed(held_room), borrowed(held_vary)
     s, blocks, v = problem.system, problem.blocks, vary.variation
     state, gradients, reduced, stages = (progress.state, progress.gradients, room.reduced,
                                          room.stages)

@@ -17,17 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import (
-    borrowed,
-    f8,
-    helper,
-    i8,
-    integers,
-    kernel,
-    matrix,
-    vector,
-)
+from fecontact.core.compiled import f8, helper, i8, integers, kernel, matrix, vector
 from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 from fecontact.system.kernels import normal_gradients
 from fecontact.system.nodes import SYSTEM, GroundMotion, NodeMotion, leaning, node_contact

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, borrowed, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import SYSTEM

@@ -1,0 +1,74 @@
+"""Functions that become part of kernels, compiled as far as that needs and no further.
+
+Numba makes machine code of every function, with entries for Python and C, and optimises what is
+called anew in each caller. A part is left as intermediate code, and optimised with its kernel.
+"""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.registry import CPUDispatcher
+
+_NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+class _NoMachineCode:
+    """A code generator whose libraries are not loaded, so that they have no environment."""
+
+    def __init__(self, codegen: Any) -> None:
+        self._codegen = codegen
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Nothing: the environment is that of the kernel."""
+
+
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Intermediate code of a part and of what it calls."""
+
+    @property
+    def codegen(self) -> Any:
+        return _NoMachineCode(self._codegen)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Zero, as for functions that are not defined."""
+        self._ensure_finalized()
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+class _PartCompiler(Compiler):  # type: ignore[misc]
+    def define_pipelines(self) -> Any:
+        state = self.state
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+class _Part(CPUDispatcher):  # type: ignore[misc]
+    """A part; where Python calls it, a second one is compiled that has an entry."""
+
+    @cached_property
+    def _callable(self) -> Any:
+        options = {key: value for key, value in self.targetoptions.items() if key not in _NO_ENTRY}
+        return CPUDispatcher(self.py_func, targetoptions=options)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._callable(*arguments)
+
+
+def part(function: Callable[..., Any], **options: Any) -> Any:
+    """A function that kernels call; ``options`` are those of numba."""
+    return _Part(function, targetoptions={"nopython": True, "boundscheck": None, **_NO_ENTRY,
+                                          **options}, pipeline_class=_PartCompiler)

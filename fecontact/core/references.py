@@ -1,0 +1,131 @@
+"""References to named tuples of arrays, for kernels that hand large ones on.
+
+A compiled function takes a tuple by value: some hundred numbers for each tuple of arrays, at every
+call, and the compiler spends most of its time on them. A reference is one pointer. Fields are read
+when they are named, so that functions are written as if they had the tuple itself.
+"""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.imputils import lower_cast
+from numba.core.typeconv import Conversion
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
+
+
+class Reference(types.Type):
+    """Numba's type of a reference to a named tuple of the type ``tuple_type``."""
+
+    def __init__(self, tuple_type: Any) -> None:
+        self.tuple_type = tuple_type
+        super().__init__(name=f"Reference({tuple_type})")
+
+    @property
+    def key(self) -> Any:
+        """What makes two of them equal."""
+        return self.tuple_type
+
+    def can_convert_to(self, typingctx: Any, other: Any) -> Any:
+        """A reference serves where the tuple itself is expected."""
+        return Conversion.safe if other == self.tuple_type else None
+
+
+@register_model(Reference)
+class _ReferenceModel(models.PrimitiveModel):  # type: ignore[misc]
+    """A pointer to the fields, which stay as they are for as long as it is used."""
+
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(dmm, fe_type, dmm.lookup(fe_type.tuple_type).get_value_type().as_pointer())
+
+
+def _field_type(kind: Any, index: int) -> Any:
+    return kind.types[index] if isinstance(kind, types.NamedTuple) else kind.dtype
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):  # type: ignore[misc]
+    key = Reference
+
+    def generic_resolve(self, kind: Any, name: str) -> Any:
+        """The type of a field; of a tuple within, a reference."""
+        if name not in kind.tuple_type.fields:
+            return None
+        field = _field_type(kind.tuple_type, kind.tuple_type.fields.index(name))
+        return Reference(field) if isinstance(field, types.BaseNamedTuple) else field
+
+
+@lower_getattr_generic(Reference)
+def _field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    index = kind.tuple_type.fields.index(name)
+    place = cgutils.gep_inbounds(builder, value, 0, index)
+    field = _field_type(kind.tuple_type, index)
+    if isinstance(field, types.BaseNamedTuple):
+        return place
+    return without_owner(context, builder, field, _read(builder, place))
+
+
+@lower_cast(Reference, types.BaseTuple)
+def _value(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
+    return without_owner(context, builder, wanted, _read(builder, value))
+
+
+def _read(builder: Any, place: Any) -> Any:
+    """The value at a place."""
+    kind = place.type.pointee
+    if isinstance(kind, ir.Aggregate):
+        value = ir.Constant(kind, ir.Undefined)
+        for index in range(len(kind)):
+            part = _read(builder, cgutils.gep_inbounds(builder, place, 0, index))
+            value = builder.insert_value(value, part, index)
+        return value
+    value = builder.load(place)
+    # Loops need not read it again after each number that they store.
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return value
+
+
+def _write(builder: Any, value: Any, place: Any) -> None:
+    if isinstance(value.type, ir.Aggregate):
+        for index in range(len(value.type)):
+            _write(builder, builder.extract_value(value, index),
+                   cgutils.gep_inbounds(builder, place, 0, index))
+    else:
+        builder.store(value, place)
+
+
+def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """An array, or a tuple of arrays, without reference counts."""
+    if isinstance(kind, types.BaseTuple):
+        items = [without_owner(context, builder, item, builder.extract_value(value, index))
+                 for index, item in enumerate(kind)]
+        return context.make_tuple(builder, kind, items)
+    if not isinstance(kind, types.Array):
+        return value
+    array = context.make_array(kind)(context, builder, value)
+    array.meminfo = cgutils.get_null_value(array.meminfo.type)
+    array.parent = cgutils.get_null_value(array.parent.type)
+    return array._getvalue()
+
+
+@intrinsic
+def borrowed(typingctx: Any, array: Any) -> Any:
+    """The same array, without reference counts, or a reference to a named tuple of arrays.
+
+    Only for what the caller of the kernel holds: an array made inside it is freed after its last
+    use under its own name.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        if not isinstance(array, types.BaseNamedTuple):
+            return without_owner(context, builder, array, args[0])
+        place = cgutils.alloca_once(builder, args[0].type)
+        _write(builder, args[0], place)
+        # No read may come before what is written here.
+        pointer = ir.FunctionType(place.type, [place.type])
+        return builder.asm(pointer, "", "=r,0,~{memory}", [place], True)
+
+    return (Reference(array) if isinstance(array, types.BaseNamedTuple) else array)(array), codegen
