@@ -17,7 +17,7 @@ few nodes on flat ground it is cheaper to evaluate the coefficients themselves.
 
 from typing import Any, NamedTuple
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import helper, routine
 from fecontact.core.types import Array
 from fecontact.integrate import bernstein
 from fecontact.integrate.rodas5p import dynamics as motion
@@ -109,7 +109,7 @@ def _project(blocks, v, columns, out):
             i += 1
 
 
-@helper
+@routine
 def set_courses(s, blocks, bounds, before, after, room):
     """Fill ``room.courses`` (6, 2 n, 3 n or 4 n) with the coefficients over a step.
 
@@ -140,7 +140,7 @@ def set_courses(s, blocks, bounds, before, after, room):
             out[k, n + j] += s.gap[j]
 
 
-@helper
+@routine
 def set_ends(t, y, s, blocks, bounds, ends):
     """Fill ``ends`` (3, d n) with displacements and velocities of the nodes, and heights below."""
     n = len(s.gap)
@@ -183,7 +183,7 @@ def keep_ends(n, room):
         room.ends[2, j] = room.ends[2, n + j]
 
 
-@helper
+@routine
 def restless(moved, h, s, blocks, control, room):
     """Whether :func:`doubtful` may be true.
 
@@ -304,7 +304,7 @@ def _departure(k1, k2, k3):
     return max(max(0.25 * abs(k1), abs(2.0 * k1 + k2) / 6.0), 0.25 * abs(k1 + k2 + k3))
 
 
-@helper
+@routine
 def doubtful(moved, h, s, bounds, levels, slip_scale, room):
     """Whether forces within the step may differ from what its ends suggest.
 

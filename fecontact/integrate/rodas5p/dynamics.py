@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from numba import types
 
-from fecontact.core.compiled import block, helper, matrix
+from fecontact.core.compiled import block, helper, matrix, routine
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import normal_at, signal_at
@@ -38,7 +38,7 @@ class Gradients(NamedTuple):
 GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
 
 
-@helper
+@routine
 def set_given(t, s, given, load):
     """Fill ``given`` (10,) with what is given at time t, and ``load`` (m,) with its modal force."""
     kernels.set_constant_load(s, load)
@@ -137,7 +137,7 @@ def gather(y, s, blocks, load, forces, rate):
     push(blocks, forces, rate[m : 2 * m])
 
 
-@helper
+@routine
 def set_rate(y, s, blocks, given, load, w, scratch, rate):
     """Fill ``rate`` (size,) with y'. ``w`` (3, d n) and ``scratch`` are room to work in."""
     m, n = len(load), len(s.gap)
@@ -160,7 +160,7 @@ def set_rate(y, s, blocks, given, load, w, scratch, rate):
     gather(y, s, blocks, load, forces, rate)
 
 
-@helper
+@routine
 def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
     m, n = len(load), len(s.gap)
@@ -183,7 +183,7 @@ def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     gather(y, s, blocks, load, forces, rate)
 
 
-@helper
+@routine
 def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     """Fill ``out`` (size,) with df/dt at a fixed state.
 
@@ -226,7 +226,7 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     push(blocks, forces, out[m : 2 * m])
 
 
-@helper
+@routine
 def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
     """Time until the forces of a node change their character, or ``within`` if later.
 

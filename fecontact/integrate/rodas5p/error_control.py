@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import helper, routine
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
@@ -12,7 +12,7 @@ from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
 
 
-@helper
+@routine
 def state_error(control, progress, room):
     """Error of a step as a multiple of what is allowed, of modes and internal variables."""
     m = len(control.largest)
@@ -32,7 +32,7 @@ def state_error(control, progress, room):
     return error / control.rtol
 
 
-@helper
+@routine
 def slip_error(error, s, blocks, control, progress, room):
     """The larger of the error and that of the slip velocities at the end of the step.
 
@@ -154,7 +154,7 @@ def _quadrature_error(h, power):
     return h * largest
 
 
-@helper
+@routine
 def work_error(step, problem, progress, room):
     """Error of the work in a step; fills ``room.power`` with the powers at the points of it."""
     control = problem.control

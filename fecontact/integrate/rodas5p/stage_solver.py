@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, helper, integers, matrix, vector
+from fecontact.core.compiled import block, helper, integers, matrix, routine, vector
 from fecontact.core.dense_lu import factorise_within, solve_within
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import block_at
@@ -60,7 +60,7 @@ def reduced_for(modes: int, nodes: int, states: int, dimension: int) -> Reduced:
         np.zeros(modes), np.zeros((2 * dimension, columns)), np.zeros((2 * modes, columns)))
 
 
-@helper
+@routine
 def eliminate_memory(G, s, g, w):
     """Fill the inverse and the weights of the nodes, by Gauss-Jordan elimination.
 
@@ -203,7 +203,7 @@ def _set_coefficients_across(j, g, w, pressing):
     c[5, 2 * n + j] -= second_across
 
 
-@helper
+@routine
 def assemble(s, blocks, g, w):
     """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
     m = len(blocks.shapes)
@@ -220,7 +220,7 @@ def assemble(s, blocks, g, w):
                      (np.uint64(blocks.pairs[pair, 4]), np.uint64(blocks.pairs[pair, 5])), w.J)
 
 
-@helper
+@routine
 def factorise_step(G, blocks, w):
     """Factorise G^2 - G Jv - Jq."""
     m = len(w.pivots)
@@ -240,7 +240,7 @@ def factorise_step(G, blocks, w):
     factorise_within(w.factors, blocks.reach, w.starts, w.pivots)
 
 
-@helper
+@routine
 def solve_stage(G, s, blocks, g, w, r, motion, out):
     """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, d n) is room to work in."""
     shapes = blocks.shapes

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel
+from fecontact.core.compiled import helper, i8, kernel, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.courses import doubtful, keep_ends, restless, set_courses, set_ends
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
@@ -58,7 +58,7 @@ _POWER = -1.0 / tableau.ORDER
 _MOST_AGAIN = 20
 
 
-@helper
+@routine
 def _start(t, problem, progress, room, output, watch):
     """Prepare the first step of a run, and write its first output."""
     s, control = problem.system, problem.control
@@ -81,7 +81,7 @@ def _watched(watch):
     return watch.counts[NODES] != 0 or len(watch.own) > 0
 
 
-@helper
+@routine
 def _aim(t, h, exactly, moved, end, problem, progress, room):
     """The next step to try, of about the length h, or ``exactly`` that, but not past a break.
 
@@ -116,7 +116,7 @@ def _aim(t, h, exactly, moved, end, problem, progress, room):
     return Step(t, target - t, target, latest, moved, caution, is_break and target == stop)
 
 
-@helper
+@routine
 def _linearise(step, after_t, problem, progress, room):
     """What a step needs of the derivatives at its start besides the matrices."""
     s, control = problem.system, problem.control
@@ -148,7 +148,7 @@ def _linearise(step, after_t, problem, progress, room):
         progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE], speed)
 
 
-@helper
+@routine
 def _stages(step, G, problem, progress, room):
     """All stages of a step, and its end in ``room.after``."""
     s, blocks = problem.system, problem.blocks
@@ -179,7 +179,7 @@ def _stages(step, G, problem, progress, room):
     progress.counts[RATES] += tableau.STAGES
 
 
-@helper
+@routine
 def _attempt(step, new, end, problem, progress, room):
     """Compute a step; ``new`` if it is the first attempt from where it begins."""
     s = problem.system
@@ -195,7 +195,7 @@ def _attempt(step, new, end, problem, progress, room):
     _stages(step, G, problem, progress, room)
 
 
-@helper
+@routine
 def _error_at_end(step, end, problem, progress, room):
     """Error of the state and of the slip velocities at the end of a step.
 
@@ -212,7 +212,7 @@ def _error_at_end(step, end, problem, progress, room):
     return error
 
 
-@helper
+@routine
 def _unfelt_part(step, again, smallest, problem, progress, room):
     """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
     s, blocks, control = problem.system, problem.blocks, problem.control
@@ -226,7 +226,7 @@ def _unfelt_part(step, again, smallest, problem, progress, room):
     return 1.0
 
 
-@helper
+@routine
 def _switch_part(step, smallest, problem, progress, room, watch):
     """Part of the step to which it has to be shortened, to end at a kink; 1 if there is none."""
     part = next_switch(step, problem, progress, room, watch)
@@ -255,7 +255,7 @@ def _reject(step, error, progress, room):
     progress.numbers[CAUTIOUS] = 0.0 if step.caution > 0.0 else step.h
 
 
-@helper
+@routine
 def _find_events(step, problem, progress, room, watch):
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
     s, control = problem.system, problem.control
@@ -267,7 +267,7 @@ def _find_events(step, problem, progress, room, watch):
     return 2.0
 
 
-@helper
+@routine
 def _write(step, reached, problem, progress, room, output, vary):
     """Write the outputs up to the time ``reached`` within the step."""
     row = progress.counts[OUTPUTS]
@@ -285,7 +285,7 @@ def _write(step, reached, problem, progress, room, output, vary):
     progress.counts[OUTPUTS] = row
 
 
-@helper
+@routine
 def _stop_at(part, step, problem, progress, room):
     """End the run at a part of the step."""
     if problem.control.work:
@@ -295,7 +295,7 @@ def _stop_at(part, step, problem, progress, room):
     progress.counts[STEPS] += 1
 
 
-@helper
+@routine
 def _go_on(step, problem, progress, room, output):
     """Make the end of the step the state of the run."""
     if problem.control.work:
