@@ -5,6 +5,7 @@ call, and the compiler spends most of its time on them. A reference is one point
 when they are named, so that functions are written as if they had the tuple itself.
 """
 
+import hashlib
 from typing import Any
 
 from llvmlite import ir
@@ -22,20 +23,25 @@ class Reference(types.Type):
 
     def __init__(self, tuple_type: Any) -> None:
         self.tuple_type = tuple_type
-        super().__init__(name=f"Reference({tuple_type})")
-
-    @property
-    def key(self) -> Any:
-        """What makes two of them equal."""
-        return self.tuple_type
+        # Types are compared by their names, which become part of those of functions: keep it short.
+        digest = hashlib.sha256(_described(tuple_type).encode()).hexdigest()[:16]
+        super().__init__(name=f"Reference({tuple_type.instance_class.__name__}, {digest})")
 
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
         """A reference serves where the tuple itself is expected."""
         return Conversion.safe if other == self.tuple_type else None
 
 
+def _described(kind: Any) -> str:
+    if not isinstance(kind, types.BaseNamedTuple):
+        return str(kind)
+    owner = kind.instance_class
+    fields = ", ".join(map(_described, kind))
+    return f"{owner.__module__}.{owner.__qualname__}({fields})"
+
+
 @register_model(Reference)
-class _ReferenceModel(models.PrimitiveModel):  # type: ignore[misc]
+class _ReferenceModel(models.PrimitiveModel):
     """A pointer to the fields, which stay as they are for as long as it is used."""
 
     def __init__(self, dmm: Any, fe_type: Any) -> None:
@@ -47,7 +53,7 @@ def _field_type(kind: Any, index: int) -> Any:
 
 
 @infer_getattr
-class _Fields(AttributeTemplate):  # type: ignore[misc]
+class _Fields(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Any, name: str) -> Any:

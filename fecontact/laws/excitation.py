@@ -60,17 +60,17 @@ class Drive:
 
     stiffness_x: Annotated[float, Unit("N/m")] = 0.0
     stiffness_y: Annotated[float, Unit("N/m")] = 0.0
-    stiffness_z: Annotated[float, Unit("N/m")] = 0.0
+    stiffness_z: Annotated[float, Unit("N/m")] = field(default=0.0, kw_only=True)
     damping_x: Annotated[float, Unit("N s/m")] = 0.0
     damping_y: Annotated[float, Unit("N s/m")] = 0.0
-    damping_z: Annotated[float, Unit("N s/m")] = 0.0
+    damping_z: Annotated[float, Unit("N s/m")] = field(default=0.0, kw_only=True)
     amplitude_x: Annotated[float, Unit("m")] = 0.0
     amplitude_y: Annotated[float, Unit("m")] = 0.0
-    amplitude_z: Annotated[float, Unit("m")] = 0.0
+    amplitude_z: Annotated[float, Unit("m")] = field(default=0.0, kw_only=True)
     angular_frequency: Annotated[float, Unit("rad/s")] = 0.0
     motion_x: Annotated[Signal | None, Unit("m")] = None
     motion_y: Annotated[Signal | None, Unit("m")] = None
-    motion_z: Annotated[Signal | None, Unit("m")] = None
+    motion_z: Annotated[Signal | None, Unit("m")] = field(default=None, kw_only=True)
     dashpots: Literal["absolute", "relative"] = "absolute"
 
     def __post_init__(self) -> None:
@@ -214,7 +214,7 @@ class BoundaryLoad:
     boundary: str
     pressure: Annotated[float | Signal, Unit("Pa")] = 0.0
     shear: Annotated[float | Signal, Unit("Pa")] = 0.0
-    shear_across: Annotated[float | Signal, Unit("Pa")] = 0.0
+    shear_across: Annotated[float | Signal, Unit("Pa")] = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
         require_kind("BoundaryLoad", str, boundary=self.boundary)
@@ -261,7 +261,8 @@ class Load:
     gravity: Annotated[tuple[float, ...] | None, Unit("m/s^2")] = None
     base_acceleration_x: Annotated[Signal | None, Unit("m/s^2")] = None
     base_acceleration_y: Annotated[Signal | None, Unit("m/s^2")] = None
-    base_acceleration_z: Annotated[Signal | None, Unit("m/s^2")] = None
+    base_acceleration_z: Annotated[Signal | None, Unit("m/s^2")] = field(
+        default=None, kw_only=True)
     boundaries: tuple[BoundaryLoad, ...] = ()
 
     def __post_init__(self) -> None:

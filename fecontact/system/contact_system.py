@@ -51,6 +51,9 @@ NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a
                    "friction); `fecontact laws` lists them.")
 
 PARTS = ("normal", "friction", "sliding", "ground", "drive", "load")
+IN_SPACE_ONLY = frozenset({"ground.speed_y", "ground.rotation_speed", "ground.centre",
+                           "ground.wave_direction", "drive.stiffness_z",
+                           "drive.damping_z", "drive.amplitude_z"})
 
 _KINDS = {"basis": ModalBasis, "ground": Ground, "drive": Drive, "load": Load}
 
@@ -386,13 +389,16 @@ class ContactSystem(Summarised):
     def parameters(self) -> dict[str, Any]:
         """All parameters by their dotted names, ``{"friction.static_coefficient": 0.8, ...}``.
 
-        Without the numbers of the basis, which :meth:`parameter` and :meth:`with_` know too.
-        Parameters of the laws of an interface: ``interfaces.NAME.normal.stiffness``.
+        Without the numbers of the basis, which :meth:`parameter` and :meth:`with_` know too, and in
+        the plane without those of the third direction. Parameters of the laws of an interface:
+        ``interfaces.NAME.normal.stiffness``.
         """
+        hidden = IN_SPACE_ONLY if self.basis.dimension == 2 else frozenset()
         return {outer_name(self, f"{part}.{name}"): value
                 for part in PARTS
                 for name, value in parameters_of(getattr(self, part)).items()
-                if part != "friction" or name.partition(".")[0] not in self.basis.springs}
+                if (part != "friction" or name.partition(".")[0] not in self.basis.springs)
+                and f"{part}.{name}" not in hidden}
 
     def parameter(self, name: str) -> Any:
         """Value of one parameter by its dotted name, as for :meth:`with_`; None where not given.

@@ -124,7 +124,7 @@ def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
     """State and work after a breakpoint at ``end``, with the work of jumps of the drive."""
     y, m = y.copy(), system.basis.modes
     for motion, stiffness, shape in zip(system.drive.motions, system.arrays.drive_stiffness,
-                                        system.arrays.drive_shapes, strict=True):
+                                        system.arrays.drive_shapes, strict=False):
         old, new = motion.history([before_break(t, end), end])[:, 0]
         y[system.size] += stiffness * (0.5 * (old + new) - shape @ y[:m]) * (new - old)
     return y
