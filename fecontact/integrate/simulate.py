@@ -131,8 +131,8 @@ def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
     with np.errstate(over="ignore", invalid="ignore"):
         energies = part.energies
         amounts = np.array([getattr(energies, entry.name) for entry in fields(energies)])
-        forces = np.array([part.normal_force, part.friction_force])
-        if not (np.isfinite(amounts).all() and np.isfinite(forces).all()
+        if not (np.isfinite(amounts).all() and np.isfinite(part.normal_force).all()
+                and np.isfinite(part.friction_forces).all()
                 and np.isfinite(run.states).all() and np.isfinite(run.work).all()):
             return Status.ENERGY_NOT_FINITE
         grown = solver.smooth and energies.growth > max(_GROWTH, 1e3 * rtol)
