@@ -112,14 +112,16 @@ IMPACT_ROOM = types.NamedTuple(
 def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
     """Room for a problem."""
     n, m = problem.system.Tx.shape
-    size = 2 * m + POWER_COUNT + n
     flags = np.zeros((3, n), dtype=np.int64)
+    given, before, after, impulses, rest = np.zeros((5, 3 * n))
+    slopes, sides = np.zeros((2, 2 * n))
+    weights, grip, sticking, slipping = np.zeros((4, n))
+    whole, half, end = np.zeros((3, 2 * m + POWER_COUNT + n))
     return ImpactRoom(
-        np.zeros((3 * n, m)), np.zeros((3 * n, m)), np.zeros((3 * n, 3 * n)),
-        *np.zeros((5, 3 * n)), *np.zeros((2, 2 * n)), *np.zeros((4, n)), np.zeros((m, m)),
-        np.zeros(2 * m), np.zeros(m), np.zeros(POWER_COUNT + n), np.zeros(2 * m),
-        *np.zeros((3, size)), np.zeros((3, 3 * n)), flags, np.zeros(n, dtype=np.int64),
-        np.zeros(m, dtype=np.int64))
+        np.zeros((3 * n, m)), np.zeros((3 * n, m)), np.zeros((3 * n, 3 * n)), given, before, after,
+        impulses, rest, slopes, sides, weights, grip, sticking, slipping, np.zeros((m, m)),
+        np.zeros(2 * m), np.zeros(m), np.zeros(POWER_COUNT + n), np.zeros(2 * m), whole, half, end,
+        np.zeros((3, 3 * n)), flags, np.zeros(n, dtype=np.int64), np.zeros(m, dtype=np.int64))
 
 
 @helper
