@@ -324,6 +324,15 @@ def test_two_bodies_keep_their_momentum(solver):
     assert abs(unexplained(run)) < 1e-5
 
 
+def test_runs_are_read_as_they_were_written(tmp_path):
+    system, state = mass(fc.Ground(speed=0.5), [0.0, 1.0, 0.0])
+    run = fc.simulate(system, 0.1, initial=state, outputs=5, solver=SetValued())
+    fc.write_case(tmp_path / "run.h5", run, frames=0)
+    back = fc.read_case(tmp_path / "run.h5").trajectory
+    assert back.held_friction_force.shape == (5, 1, 2)
+    assert np.array_equal(back.friction_forces, run.friction_forces)
+
+
 @pytest.mark.parametrize(("solver", "events", "message"), [
     (SetValued(scheme="events"), None, r"scheme = 'events' is for plane bodies.*'stepping'"),
     (SetValued(restitution=0.5, scheme="events"), None, "is for plane bodies"),
