@@ -187,11 +187,13 @@ def check_integrator(names, printed, folder):
 
 
 def check_set_valued(names, printed, folder):
-    largest, end = (float(text) for text in printed.split())
+    largest, end, place = (float(text) for text in printed.split())
     # The spring pulls the sticking block up to the static limit before it slips.
     assert 0.97 < largest <= 1.0 + 1e-9
     # Friction mu g t takes the speed of the thrown one.
     assert end == pytest.approx(3.0, abs=1e-5)
+    # Across the belt it goes v v_y / (2 mu g), v its velocity relative to the belt.
+    assert place == pytest.approx(np.sqrt(1.25) / (2.0 * 0.3 * 9.81), abs=1e-7)
 
 
 def check_loads(names, printed, folder):

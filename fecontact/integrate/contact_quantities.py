@@ -40,10 +40,12 @@ class ContactQuantities:
     @cached_property
     def _contact(self) -> Array:
         history = self.system.contact_history(self.time, self.states)
-        for column, held in ((kernels.NORMAL_FORCE, self.held_normal_force),
-                             (kernels.FRICTION_FORCE, self.held_friction_force)):
-            if held is not None:
-                history[:, :, column] = held
+        if self.held_normal_force is not None:
+            history[:, :, kernels.NORMAL_FORCE] = self.held_normal_force
+        if self.held_friction_force is not None:
+            columns = self._columns(kernels.FRICTION_FORCE, kernels.FRICTION_ACROSS)
+            held = self.held_friction_force
+            history[:, :, columns] = held.reshape(*held.shape[:2], len(columns))
         return history
 
     @property

@@ -134,7 +134,8 @@ class SetValued(Solver):
         |R_j| \le \mu(0^+) F_j \ \text{ where } v_j = 0, \qquad
         R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
 
-    This is the limit of infinite ``smoothing_slope``, which friction laws must have.
+    This is the limit of infinite ``smoothing_slope``, which friction laws must have. On solids R
+    and v are vectors along the tangents, R is in the direction of v, and the set is a disc.
 
     Parameters
     ----------
@@ -143,11 +144,11 @@ class SetValued(Solver):
     static_coefficient : float or (n,) sequence, optional
         Limit of \|R\|/F in stick [-], for all contact nodes or each; default that of the law.
     scheme : 'auto', 'events' or 'stepping'
-        Event-driven, for few nodes, or time-stepping, for any number of nodes.
+        Event-driven, for few nodes, or time-stepping, for any number of nodes and for solids.
     impact_law : 'newton' or 'poisson'
         Whether restitution is a ratio of velocities or of impulses. With friction, Newton's law
         gains energy in some impacts unless both coefficients are equal; the status of a run
-        says so. Poisson's law does not.
+        says so. Poisson's law does not; it is for plane bodies.
     tangential_restitution : float
         Newton's coefficient along the ground, from 0 to 1, of contacts that stick in an impact.
 
@@ -187,9 +188,6 @@ class SetValued(Solver):
         if self.scheme not in self.schemes:
             raise InputError(f"SetValued: scheme = {self.scheme!r} must be one of "
                              f"{choices(self.schemes)}{nearest(str(self.scheme), self.schemes)}.")
-        if self.restitution is not None and self.scheme == "stepping":
-            raise InputError("SetValued: scheme = 'stepping' has no rigid stops; use 'events', or "
-                             "leave restitution out.")
         if self.static_coefficient is not None:
             values = as_floats(self.static_coefficient, "SetValued: static_coefficient")
             if values.ndim > 1 or not (np.isfinite(values).all() and (values >= 0.0).all()):
@@ -208,9 +206,7 @@ class SetValued(Solver):
         """See :meth:`Solver.run`; InputError for a system that it cannot run."""
         from fecontact.integrate.nonsmooth.driver import integrate_set_valued
         from fecontact.integrate.reference.scipy import longest_step
-        from fecontact.system.model_limits import require_plane
 
-        require_plane(task.system, "SetValued")
         found = integrate_set_valued(
             task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
             impact_law=self.impact_law, tangential_restitution=self.tangential_restitution,

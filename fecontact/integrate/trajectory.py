@@ -138,7 +138,7 @@ class Solution:
         is lost in stick, by the creep of smoothed friction [J].
     normal_force, friction_force : (N, n) arrays or None
         F and R of each node [N] if they do not follow from the state, as in set-valued contact;
-        F without the impulses of rigid stops.
+        F without the impulses of rigid stops. In space R is (N, n, 2), along both tangents.
     events : Events or None
         Located events in chronological order.
     """
@@ -179,8 +179,8 @@ class Trajectory(ContactQuantities, Summarised):
         Energy lost by friction at each node, and the part of it in stick [J], if the integrator
         stores them; see :attr:`friction_work` and :attr:`creep_work`.
     held_normal_force, held_friction_force : (N, n) arrays or None
-        Forces of set-valued contact [N], which do not follow from the state; None if laws give the
-        forces.
+        Forces of set-valued contact [N], which do not follow from the state; friction of solids
+        is (N, n, 2). None if laws give the forces.
     events : Events or None
         Located events in chronological order; None if none were requested.
     """

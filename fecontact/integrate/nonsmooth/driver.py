@@ -59,7 +59,8 @@ def integrate_set_valued(
         R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
 
     with the normal force F_j of the normal law, slip velocity v_j and the coefficient mu of the
-    friction law, unsmoothed.
+    friction law, unsmoothed. In space R_j and v_j are vectors along the tangents, and R_j acts
+    along v_j.
 
     Parameters
     ----------
@@ -73,7 +74,8 @@ def integrate_set_valued(
         Relative tolerance.
     scheme : 'auto', 'events' or 'stepping'
         From event to event with steps of order 8: for nodes whose slip velocities, equal ones
-        counted once, are independent. Or by implicit steps of order 3, for any number of nodes.
+        counted once, are independent. Or by implicit steps of order 3, for any number of nodes and
+        for solids.
     restitution : float, optional
         Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and a coefficient
         e from 0 to 1 gives their rebound. Penetration at the start is taken away. Friction has to
@@ -116,29 +118,35 @@ def integrate_set_valued(
                                poisson=int(impact_law == "poisson"))
     scheme = _chosen(problem, scheme)
     begin = clock.perf_counter()
-    n, m = system.basis.contact_nodes, system.basis.modes
+    n, m, solid = system.basis.contact_nodes, system.basis.modes, system.basis.dimension == 3
     course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
         np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
         _floor(system, state, times, longest), rtol, longest)
     output = kinds.Output(times, np.empty((len(times), len(course.state))),
-                          np.empty((len(times), n)), np.empty((len(times), n)))
+                          np.empty((len(times), len(course.carried))), np.empty((len(times), n)))
     workspace = kinds.workspace_for(problem)
     run: Callable[..., int]
     found = _Found(system, events)
-    if scheme == "events":
+    if solid and restitution is not None:
+        from fecontact.integrate.nonsmooth.impact_steps import run_impact_steps
+        from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
+        _require_no_events(events)
+        run = partial(run_impact_steps, problem, limits, course, output,
+                      impact_room_for(problem))
+    elif scheme == "events":
         from fecontact.integrate.nonsmooth.event_driven import run_events
         from fecontact.integrate.nonsmooth.event_search import room_for
         run = partial(run_events, problem, limits, course, output, workspace,
                       room_for(problem, len(course.state)), found.watch)
     else:
-        from fecontact.integrate.nonsmooth.time_stepping import room_for as stepping_room
+        from fecontact.integrate.nonsmooth.space_contact import in_space
+        from fecontact.integrate.nonsmooth.stepping_room import IN_PLANE
+        from fecontact.integrate.nonsmooth.stepping_room import room_for as stepping_room
         from fecontact.integrate.nonsmooth.time_stepping import run_steps
-        if events:
-            raise InputError("SetValued: scheme = 'stepping', which this system needs, locates no "
-                             "events; leave them out, or use fewer contact nodes.")
+        _require_no_events(events)
         run = partial(run_steps, problem, limits, course, output, workspace,
-                      stepping_room(problem))
+                      stepping_room(problem, in_space() if solid else IN_PLANE))
     counts, reached = course.counts, course.clock
     outcome, ended = kinds.GOING_ON, Status.FINISHED
     try:
@@ -166,10 +174,18 @@ def integrate_set_valued(
         time, states = np.append(time, last), np.vstack([states, Y])
         friction = np.vstack([friction, friction[-1:]])
         normal = np.vstack([normal, normal[-1:]])
+    if solid:
+        friction = np.stack([friction[:, :n], friction[:, n:]], axis=-1)
     end = 2 * m + POWER_COUNT
     return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
                     statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
                     friction_force=friction, events=found.events)
+
+
+def _require_no_events(events: Sequence[AnyEvent]) -> None:
+    if events:
+        raise InputError("SetValued: scheme = 'stepping', which this system needs, locates no "
+                         "events; leave them out, or use fewer contact nodes.")
 
 
 class _Found:
@@ -209,7 +225,10 @@ def _problem(
     width = max(table.shape[1] for table in tables)
     arrays = system.arrays._replace(friction_parameters=np.vstack(
         [np.pad(table, ((0, 0), (0, width - table.shape[1]))) for table in tables]))
-    cluster, rows = _clusters(arrays.Tx, arrays.sliding)
+    if system.basis.dimension == 3:
+        cluster, rows = np.arange(n), arrays.Tx
+    else:
+        cluster, rows = _clusters(arrays.Tx, arrays.sliding)
     sliding = np.zeros(len(rows))
     sliding[cluster] = arrays.sliding
     ground = system.ground
@@ -228,7 +247,8 @@ def _problem(
     if restitution is not None:
         rough = _rough_nodes(groups, problem.static)
         rubbing &= np.array([rough[cluster == c].any() for c in range(len(rows))])
-        _require_independence(arrays.Ty, rows[rubbing])
+        if system.basis.dimension == 2:
+            _require_independence(arrays.Ty, rows[rubbing])
     return problem, rubbing
 
 
@@ -297,7 +317,18 @@ def _require_independence(Ty: Array, rows: Array) -> None:
 
 
 def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
+    if len(problem.system.T2):
+        if problem.poisson:
+            raise InputError("SetValued: impact_law = 'poisson' is for plane bodies, but this "
+                             "system has contact in space; use impact_law = 'newton'.")
+        if scheme == "events":
+            raise InputError("SetValued: scheme = 'events' is for plane bodies, but this system "
+                             "has contact in space; use scheme = 'stepping', its default.")
+        return "stepping"
     if problem.restitution >= 0.0:
+        if scheme == "stepping":
+            raise InputError("SetValued: scheme = 'stepping' has no rigid stops for plane bodies; "
+                             "use 'events', or leave restitution out.")
         return "events"
     moving = problem.rows[np.any(problem.rows != 0.0, axis=1)]
     scale = np.abs(moving).max(initial=0.0)
@@ -314,7 +345,7 @@ def _floor(system: ContactSystem, state: Array, times: Array, longest: float) ->
     """Values (2 m + p + n,) below which the error is not measured relative to the state."""
     m, n = system.basis.modes, system.basis.contact_nodes
     arrays, drive = system.arrays, system.drive
-    largest = np.abs(system.basis.T[:, :2]).max(axis=(0, 1))
+    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
     depth = system.penetration_scale
     fastest = system.prescribed_motion.largest_speed(float(times[0]), float(times[-1]))

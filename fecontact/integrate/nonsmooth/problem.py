@@ -15,9 +15,10 @@ from fecontact.system.powers import POWER_COUNT
 # curve of the coefficient has not begun to change.
 STEEP, CREEP = 1e36, 1e-18
 
-# Columns of `Workspace.nodes`.
-NODE_COLUMNS = 9
-FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT, GRIP = range(NODE_COLUMNS)
+# Columns of `Workspace.nodes`; the last two in space only.
+NODE_COLUMNS, SPACE_NODE_COLUMNS = 9, 11
+(FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT, GRIP, SLIP_ACROSS,
+ SLOPE_ACROSS) = range(SPACE_NODE_COLUMNS)
 
 # Status of a cluster; a slipping one has the sign of its slip velocity, +1 or -1.
 OPEN, STICK, FIXED = 0, 2, 3
@@ -92,7 +93,7 @@ class Progress(NamedTuple):
 
     ``state`` is Y; ``status`` (k,) is that of the clusters, ``closed`` (n,) tells the closed
     stops; ``largest`` (3,) are the largest sizes so far, and ``carried`` (n,) the friction forces
-    of implicit steps.
+    of implicit steps, in space (2 n,) along the first tangents and then along the second ones.
     """
 
     clock: Array
@@ -109,7 +110,10 @@ PROGRESS = types.NamedTuple([vector, integers, vector, integers, integers, vecto
 
 
 class Output(NamedTuple):
-    """Output times (N,), and states (N, size), friction and normal forces (N, n) there."""
+    """Output times (N,), and states (N, size), friction and normal forces (N, n) there.
+
+    In space friction (N, 2 n), as in `Progress`.
+    """
 
     times: Array
     states: Array
@@ -150,11 +154,21 @@ WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, ma
                               integers, integers], Workspace)
 
 
+def tangents(problem: NonsmoothProblem) -> int:
+    """How many tangents a node has."""
+    return 2 if len(problem.system.T2) else 1
+
+
+def node_columns(problem: NonsmoothProblem) -> int:
+    """How many columns `Workspace.nodes` has."""
+    return SPACE_NODE_COLUMNS if len(problem.system.T2) else NODE_COLUMNS
+
+
 def workspace_for(problem: NonsmoothProblem) -> Workspace:
     """Room for a problem."""
     n, k = len(problem.cluster), len(problem.rows)
     size = n + k
-    return Workspace(np.zeros((n, NODE_COLUMNS)), np.zeros(n), np.zeros(k), np.zeros(k),
+    return Workspace(np.zeros((n, node_columns(problem))), np.zeros(n), np.zeros(k), np.zeros(k),
                      np.zeros(k), np.zeros(k), np.zeros((size, size)), np.zeros(size),
                      np.zeros(size, np.int64), np.zeros(size, np.int64))
 
@@ -168,4 +182,4 @@ def progress_for(
     return Progress(
         np.array([time, length]), np.zeros(COUNTS, dtype=np.int64),
         np.concatenate([state, np.zeros(POWER_COUNT + n)]), status,
-        np.zeros(n, dtype=np.int64), np.zeros(SIZES), np.zeros(n))
+        np.zeros(n, dtype=np.int64), np.zeros(SIZES), np.zeros(n * tangents(problem)))

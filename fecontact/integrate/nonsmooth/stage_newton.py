@@ -10,6 +10,8 @@ until nothing creeps (augmented Lagrangian). Nodes whose stick the others bring 
 no trouble: the equations for V stay regular, and only the way in which such nodes share a force
 remains open; each keeps what it carried when it came to rest, as far as its limit allows.
 
+In space R_j and v_j are vectors, see :mod:`fecontact.integrate.nonsmooth.space_contact`.
+
 References
 ----------
 P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like
@@ -22,13 +24,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, helper, matrix, vector
+from fecontact.core.compiled import block, f8, function_at, helper, i8, matrix, vector
+from fecontact.core.references import Reference
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
-from fecontact.integrate.nonsmooth.problem import CREEP
+from fecontact.integrate.nonsmooth.problem import CREEP, PROBLEM
 from fecontact.laws.signatures import friction_at
 from fecontact.system.kernels import normal_gradients
-from fecontact.system.nodes import leaning, node_contact, node_motion
+from fecontact.system.nodes import GROUND_MOTION, in_space, leaning, node_contact, node_motion
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
@@ -53,27 +56,34 @@ class Stage(NamedTuple):
     Y: Array
 
 
+STAGE = types.NamedTuple([f8, f8, vector, vector, vector], Stage)
+
+
 class Hold(NamedTuple):
     """What holds the nodes (n,) in stick.
 
     ``grip`` is r, ``multiplier`` is lambda, and ``side`` the sign of the slip of each node at the
-    last evaluation, zero for stick.
+    last evaluation, zero for stick. In space the last two are vectors (2 n,), of all first and then
+    of all second components, the latter of length one in slip, and ``linearise`` is the address of
+    :data:`fecontact.integrate.nonsmooth.space_contact.linearise_in_space`.
     """
 
     grip: Array
     multiplier: Array
     side: Array
+    linearise: int
 
 
-HOLD = types.NamedUniTuple(vector, 3, Hold)
+HOLD = types.NamedTuple([vector, vector, vector, i8], Hold)
 
 
 class NewtonRoom(NamedTuple):
     """Room for Newton's method.
 
     Rows ``active`` (2, n, m), Tx and Ty, of the nodes under force, and their ``gradients``
-    (2, n, m), dR/dV and -dF/dV; ``partial`` (3, 4) of one node; ``linear`` (m, m) is
-    1 + g C + g^2 K, ``matrix`` the whole matrix; ``balance`` and ``residual`` (m,).
+    (2, n, m), dR/dV and -dF/dV; in space (3, n, m), with T2 and friction across at the end;
+    ``partial`` (3, 4) of one node; ``linear`` (m, m) is 1 + g C + g^2 K, ``matrix`` the whole
+    matrix; ``balance`` and ``residual`` (m,).
     """
 
     gradients: Array
@@ -88,12 +98,18 @@ class NewtonRoom(NamedTuple):
 NEWTON_ROOM = types.NamedTuple([block] * 2 + [matrix] * 3 + [vector] * 2, NewtonRoom)
 
 
-def newton_room_for(nodes: int, modes: int) -> NewtonRoom:
+# What evaluates the contact of a stage in space: number of nodes under force and creep velocity.
+LINEARISE = types.UniTuple(f8, 2)(STAGE, GROUND_MOTION, Reference(PROBLEM), Reference(HOLD), i8,
+                                  Reference(NEWTON_ROOM), vector)
+_linearise_at = function_at(LINEARISE)
+
+
+def newton_room_for(nodes: int, modes: int, tangents: int = 1) -> NewtonRoom:
     """Room for so many nodes and modes."""
     linear, whole = np.zeros((2, modes, modes))
     balance, residual = np.zeros((2, modes))
-    return NewtonRoom(np.zeros((2, nodes, modes)), np.zeros((2, nodes, modes)), np.zeros((3, 4)),
-                      linear, whole, balance, residual)
+    gradients, active = np.zeros((2, 1 + tangents, nodes, modes))
+    return NewtonRoom(gradients, active, np.zeros((3, 4)), linear, whole, balance, residual)
 
 
 @helper
@@ -160,7 +176,11 @@ def _evaluate(stage, p, hold, turning, room, force):
     for i in range(m):
         Y[i] = stage.start[i] + stage.g * Y[m + i]
     moved = free_acceleration(stage.t, Y, p.system, room.balance)
-    count, creep = _linearise(stage, moved, p, hold, turning, room, force)
+    if in_space(p.system):
+        found, creep = _linearise_at(hold.linearise)(stage, moved, p, hold, turning, room, force)
+        count = int(found)
+    else:
+        count, creep = _linearise(stage, moved, p, hold, turning, room, force)
     for i in range(m):
         room.residual[i] = stage.known[i] + stage.g * room.balance[i] - Y[m + i]
     return count, creep
@@ -206,6 +226,9 @@ def solve_stage(stage, p, hold, limits, finest, room, force):
             Tx, Ty = room.active[0, :count].T, room.active[1, :count].T
             whole += stage.g * (np.dot(Tx, room.gradients[0, :count])
                                 + np.dot(Ty, room.gradients[1, :count]))
+            if in_space(p.system):
+                T2 = room.active[2, :count].T
+                whole += stage.g * np.dot(T2, room.gradients[2, :count])
         for i in range(m):
             if not math.isfinite(room.residual[i]):
                 return False

@@ -10,15 +10,13 @@ Numerical Analysis 14 (1977).
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import function_at, helper, i8, kernel
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array
-from fecontact.integrate.bernstein import DEPTH, NOWHERE, first_below, fit
+from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
 from fecontact.integrate.nonsmooth.event_search import ROUGHLY, UNFELT, first_pressed, pressed
 from fecontact.integrate.nonsmooth.problem import (
@@ -29,7 +27,6 @@ from fecontact.integrate.nonsmooth.problem import (
     LENGTH,
     LIMIT,
     LIMITS,
-    NODE_COLUMNS,
     OUTPUT,
     OUTPUTS,
     PENETRATION,
@@ -38,28 +35,29 @@ from fecontact.integrate.nonsmooth.problem import (
     RATE,
     REJECTED,
     SLIP,
+    SLIP_ACROSS,
     SLIP_SIZE,
     STARTED,
     STEPS,
     STUCK,
     TIME,
     WORKSPACE,
-    NonsmoothProblem,
     Step,
 )
-from fecontact.integrate.nonsmooth.stage_newton import (
-    GRIP,
-    HOLD,
-    NEWTON_ROOM,
-    ROUNDING,
-    Hold,
-    NewtonRoom,
-    Stage,
-    newton_room_for,
-    solve_stage,
+from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
+from fecontact.integrate.nonsmooth.stepping_room import (
+    OBSERVE,
+    POWERS,
+    ROOM,
+    SLIPS_BACK,
+    STAGES,
+    THIRDS,
 )
-from fecontact.system.nodes import ground_motion
-from fecontact.system.powers import DRIVE, POWER_COUNT, body_powers, drive_jump
+from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
+from fecontact.system.powers import DRIVE, body_powers, drive_jump
+
+_observe_at, _powers_at = function_at(OBSERVE), function_at(POWERS)
+_slips_back_at = function_at(SLIPS_BACK)
 
 GAMMA = 0.43586652150845899942
 A21 = 0.5 * (1.0 - GAMMA)
@@ -68,65 +66,29 @@ B2 = 0.25 * (6.0 * GAMMA**2 - 20.0 * GAMMA + 5.0)
 ERROR_1 = B1 - GAMMA / (1.0 - GAMMA)
 ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
 NODES = (GAMMA, GAMMA + A21, 1.0)
-STAGES = len(NODES)
-_THIRDS = fit(np.arange(4) / 3.0)
 # A step is cut so often at most before what is left counts as error.
 CUTS = 3
 
 
-class Room(NamedTuple):
-    """Room for implicit steps.
-
-    Attributes
-    ----------
-    newton, hold : NewtonRoom, Hold
-        Those of the stages.
-    states, accelerations, forces, rates : (3, 2 m), (3, m), (3, n), (3, p + n) arrays
-        Of the stages: Y, q'', friction forces and powers.
-    start, known : (m,) arrays
-        Places and velocities that a stage adds to.
-    new, before, after : (size,), (m + p + n,), (m + p + n,) arrays
-        Y at the end of the step; accelerations and powers at both ends.
-    old : (n, NODE_COLUMNS) array
-        What `observe` says of the begin.
-    inertia : (n,) array
-        Tx Tx^T of each node.
-    cubic, speed, halves : (4,), (4,), (DEPTH, 5) arrays
-        Polynomials over the step, and parts of it.
-    """
-
-    newton: NewtonRoom
-    hold: Hold
-    states: Array
-    accelerations: Array
-    forces: Array
-    rates: Array
-    start: Array
-    known: Array
-    new: Array
-    before: Array
-    after: Array
-    old: Array
-    inertia: Array
-    cubic: Array
-    speed: Array
-    halves: Array
+@helper
+def _observe(moved, Y, p, nodes, room):
+    if in_space(p.system):
+        _observe_at(room.space.observe)(moved, Y, p, nodes)
+    else:
+        observe(moved, Y, p, nodes)
 
 
-ROOM = types.NamedTuple(
-    [NEWTON_ROOM, HOLD] + [matrix] * 4 + [vector] * 5 + [matrix] + [vector] * 3 + [matrix], Room)
-
-
-def room_for(problem: NonsmoothProblem) -> Room:
-    """Room for a problem."""
-    n, m = problem.system.Tx.shape
-    size = m + POWER_COUNT + n
-    start, known = np.zeros((2, m))
-    before, after = np.zeros((2, size))
-    return Room(newton_room_for(n, m), Hold(*np.zeros((3, n))), np.zeros((STAGES, 2 * m)),
-                np.zeros((STAGES, m)), np.zeros((STAGES, n)), np.zeros((STAGES, size - m)),
-                start, known, np.zeros(m + size), before, after, np.zeros((n, NODE_COLUMNS)),
-                np.zeros(n), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))
+@helper
+def _fastest_side(moved, p):
+    """Largest speed of what slides under the nodes."""
+    s = p.system
+    if not in_space(s):
+        return np.abs(p.sliding).max() * abs(moved.speed)
+    fastest = 0.0
+    for j in range(len(s.gap)):
+        fastest = max(fastest, math.hypot(moved_along(j, moved.speed, moved.second_speed, s),
+                                          moved_across(j, moved.speed, moved.second_speed, s)))
+    return fastest
 
 
 @helper
@@ -179,11 +141,15 @@ def _passed_over(step, p, limits, tolerance, w, room):
     for i in range(4):
         room.speed[i] = 0.0
         for k in range(4):
-            room.speed[i] += _THIRDS[i, k] * ground_motion(step.t + step.h * k / 3.0,
+            room.speed[i] += THIRDS[i, k] * ground_motion(step.t + step.h * k / 3.0,
                                                            p.system).speed
     shorter = 1.0
     for j in range(len(room.old)):
-        shorter = min(shorter, _slips_back(j, step.h, p, w, tolerance, room))
+        if in_space(p.system):
+            back = _slips_back_at(room.space.slips_back)(j, step, p, w, tolerance, room)
+        else:
+            back = _slips_back(j, step.h, p, w, tolerance, room)
+        shorter = min(shorter, back)
         shorter = min(shorter, _touches(j, step.h, p, w, limits, room))
     return shorter
 
@@ -205,7 +171,7 @@ def _write_row(row, t, h, p, progress, output, w, room):
     for i in range(2 * m, len(Y)):
         states[row, i] = (early * ((1.0 + 2.0 * x) * Y[i] + x * h * before[i - m])
                           + late * ((3.0 - 2.0 * x) * new[i] + (x - 1.0) * h * after[i - m]))
-    observe(ground_motion(time, p.system), states[row], p, w.nodes)
+    _observe(ground_motion(time, p.system), states[row], p, w.nodes, room)
     output.normal[row] = w.nodes[:, FORCE]
     for j in range(len(progress.carried)):
         output.friction[row, j] = ((1.0 - x) * progress.carried[j]
@@ -223,6 +189,12 @@ def _set_inertia(p, limits, room):
         for i in range(m):
             room.inertia[j] += s.Tx[j, i] * s.Tx[j, i]
             part = max(part, abs(s.Tx[j, i]) * limits.floor[m + i])
+        if in_space(s):
+            across = 0.0
+            for i in range(m):
+                across += s.T2[j, i] * s.T2[j, i]
+                part = max(part, abs(s.T2[j, i]) * limits.floor[m + i])
+            room.inertia[j] = max(room.inertia[j], across)
         slowest = max(slowest, part)
     return slowest
 
@@ -243,7 +215,7 @@ def _prepare(step, quick, p, progress, w, room):
         if w.nodes[j, LIMIT] > 0.0:
             softest += ROUNDING * quick / w.nodes[j, LIMIT]
         hold.grip[j] = 1.0 / softest if inertia[j] > 0.0 else 0.0
-        hold.multiplier[j] = progress.carried[j]
+    hold.multiplier[:] = progress.carried
 
 
 @helper
@@ -302,9 +274,12 @@ def _set_rates(step, p, w, room):
     for k in range(STAGES):
         moment = min(step.t + NODES[k] * step.h, step.latest)
         moved = ground_motion(moment, p.system)
-        observe(moved, room.states[k], p, w.nodes)
+        _observe(moved, room.states[k], p, w.nodes, room)
         body_powers(moment, room.states[k], p.system, room.rates[k])
-        contact_powers(moved, p.system, w.nodes, room.forces[k], True, room.rates[k])
+        if in_space(p.system):
+            _powers_at(room.space.powers)(moved, p, w.nodes, room.forces[k], room.rates[k])
+        else:
+            contact_powers(moved, p.system, w.nodes, room.forces[k], True, room.rates[k])
 
 
 @helper
@@ -335,7 +310,7 @@ def _accept(step, reached, p, progress, output, w, room):
 
 
 @helper
-def _pass_break(step, t, p, progress, output):
+def pass_break(step, t, p, progress, output):
     """Add the work that the drive puts in where its motions jump, at the time t."""
     first = 2 * p.system.Tx.shape[1]
     work = drive_jump(step.latest, t, progress.state, p.system)
@@ -374,11 +349,14 @@ def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room
         step = Step(t, length, np.nextafter(goal, t))
         counts[STEPS] += 1
         moved = ground_motion(t, p.system)
-        observe(moved, Y, p, w.nodes)
+        _observe(moved, Y, p, w.nodes, room)
         room.old[:] = w.nodes
-        quick = largest[SLIP_SIZE] + np.abs(p.sliding).max() * abs(moved.speed)
+        quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
         _prepare(step, quick, p, progress, w, room)
         finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
+        if in_space(p.system):
+            # Athwart a fast belt slip velocities are small, and their errors count.
+            finest *= 0.01
         solved = _solve_stages(step, finest, p, limits, progress, room)
         if solved < STAGES:
             counts[REJECTED] += 1
@@ -410,7 +388,10 @@ def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room
                 h = part * length
                 continue
         for j in range(n):
-            largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.nodes[j, SLIP]))
+            slip = abs(w.nodes[j, SLIP])
+            if in_space(p.system):
+                slip = math.hypot(slip, w.nodes[j, SLIP_ACROSS])
+            largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
         _set_end(length, m, progress, room)
         t = goal if reaching else t + length
         _accept(step, t, p, progress, output, w, room)
@@ -418,7 +399,7 @@ def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room
         if reaching and stop < len(limits.stops) and goal == limits.stops[stop]:
             stop += 1
             known_before = False
-            _pass_break(step, t, p, progress, output)
+            pass_break(step, t, p, progress, output)
         in_a_row, cuts = 0, 0
         h = length * min(8.0, max(0.3, 0.9 * max(worst, 1e-12) ** (-1.0 / 3.0)))
     clock[TIME], clock[LENGTH] = t, h

@@ -185,7 +185,10 @@ def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
     state: dict[str, Any] = {"time": time}
     for name in (*_STATE, *_OPTIONAL):
         if name != "time" and (name in _STATE or name in stored):
-            state[name] = array(stored, name, (N, widths.get(name, n)))
+            shape: tuple[int | None, ...] = (N, widths.get(name, n))
+            if name == "held_friction_force" and basis.dimension == 3:
+                shape = (N, n, 2)
+            state[name] = array(stored, name, shape)
     if "events" in stored:
         events = member(stored, "events")
         times = array(events, "time", (None,))

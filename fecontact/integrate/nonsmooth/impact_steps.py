@@ -1,0 +1,367 @@
+r"""Compiled run of solids at rigid stops with friction, by steps of impulses (Moreau and Jean).
+
+Over a step of length h the modal velocities v change by the forces at its middle and by normal
+impulses L_j and tangential ones P_j of the nodes that touch there,
+
+.. math::
+
+    v^+ - v = h\,(f - K (q + \tfrac{h}{4} (v + v^+) ) - \tfrac12 C (v + v^+)) + G L - T^T P,
+    \qquad q^+ = q + \tfrac{h}{2} (v + v^+)
+
+with, for penetration rates u' and slip velocities s,
+
+.. math::
+
+    0 \le L_j \perp -(u_j'^+ + e \max(u_j'^-, 0)) \ge 0, \qquad
+    P_j \in \mu_j L_j\, e(s_j^+ + \kappa s_j^-)
+
+where e(.) is the unit direction, and the whole disc at zero. In a step with an impact kappa is
+e_T; else it is 1 at nodes that slip on in about their direction, which makes the path of second
+order, and 0 at others. Closed contacts beside the one that is struck take part, and nodes need not
+be independent: what counts are the velocities. The impulses of all nodes are found by projected
+Gauss-Seidel sweeps; at unilateral contact without friction these minimise the kinetic energy.
+
+A step is compared with two of half its length, which are kept: to the tolerance in its places, and
+without impact in its velocities too; nor may a node come deeper into the ground. Across impacts and
+transitions the scheme is of first order. Nodes that touch are put back on the ground after each
+step.
+
+References
+----------
+J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM Courses and
+Lectures 302 (1988). M. Jean, The non-smooth contact dynamics method, Computer Methods in Applied
+Mechanics and Engineering 177 (1999).
+"""
+
+import math
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import helper, i8, kernel, routine
+from fecontact.core.dense_lu import solve
+from fecontact.core.references import borrowed
+from fecontact.integrate.nonsmooth.equations import stick_limit
+from fecontact.integrate.nonsmooth.problem import (
+    CREEP,
+    DIVERGED,
+    FINISHED,
+    GAINED,
+    GOING_ON,
+    IMPACTS,
+    LENGTH,
+    LIMITS,
+    OUTPUT,
+    OUTPUTS,
+    PROBLEM,
+    PROGRESS,
+    REJECTED,
+    STARTED,
+    STEPS,
+    STUCK,
+    TIME,
+    UNSOLVED,
+    Step,
+)
+from fecontact.integrate.nonsmooth.space_contact import contact_of, scale_of
+from fecontact.integrate.nonsmooth.space_impulses import (
+    IMPACT_ROOM,
+    find_impulses,
+    put_on_ground,
+    set_matrix,
+    set_pushes,
+    set_rows,
+)
+from fecontact.integrate.nonsmooth.time_stepping import pass_break
+from fecontact.laws.signatures import friction_at
+from fecontact.system.kernels import body_acceleration, given_at
+from fecontact.system.nodes import ground_motion, moved_across, moved_along
+from fecontact.system.powers import (
+    BELT_FRICTION,
+    BELT_NORMAL,
+    CONTACT_DAMPING,
+    FRICTION,
+    POWER_COUNT,
+    belt_normal_power,
+    body_powers,
+)
+
+# Velocities below this part of the largest are no approach, and no slip.
+_STILL = 1e-9
+# Energy gained by impacts that is rounding.
+_GAIN = 1e-10
+# How often the impulses of a step are found anew with coefficients of its middle.
+_PASSES = 4
+
+
+@helper
+def _coefficient(j, slip, grip, p):
+    """Coefficient of friction of node j at a slip velocity."""
+    s = p.system
+    return friction_at(s.friction[j])(max(slip, CREEP), grip, s.friction_parameters[j])[0]
+
+
+@helper
+def _look_again(n, p, room):
+    """Set weights and coefficients of a step without impact anew; whether they have changed."""
+    changed = False
+    for j in range(n):
+        if not room.touching[j]:
+            continue
+        a, b = n + j, 2 * n + j
+        went = room.before[a] * room.before[a] + room.before[b] * room.before[b]
+        on = room.before[a] * room.after[a] + room.before[b] * room.after[b] > 0.25 * went
+        if room.weights[j] != 0.0 and not on:
+            room.weights[j] = 0.0
+            changed = True
+        slip = 0.5 * math.hypot(room.before[a] + room.after[a], room.before[b] + room.after[b])
+        fresh = _coefficient(j, slip, room.grip[j], p)
+        changed = changed or abs(fresh - room.slipping[j]) > 1e-12 * fresh
+        room.slipping[j] = fresh
+        room.sticking[j] = max(room.sticking[j], fresh)
+    return changed
+
+
+@routine
+def _observe_nodes(t, Y, closed, quick, p, room):
+    """Fill rows, coefficients and [-u', s] of the nodes that touch in the middle of a step.
+
+    For the places in ``room.middle`` and the velocities of Y; whether a node is struck.
+    """
+    s, middle, sides = p.system, room.middle, room.sides
+    n, m = s.Tx.shape
+    moved = ground_motion(t, s)
+    struck = False
+    for j in range(n):
+        contact = contact_of(j, middle, moved, s)
+        room.touching[j] = 1 if closed[j] or contact.penetration >= 0.0 else 0
+        if not room.touching[j]:
+            continue
+        set_rows(j, contact, p, room)
+        room.slopes[j], room.slopes[n + j] = contact.slope, contact.slope_across
+        sides[j] = moved_along(j, moved.speed, moved.second_speed, s)
+        sides[n + j] = moved_across(j, moved.speed, moved.second_speed, s)
+        lifted = contact.slope * sides[j] + contact.slope_across * sides[n + j]
+        for place, own in ((j, lifted), (n + j, -sides[j]), (2 * n + j, -sides[n + j])):
+            free, now = own, own
+            for i in range(m):
+                free += room.rows[place, i] * room.change[i]
+                now += room.rows[place, i] * Y[m + i]
+            room.given[place], room.before[place] = free, now
+        struck = struck or (not closed[j] and -room.before[j] > _STILL * quick)
+        slip = math.hypot(room.before[n + j], room.before[2 * n + j])
+        room.grip[j] = scale_of(j, contact, s)[0]
+        room.slipping[j] = _coefficient(j, slip, room.grip[j], p)
+        room.sticking[j] = max(stick_limit(j, room.grip[j], p), room.slipping[j])
+        room.weights[j] = 1.0 if slip > _STILL * quick else 0.0
+    if struck:
+        room.weights[:] = p.tangential
+    return struck
+
+
+@routine
+def _add_powers(t, h, Y, out, p, room):
+    """Put the work of a step into ``out``; returns what the impulses took."""
+    s, rates, middle = p.system, room.rates, room.middle
+    n, m = s.Tx.shape
+    for i in range(2 * m):
+        middle[i] = 0.5 * (Y[i] + out[i])
+    rates[:] = 0.0
+    body_powers(t, middle, s, rates)
+    taken = 0.0
+    for j in range(n):
+        if not room.touching[j]:
+            continue
+        L, rubbed = room.impulses[j] / h, 0.0
+        for k in range(2):
+            a = (1 + k) * n + j
+            slip, speed = 0.5 * (room.before[a] + room.after[a]), room.sides[k * n + j]
+            rates[BELT_NORMAL] += belt_normal_power(L, room.slopes[k * n + j], slip, speed, s)
+            rates[BELT_FRICTION] -= room.impulses[a] / h * speed
+            rubbed += room.impulses[a] / h * slip
+        lost = -0.5 * L * (room.before[j] + room.after[j])
+        rates[CONTACT_DAMPING] += lost
+        rates[FRICTION] += rubbed
+        rates[POWER_COUNT + j] += rubbed
+        taken += h * (lost + rubbed)
+    for i in range(len(rates)):
+        out[2 * m + i] = Y[2 * m + i] + h * rates[i]
+    return taken
+
+
+@routine
+def _go(t, h, latest, Y, closed, which, quick, p, room, out):
+    """One step of impulses from Y to ``out``; 0, 1 with an impact, 2 if that gained energy, or -1.
+
+    ``which`` is the row of forces and closed contacts that it fills; -1 where no impulses were
+    found.
+    """
+    s, middle, change = p.system, room.middle, room.change
+    n, m = s.Tx.shape
+    at = min(t + 0.5 * h, latest)
+    for i in range(m):
+        middle[i] = Y[i] + 0.5 * h * Y[m + i]
+        middle[m + i] = Y[m + i]
+    given_at(at, s, change)
+    body_acceleration(change, middle, s, change)
+    set_matrix(h, p, room)
+    solve(room.matrix, room.pivots, change)
+    for i in range(m):
+        change[i] = Y[m + i] + h * change[i]
+    struck = _observe_nodes(at, Y, closed, quick, p, room)
+    room.impulses[:] = 0.0
+    if room.touching.any():
+        set_pushes(p, room)
+        if not find_impulses(p.restitution, n, room):
+            return -1
+        for _ in range(_PASSES):
+            if struck or not _look_again(n, p, room):
+                break
+            if not find_impulses(p.restitution, n, room):
+                return -1
+    for a in range(3 * n):
+        if room.touching[a % n]:
+            for i in range(m):
+                change[i] += room.impulses[a] * room.pushes[a, i]
+        # Impulses of impacts are no forces.
+        room.forces[which, a] = 0.0 if struck else room.impulses[a] / h
+    for j in range(n):
+        room.closed[which, j] = 1 if room.touching[j] and room.impulses[j] > 0.0 else 0
+    energy = 0.0
+    for i in range(m):
+        out[i], out[m + i] = Y[i] + 0.5 * h * (Y[m + i] + change[i]), change[i]
+        energy += 0.5 * change[i] * change[i]
+    taken = _add_powers(at, h, Y, out, p, room)
+    return (2 if taken < -_GAIN * energy else 1) if struck else 0
+
+
+@helper
+def _error(struck, limits, room):
+    """Difference of a whole step and two halves in units of what is allowed."""
+    m, worst = len(room.change), 0.0
+    for i in range(m if struck else 2 * m):
+        room.largest[i] = max(room.largest[i], abs(room.end[i]))
+        allowed = limits.rtol * (limits.floor[i] + room.largest[i])
+        worst = max(worst, abs(room.whole[i] - room.end[i]) / allowed)
+    return worst
+
+
+@routine
+def _too_deep(t, Y, closed, limits, p, room):
+    """How deep nodes that are open have come into the ground, in units of what is allowed."""
+    s, worst = p.system, 0.0
+    moved = ground_motion(t, s)
+    for j in range(len(closed)):
+        if closed[j]:
+            continue
+        depth = contact_of(j, Y, moved, s).penetration
+        if depth > 0.0:
+            allowed = 0.0
+            for i in range(s.Ty.shape[1]):
+                allowed += abs(s.Ty[j, i]) * limits.rtol * (limits.floor[i] + room.largest[i])
+            worst = max(worst, depth / allowed)
+    return worst
+
+
+@helper
+def _write(upto, t, h, Y, out, which, progress, output, room):
+    """Write the outputs of a step from Y to ``out``; forces are constant in it."""
+    m, n = len(room.change), len(room.grip)
+    counts, times, states = progress.counts, output.times, output.states
+    while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= upto:
+        row = counts[OUTPUTS]
+        part = (times[row] - t) / h
+        for i in range(m):
+            gained = out[m + i] - Y[m + i]
+            states[row, i] = Y[i] + h * part * (Y[m + i] + 0.5 * part * gained)
+            states[row, m + i] = Y[m + i] + part * gained
+        for i in range(2 * m, len(Y)):
+            states[row, i] = Y[i] + part * (out[i] - Y[i])
+        for j in range(n):
+            output.normal[row, j] = room.forces[which, j]
+        for a in range(2 * n):
+            output.friction[row, a] = room.forces[which, n + a]
+        counts[OUTPUTS] += 1
+
+
+@helper
+def _fastest(p, room):
+    """Largest velocity of a node so far."""
+    s = p.system
+    n, m = s.Tx.shape
+    fastest = 0.0
+    for j in range(n):
+        for i in range(m):
+            row = max(abs(s.Tx[j, i]), abs(s.Ty[j, i]), abs(s.T2[j, i]))
+            fastest = max(fastest, row * room.largest[m + i])
+    return fastest
+
+
+@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, IMPACT_ROOM, i8), nogil=True)
+def run_impact_steps(held_p, held_limits, held_progress, held_output, held_room, most):
+    """Go on for at most ``most`` steps, up to the last of the output times; how it ended."""
+    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
+    output, room = borrowed(held_output), borrowed(held_room)
+    Y, counts, clock, closed = progress.state, progress.counts, progress.clock, progress.closed
+    m = p.system.Tx.shape[1]
+    t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
+    tiny = 1e-14 * max(abs(output.times[0]), abs(end), limits.longest)
+    if counts[STARTED] == 0:
+        counts[STARTED] = 1
+        for i in range(2 * m):
+            room.largest[i] = abs(Y[i])
+        put_on_ground(t, Y, closed, p, room)
+    stop = 0
+    while stop < len(limits.stops) and limits.stops[stop] <= t:
+        stop += 1
+    for _ in range(most):
+        if t >= end:
+            break
+        goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
+        length = min(h, limits.longest)
+        reaching = length >= (goal - t) * (1.0 - 1e-10)
+        if reaching:
+            length = goal - t
+        latest = np.nextafter(goal, t)
+        half = 0.5 * length
+        counts[STEPS] += 1
+        quick = _fastest(p, room)
+        whole = _go(t, length, latest, Y, closed, 0, quick, p, room, room.whole)
+        first = _go(t, half, latest, Y, closed, 1, quick, p, room, room.half)
+        second = -1
+        if first >= 0:
+            second = _go(t + half, half, latest, room.half, room.closed[1], 2, quick, p, room,
+                         room.end)
+        if whole < 0 or first < 0 or second < 0:
+            counts[REJECTED] += 1
+            h = 0.25 * length
+            if h < tiny:
+                clock[TIME], clock[LENGTH] = t, h
+                return UNSOLVED
+            continue
+        struck = whole > 0 or first > 0 or second > 0
+        worst = max(_error(struck, limits, room), _too_deep(
+            min(t + length, latest), room.end[: 2 * m], room.closed[2], limits, p, room))
+        if not worst <= 1.0:
+            counts[REJECTED] += 1
+            h = length * max(0.1, 0.8 / math.sqrt(worst)) if worst < math.inf else 0.1 * length
+            if h < tiny:
+                clock[TIME], clock[LENGTH] = t, h
+                return STUCK if math.isfinite(room.end[m]) else DIVERGED
+            continue
+        counts[IMPACTS] += (first > 0) + (second > 0)
+        counts[GAINED] += (first == 2) + (second == 2)
+        reached = goal if reaching else t + length
+        _write(t + half, t, half, Y, room.half, 1, progress, output, room)
+        _write(reached, t + half, reached - (t + half), room.half, room.end, 2, progress, output,
+               room)
+        Y[:] = room.end
+        closed[:] = room.closed[2]
+        put_on_ground(reached, Y, closed, p, room)
+        if reaching and stop < len(limits.stops) and goal == limits.stops[stop]:
+            stop += 1
+            pass_break(Step(t, length, latest), reached, p, progress, output)
+        t = reached
+        h = length * min(4.0, max(0.3, 0.8 / math.sqrt(max(worst, 1e-3))))
+    clock[TIME], clock[LENGTH] = t, h
+    return FINISHED if t >= end else GOING_ON

@@ -1,0 +1,283 @@
+r"""Compiled contact of solids for implicit steps, with friction as a set: a disc in two directions.
+
+Per node, with slip velocity v and friction force R against it, both vectors along the tangents,
+
+    |R| <= mu(0+) F  where v = 0,    R = mu(|v|) F v / |v|  else.
+
+In a stage R is the projection of ``lambda + r v`` on the disc of stick, or beyond it the force of
+slip in its direction e. Once lambda has become R, e is the direction of v. Along a straight path
+all this is what :mod:`fecontact.integrate.nonsmooth.stage_newton` does in the plane.
+
+Plane bodies need none of it; it is called by its address.
+"""
+
+import math
+
+from fecontact.core.compiled import compile_law, helper
+from fecontact.core.references import borrowed
+from fecontact.integrate.bernstein import NOWHERE, first_below
+from fecontact.integrate.nonsmooth.equations import stick_limit
+from fecontact.integrate.nonsmooth.problem import (
+    CREEP,
+    CURVED,
+    FORCE,
+    GRIP,
+    LIMIT,
+    PENETRATION,
+    PRESSING,
+    RATE,
+    SLIP,
+    SLIP_ACROSS,
+    SLOPE,
+    SLOPE_ACROSS,
+)
+from fecontact.integrate.nonsmooth.stage_newton import GRIP as STIFFEST
+from fecontact.integrate.nonsmooth.stage_newton import HESITANT, KEPT, LINEARISE
+from fecontact.integrate.nonsmooth.stepping_room import (
+    OBSERVE,
+    POWERS,
+    SLIPS_BACK,
+    STAGES,
+    THIRDS,
+    InSpace,
+)
+from fecontact.laws.signatures import friction_at, normal_at
+from fecontact.system.nodes import ground_motion, leaning, moved_across, moved_along, node_motion
+from fecontact.system.powers import (
+    BELT_FRICTION,
+    BELT_NORMAL,
+    CONTACT_DAMPING,
+    FRICTION,
+    POWER_COUNT,
+    belt_normal_power,
+)
+from fecontact.system.space_nodes import (
+    ON_GROUND,
+    WAVES_X,
+    WAVES_Y,
+    contact_in_space,
+    laws_of,
+    scale_under,
+)
+
+# Part of the softness against rounding that is enough for a node in space.
+_FINER = 1e-4
+
+
+@helper
+def contact_of(j, Y, moved, s):
+    """Where node j is above the other side, in the state Y."""
+    return contact_in_space(node_motion(j, Y, s), moved, laws_of(j, s), s.sides[j],
+                            s.profile_parameters)
+
+
+@helper
+def scale_of(j, contact, s):
+    """Variation of friction along the ground at node j, and its derivatives along the tangents."""
+    side = s.sides[j]
+    if s.friction_scale == 0 or side[ON_GROUND] == 0.0:
+        return 1.0, 0.0, 0.0
+    a, b = side[WAVES_X], side[WAVES_Y]
+    scale, slope = scale_under(contact, a, b, s.friction_scale, s.friction_scale_parameters)
+    return scale, a * slope, b * slope
+
+
+def _observe(moved, held_Y, p, held_nodes):
+    """Fill ``nodes`` from the positions and velocities in Y."""
+    Y, nodes = borrowed(held_Y), borrowed(held_nodes)
+    s = p.system
+    for j in range(len(nodes)):
+        contact = contact_of(j, Y, moved, s)
+        force = normal_at(s.normal[j])(contact.penetration, contact.rate,
+                                       s.normal_parameters[j])[0]
+        pressing = abs(force) * scale_of(j, contact, s)[0]
+        nodes[j, FORCE], nodes[j, PRESSING] = force, pressing
+        nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
+        nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
+        nodes[j, SLIP], nodes[j, SLIP_ACROSS] = contact.slip, contact.slip_across
+        nodes[j, SLOPE], nodes[j, SLOPE_ACROSS] = contact.slope, contact.slope_across
+        nodes[j, CURVED], nodes[j, GRIP] = 0.0, 0.0
+
+
+def _contact_powers(moved, p, held_nodes, held_friction, held_out):
+    """Add the powers at the nodes to out (p,) and put those of friction behind them (n,)."""
+    nodes, friction, out = borrowed(held_nodes), borrowed(held_friction), borrowed(held_out)
+    s, n = p.system, len(nodes)
+    for j in range(n):
+        force, rubbed = nodes[j, FORCE], 0.0
+        for tangent in range(2):
+            if tangent == 0:
+                speed = moved_along(j, moved.speed, moved.second_speed, s)
+                slope, slip, R = nodes[j, SLOPE], nodes[j, SLIP], friction[j]
+            else:
+                speed = moved_across(j, moved.speed, moved.second_speed, s)
+                slope, slip, R = nodes[j, SLOPE_ACROSS], nodes[j, SLIP_ACROSS], friction[n + j]
+            out[BELT_NORMAL] += belt_normal_power(force, slope, slip, speed, s)
+            out[BELT_FRICTION] -= R * speed
+            rubbed += R * slip
+        # Damping may bring the force to zero while the spring is still compressed.
+        stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
+        out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
+        out[POWER_COUNT + j] = rubbed
+        out[FRICTION] += rubbed
+
+
+def _slips_back(j, step, p, w, tolerance, room):
+    """Part of a step at which node j slips back between ends with slip of one sense; or 1.
+
+    Along the direction of the slip at the begin.
+    """
+    s, b, old, h = p.system, room.cubic, room.old, step.h
+    first = math.hypot(old[j, SLIP], old[j, SLIP_ACROSS])
+    if old[j, FORCE] == 0.0 or w.nodes[j, FORCE] == 0.0 or first <= tolerance:
+        return 1.0
+    e1, e2 = old[j, SLIP] / first, old[j, SLIP_ACROSS] / first
+    last = e1 * w.nodes[j, SLIP] + e2 * w.nodes[j, SLIP_ACROSS]
+    if last <= tolerance:
+        return 1.0
+    speed = room.speed
+    speed[:] = 0.0
+    for k in range(4):
+        moved = ground_motion(step.t + h * k / 3.0, s)
+        side = (e1 * moved_along(j, moved.speed, moved.second_speed, s)
+                + e2 * moved_across(j, moved.speed, moved.second_speed, s))
+        for i in range(4):
+            speed[i] += THIRDS[i, k] * side
+    rise, fall = 0.0, 0.0
+    for i in range(s.Tx.shape[1]):
+        row = e1 * s.Tx[j, i] + e2 * s.T2[j, i]
+        rise += row * room.before[i]
+        fall += row * room.accelerations[STAGES - 1, i]
+    b[0], b[3] = first + speed[0], last + speed[3]
+    b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
+    for i in range(4):
+        b[i] += tolerance - speed[i]
+    back = first_below(b, room.halves)
+    if back == NOWHERE:
+        return 1.0
+    b[0], b[1], b[2], b[3] = b[3], b[2], b[1], b[0]
+    return 0.5 * (back + 1.0 - first_below(b, room.halves))
+
+
+@helper
+def _grip(j, g, hold, s):
+    """What holds node j in stick, stiffer than in the plane where rounding limits it.
+
+    Athwart a fast belt velocities are small, and nodes have to come to rest in shorter steps.
+    """
+    along, across = 0.0, 0.0
+    for i in range(s.Tx.shape[1]):
+        along += s.Tx[j, i] * s.Tx[j, i]
+        across += s.T2[j, i] * s.T2[j, i]
+    if hold.grip[j] == 0.0:
+        return 0.0
+    softest = max(along, across) * g / STIFFEST
+    return 1.0 / (softest + _FINER * max(1.0 / hold.grip[j] - softest, 0.0))
+
+
+def _linearise(held_stage, moved, p, hold, turning, room, held_force):
+    """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
+
+    As in the plane: adds ``Ty F - Tx T - T2 T_across`` to ``room.balance``, fills ``force`` (2 n,)
+    with R, and ``active`` and ``gradients`` (3, n, m) of the room. Returns the number of nodes
+    under force and the largest velocity that there must not be: of a sticking node, or of slip
+    athwart its friction; infinite when a node has changed between stick and slip.
+    """
+    stage, force = borrowed(held_stage), borrowed(held_force)
+    s, g, side = p.system, stage.g, hold.side
+    n, m = s.Tx.shape
+    count, creep = 0, 0.0
+    for j in range(n):
+        force[j], force[n + j] = 0.0, 0.0
+        grip = _grip(j, g, hold, s)
+        contact = contact_of(j, stage.Y, moved, s)
+        F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
+                                             s.normal_parameters[j])
+        if F == 0.0:
+            continue
+        v1, v2, s1, s2 = contact.slip, contact.slip_across, contact.slope, contact.slope_across
+        # Derivatives of F to the velocities along, away and across.
+        F_1 = g * (F_u * s1 + F_v * (contact.curvature * v1 + contact.twist * v2)) + F_v * s1
+        F_y = -g * F_u - F_v
+        F_2 = g * (F_u * s2 + F_v * (contact.twist * v1 + contact.curvature_across * v2)) + F_v * s2
+        sign = 1.0 if F >= 0.0 else -1.0
+        scale, scale_1, scale_2 = scale_of(j, contact, s)
+        pressing = abs(F) * scale
+        limit = stick_limit(j, pressing, p)
+        trial1 = hold.multiplier[j] + grip * v1
+        trial2 = hold.multiplier[n + j] + grip * v2
+        size = math.hypot(trial1, trial2)
+        before1, before2 = side[j], side[n + j]
+        stuck = before1 == 0.0 and before2 == 0.0
+        sticks = size <= limit
+        if turning == KEPT:
+            sticks = stuck
+        elif turning == HESITANT and trial1 * before1 + trial2 * before2 < 0.0:
+            sticks = True
+        if sticks:
+            R1, R2 = trial1, trial2
+            R11, R12, R22, R1y, R2y, R21 = grip, 0.0, grip, 0.0, 0.0, 0.0
+            slip = math.hypot(v1, v2)
+            creep = max(creep, slip) if stuck else math.inf
+            side[j], side[n + j] = 0.0, 0.0
+        else:
+            e1, e2, turn = before1, before2, 0.0
+            if size > 0.0 and (turning != KEPT or trial1 * before1 + trial2 * before2 > 0.0):
+                e1, e2 = trial1 / size, trial2 / size
+                turn = grip / size
+            if before1 * e1 + before2 * e2 <= 0.0:
+                creep = math.inf
+            side[j], side[n + j] = e1, e2
+            slip = e1 * v1 + e2 * v2
+            R, R_v, R_F = friction_at(s.friction[j])(max(slip, CREEP), pressing,
+                                                     s.friction_parameters[j])
+            if slip < 0.0:
+                creep = max(creep, math.hypot(v1, v2))
+                R_v = 0.0
+            # Slip too slow to turn the trial force ends before its direction matters.
+            if grip * slip > limit:
+                creep = max(creep, abs(e1 * v2 - e2 * v1))
+            R1, R2 = R * e1, R * e2
+            # The force of slip turns with the trial force.
+            around = R * turn
+            P_1 = R_F * (sign * scale * F_1 + g * abs(F) * scale_1)
+            P_y = R_F * sign * scale * F_y
+            P_2 = R_F * (sign * scale * F_2 + g * abs(F) * scale_2)
+            R11 = R_v * e1 * e1 + around * e2 * e2 + e1 * P_1
+            R12 = (R_v - around) * e1 * e2 + e1 * P_2
+            R21 = (R_v - around) * e1 * e2 + e2 * P_1
+            R22 = R_v * e2 * e2 + around * e1 * e1 + e2 * P_2
+            R1y, R2y = e1 * P_y, e2 * P_y
+        force[j], force[n + j] = R1, R2
+        T1, T2 = leaning(F, R1, s1, s), leaning(F, R2, s2, s)
+        if s.leans:
+            R11 += s1 * F_1 + g * F * contact.curvature
+            R12 += s1 * F_2 + g * F * contact.twist
+            R21 += s2 * F_1 + g * F * contact.twist
+            R22 += s2 * F_2 + g * F * contact.curvature_across
+            R1y += s1 * F_y
+            R2y += s2 * F_y
+        for i in range(m):
+            tx, ty, t2 = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
+            room.balance[i] += ty * F - tx * T1 - t2 * T2
+            room.active[0, count, i], room.active[1, count, i] = tx, ty
+            room.active[2, count, i] = t2
+            room.gradients[0, count, i] = R11 * tx + R1y * ty + R12 * t2
+            room.gradients[1, count, i] = -F_1 * tx - F_y * ty - F_2 * t2
+            room.gradients[2, count, i] = R21 * tx + R2y * ty + R22 * t2
+        count += 1
+    return float(count), creep
+
+
+observe_in_space = compile_law(OBSERVE, "observe(moved, Y, p, nodes)", _observe)
+powers_in_space = compile_law(POWERS, "powers(moved, p, nodes, friction, out)", _contact_powers)
+slips_back_in_space = compile_law(SLIPS_BACK, "slips_back(j, step, p, w, tolerance, room)",
+                                  _slips_back)
+linearise_in_space = compile_law(
+    LINEARISE, "linearise(stage, moved, p, hold, turning, room, force)", _linearise)
+
+
+def in_space() -> InSpace:
+    """Addresses of these functions."""
+    return InSpace(observe_in_space.address, powers_in_space.address, slips_back_in_space.address,
+                   linearise_in_space.address)

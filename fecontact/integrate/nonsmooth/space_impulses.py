@@ -1,0 +1,276 @@
+r"""Compiled impulses of all touching nodes of solids in one step, and where they are put.
+
+With normal impulses L and tangential ones P, which act against slip, heights above the ground g and
+slip velocities s, primed after the step,
+
+.. math::
+
+    0 \le L_j \perp g_j'^+ - e \max(-g_j'^-, 0) \ge 0, \qquad
+    P_j \in \mu_j L_j\, e(s_j^+ + \kappa_j s_j^-)
+
+The tangential impulse lies in a disc and acts against what it has left of the slip: no other in
+the disc takes more energy. Projected Gauss-Seidel sweeps over the nodes find the impulses; they
+stop where nothing changes. Nodes need not be independent: then the velocities are found, and one
+of the ways in which the nodes share the impulses.
+
+References
+----------
+P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like
+solution methods, Computer Methods in Applied Mechanics and Engineering 92 (1991). M. Jean, The
+non-smooth contact dynamics method, Computer Methods in Applied Mechanics and Engineering 177
+(1999).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import helper, i8, integers, matrix, routine, vector
+from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.types import Array, Integers
+from fecontact.integrate.nonsmooth.problem import NonsmoothProblem
+from fecontact.integrate.nonsmooth.space_contact import contact_of
+from fecontact.system.nodes import ground_motion
+from fecontact.system.powers import POWER_COUNT
+
+_SWEEPS = 20000
+# Change of the impulses in a sweep at which they count as found, relative to the largest.
+_SETTLED = 1e-13
+# How deep nodes that touch are left in the ground, relative to the largest displacements.
+_MARGIN = 1e-12
+
+
+class ImpactRoom(NamedTuple):
+    """Room for steps of impulses, for n nodes and m modes.
+
+    Entries of the nodes are normal ones (n,), then those along the first and the second tangents.
+
+    Attributes
+    ----------
+    rows, pushes : (3 n, m) arrays
+        Changes of [-u', s] by the modes, and of the velocities by unit impulses.
+    coupling : (3 n, 3 n) array
+        Changes of [-u', s] by unit impulses [L, P].
+    given, before, after, impulses, rest : (3 n,) arrays
+        [-u', s] without contact, and at both ends of a step; [L, P]; what is left of the
+        conditions.
+    slopes, sides : (2 n,), (2 n,) arrays
+        Of the ground, and velocities of the other side.
+    weights, grip : (n,) arrays
+        kappa, and what friction sees of a unit normal force.
+    sticking, slipping : (n,) arrays
+        Coefficients of friction.
+    matrix : (m, m) array
+        1 + h C / 2 + h^2 K / 4, factorised.
+    middle, change, rates, largest : (2 m,), (m,), (p + n,), (2 m,) arrays
+        State in the middle, change of the velocities, powers, largest coordinates so far.
+    whole, half, end : (size,) arrays
+        Y after a whole step, and after one and two halves.
+    forces : (3, 3 n) array
+        Forces in the whole step, and in the halves.
+    closed : (3, n) array
+        Contacts after a whole step, and after one and two halves.
+    touching, pivots : (n,), (m,) arrays
+    """
+
+    rows: Array
+    pushes: Array
+    coupling: Array
+    given: Array
+    before: Array
+    after: Array
+    impulses: Array
+    rest: Array
+    slopes: Array
+    sides: Array
+    weights: Array
+    grip: Array
+    sticking: Array
+    slipping: Array
+    matrix: Array
+    middle: Array
+    change: Array
+    rates: Array
+    largest: Array
+    whole: Array
+    half: Array
+    end: Array
+    forces: Array
+    closed: Integers
+    touching: Integers
+    pivots: Integers
+
+
+_flags = types.Array(i8, 2, "C")
+IMPACT_ROOM = types.NamedTuple(
+    [matrix] * 3 + [vector] * 11 + [matrix] + [vector] * 7 + [matrix, _flags] + [integers] * 2,
+    ImpactRoom)
+
+
+def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
+    """Room for a problem."""
+    n, m = problem.system.Tx.shape
+    flags = np.zeros((3, n), dtype=np.int64)
+    given, before, after, impulses, rest = np.zeros((5, 3 * n))
+    slopes, sides = np.zeros((2, 2 * n))
+    weights, grip, sticking, slipping = np.zeros((4, n))
+    whole, half, end = np.zeros((3, 2 * m + POWER_COUNT + n))
+    return ImpactRoom(
+        np.zeros((3 * n, m)), np.zeros((3 * n, m)), np.zeros((3 * n, 3 * n)), given, before, after,
+        impulses, rest, slopes, sides, weights, grip, sticking, slipping, np.zeros((m, m)),
+        np.zeros(2 * m), np.zeros(m), np.zeros(POWER_COUNT + n), np.zeros(2 * m), whole, half, end,
+        np.zeros((3, 3 * n)), flags, np.zeros(n, dtype=np.int64), np.zeros(m, dtype=np.int64))
+
+
+@helper
+def set_matrix(h, p, room):
+    """Factorise the matrix of a step."""
+    s, linear = p.system, room.matrix
+    for i in range(len(linear)):
+        for k in range(len(linear)):
+            linear[i, k] = 0.5 * h * s.damping[i, k] + 0.25 * h * h * s.stiffness[i, k]
+        linear[i, i] += 1.0
+    factorise(linear, len(linear), room.pivots)
+
+
+@helper
+def set_rows(j, contact, p, room):
+    """Fill the rows of node j: how modes change its height over the ground and its place."""
+    s, rows = p.system, room.rows
+    n, m = s.Tx.shape
+    for i in range(m):
+        rows[j, i] = (s.Ty[j, i] - contact.slope * s.Tx[j, i]
+                      - contact.slope_across * s.T2[j, i])
+        rows[n + j, i], rows[2 * n + j, i] = s.Tx[j, i], s.T2[j, i]
+
+
+@routine
+def set_pushes(p, room):
+    """Fill ``pushes`` and ``coupling`` of the touching nodes, with the factorised matrix."""
+    s, rows, pushes, touching = p.system, room.rows, room.pushes, room.touching
+    n, m = s.Tx.shape
+    for b in range(3 * n):
+        j = b % n
+        if not touching[j]:
+            continue
+        for i in range(m):
+            if b >= n:
+                pushes[b, i] = -rows[b, i]
+            else:
+                pushes[b, i] = rows[b, i] if s.leans else s.Ty[j, i]
+        solve(room.matrix, room.pivots, pushes[b])
+        for a in range(3 * n):
+            if touching[a % n]:
+                total = 0.0
+                for i in range(m):
+                    total += rows[a, i] * pushes[b, i]
+                room.coupling[a, b] = total
+
+
+@helper
+def _stiffest(j, n, room):
+    """Largest change of the slip velocity of node j by a unit impulse along the ground."""
+    c = room.coupling
+    a, b = -c[n + j, n + j], -c[2 * n + j, 2 * n + j]
+    mixed = -0.5 * (c[n + j, 2 * n + j] + c[2 * n + j, n + j])
+    return 0.5 * (a + b) + math.hypot(0.5 * (a - b), mixed)
+
+
+@routine
+def _add_impulse(a, change, n, room):
+    """Change an impulse, and with it what is left of the conditions."""
+    room.impulses[a] += change
+    for b in range(3 * n):
+        if room.touching[b % n]:
+            room.rest[b] += room.coupling[b, a] * change
+
+
+@routine
+def find_impulses(restitution, n, room):
+    """Fill ``impulses`` of the touching nodes, and ``after``; whether they were found."""
+    x, y, c = room.impulses, room.rest, room.coupling
+    x[:] = 0.0
+    for j in range(n):
+        y[j] = room.given[j] - restitution * max(-room.before[j], 0.0)
+        for a in (n + j, 2 * n + j):
+            y[a] = room.given[a] + room.weights[j] * room.before[a]
+    found = False
+    for _ in range(_SWEEPS):
+        moved, scale = 0.0, 0.0
+        for j in range(n):
+            if not room.touching[j]:
+                continue
+            pressed = max(0.0, x[j] - y[j] / c[j, j]) if c[j, j] > 0.0 else 0.0
+            moved = max(moved, abs(pressed - x[j]))
+            scale = max(scale, pressed)
+            _add_impulse(j, pressed - x[j], n, room)
+            stiffest = _stiffest(j, n, room)
+            if stiffest <= 0.0:
+                continue
+            one, two = x[n + j] + y[n + j] / stiffest, x[2 * n + j] + y[2 * n + j] / stiffest
+            size = math.hypot(one, two)
+            if size > room.sticking[j] * pressed:
+                part = room.slipping[j] * pressed / size
+                one, two = part * one, part * two
+            moved = max(moved, abs(one - x[n + j]), abs(two - x[2 * n + j]))
+            scale = max(scale, abs(one), abs(two))
+            _add_impulse(n + j, one - x[n + j], n, room)
+            _add_impulse(2 * n + j, two - x[2 * n + j], n, room)
+        if moved <= _SETTLED * scale:
+            found = True
+            break
+    for j in range(n):
+        room.after[j] = y[j] + restitution * max(-room.before[j], 0.0)
+        for a in (n + j, 2 * n + j):
+            room.after[a] = y[a] - room.weights[j] * room.before[a]
+    return found
+
+
+@routine
+def put_on_ground(t, Y, closed, p, room):
+    """Move closed nodes, and nodes in the ground, to where they just touch it."""
+    s, middle, x = p.system, room.middle, room.impulses
+    n, m = s.Tx.shape
+    moved = ground_motion(t, s)
+    margin = 0.0
+    for i in range(m):
+        for j in range(n):
+            margin = max(margin, _MARGIN * abs(s.Ty[j, i]) * room.largest[i])
+    middle[:] = Y[: 2 * m]
+    room.matrix[:] = 0.0
+    for i in range(m):
+        room.matrix[i, i] = 1.0
+    factorise(room.matrix, m, room.pivots)
+    deepest = 0.0
+    for j in range(n):
+        contact = contact_of(j, middle, moved, s)
+        room.touching[j] = 1 if closed[j] or contact.penetration > margin else 0
+        set_rows(j, contact, p, room)
+        room.rest[j] = margin - contact.penetration
+        if room.touching[j]:
+            deepest = max(deepest, abs(room.rest[j]))
+    x[:] = 0.0
+    if deepest <= margin:
+        return
+    set_pushes(p, room)
+    for _ in range(_SWEEPS):
+        furthest = 0.0
+        for j in range(n):
+            if not room.touching[j] or room.coupling[j, j] <= 0.0:
+                continue
+            change = -room.rest[j] / room.coupling[j, j]
+            if not closed[j]:
+                change = max(change, -x[j])
+            furthest = max(furthest, abs(change * room.coupling[j, j]))
+            x[j] += change
+            for b in range(n):
+                if room.touching[b]:
+                    room.rest[b] += room.coupling[b, j] * change
+        if furthest <= 0.1 * margin:
+            break
+    for j in range(n):
+        if room.touching[j]:
+            for i in range(m):
+                Y[i] += x[j] * room.pushes[j, i]
