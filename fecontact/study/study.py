@@ -376,6 +376,8 @@ class Study(Summarised, StudyModels):
             raise InputError(f"{title}: [wear] needs bodies of one thickness; give the same to all "
                              f"in [bodies.NAME.body].")
         system = self.system()
+        if system.basis.dimension == 3:
+            thickness = None
         with located(f"{title}: [wear]:", "wear_history:"):
             return wear_history(
                 system, law, thickness, acceleration=wanted.acceleration,

@@ -6,6 +6,7 @@ second moments and differences of area is taken, so that a face with a grid of f
 its lines. Nothing is random; equal faces are cut equally.
 """
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -40,6 +41,41 @@ def partition(surface: Surface, count: int) -> Integers:
         which = part == number
         owner[which] = first + _cut(surface.only(which), share)
         first += share
+    return _numbered(surface, owner, count)
+
+
+def grid_partition(surface: Surface, along: int, across: int) -> Integers | None:
+    """Patch (k,) of each facet of a connected face, of ``along`` strips of ``across`` patches.
+
+    Strips follow each other along the first tangent of the face and are cut along the second one,
+    or follow each other around its axis, as those of a ring, a bore or a shaft, and are cut
+    along it or away from it; whichever makes the more compact patches. None if there are patches
+    without facets. They are numbered as those of :func:`partition`.
+    """
+    count = along * across
+    best, least = None, np.inf
+    pairs = [frame[:2] for frame in itertools.islice(_frames(surface), 2)]
+    for u, v in [*(_along_first(surface, pair) for pair in pairs), _around(surface)]:
+        owner = _strips(u, v, surface.areas, count, along)
+        if (np.bincount(owner, minlength=count) > 0).all() and (
+                cost := _cost(surface, owner, count)) < least * (1.0 - 1e-6):
+            best, least = owner, cost
+    return None if best is None else _numbered(surface, best, count)
+
+
+def _along_first(surface: Surface, pair: Array) -> tuple[Array, Array]:
+    """Two coordinates (2, k) of the facets, that which rises most along the first tangent first."""
+    mean = surface.area_vectors.sum(axis=0)
+    size = float(np.linalg.norm(mean))
+    if size <= _FLAT * surface.areas.sum():
+        return pair[0], pair[1]
+    first = surface.centres @ frames_of(mean[None] / size)[0][0]
+    rises = np.abs((pair - pair.mean(axis=1)[:, None]) @ (first - first.mean()))
+    return (pair[0], pair[1]) if rises[0] >= rises[1] * (1.0 - 1e-9) else (pair[1], pair[0])
+
+
+def _numbered(surface: Surface, owner: Integers, count: int) -> Integers:
+    """The patches (k,) numbered along x, then y, then z of their centres."""
     centres = surface.patches(owner).centres
     places = np.round(centres / (1e-6 * max(float(np.ptp(surface.centres, axis=0).max()), 1e-300)))
     rank = np.empty(count, dtype=np.int64)
