@@ -75,7 +75,7 @@ def largest_displacement(trajectory: Trajectory) -> tuple[float, str]:
 
 
 def contact_shares(trajectory: Trajectory, nodes: slice = slice(None)) -> dict[str, float]:
-    """Fractions of time and contact length or area of some nodes that are open, in stick and in slip."""
+    """Fractions of time and contact face of some nodes that are open, in stick and in slip."""
     weight = trajectory.system.basis.tributary[nodes]
     states = trajectory.contact_state[:, nodes]
     return {state.name.lower(): float(((states == state) @ (weight / weight.sum())).mean())

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -106,8 +106,8 @@ def contact_nodes(
 
     The face of a solid is cut into patches of facets of nearly equal area, which move and are
     loaded likewise; with 'all', every facet is one; two numbers are those along its first and
-    second tangent, or around and across the axis of a ring, bore or shaft. (The integrals of shape functions over
-    quadratic facets are zero or negative at corners.)
+    second tangent, or around and across the axis of a ring, bore or shaft. (The integrals of shape
+    functions over quadratic facets are zero or negative at corners.)
 
     Raises
     ------

@@ -19,7 +19,6 @@ from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.statics import equilibrium
 
-
 RigidMotion = (tuple[float, float, float]
                | tuple[float, float, float, float, float, float])
 

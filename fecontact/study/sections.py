@@ -94,7 +94,7 @@ class BodySettings:
             usual = BodySettings()
             for key in ("thickness", "plane", "rotation"):
                 if (value := getattr(self, key)) != getattr(usual, key):
-                    raise InputError(f"BodySettings: {key} = {shown(plain(value))} is for plane "
+                    raise InputError(f"ElasticBody: {key} = {shown(plain(value))} is for plane "
                                      f"bodies, but the mesh is that of a solid; leave it out.")
         return ElasticBody(mesh, self.elastic_material, thickness=self.thickness,
                            plane=self.plane, degree=self.degree, fixed=self.fixed)

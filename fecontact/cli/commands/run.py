@@ -139,8 +139,8 @@ def plot(
     set_: Changes = None,
     point: Annotated[list[str] | None, Parameter(
         negative=(), show_default=False,
-        help="Name of a point, number of a contact node, or place `x,y` or `x,y,z`; B by default. A history "
-        "takes several.")] = None,
+        help="Name of a point, number of a contact node, or place `x,y` or `x,y,z`; B by default. "
+        "A history takes several.")] = None,
     component: Annotated[Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None, Parameter(
         help="Component of the motion, of solids x, y, z, phi_x, phi_y or phi_z, else x, y or phi; "
         "that of the drive by default.")] = None,

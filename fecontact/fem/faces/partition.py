@@ -21,6 +21,8 @@ _UNEQUAL = 10.0
 _AROUND = 2
 # Coordinates closer than this fraction of the extent count as equal.
 _SAME = 1e-7
+# Least distance of the middles of neighbours in a grid of patches, of their mean distance.
+_APART = 0.3
 # A face is flat enough to have a direction if its mean normal is at least so long.
 _FLAT = 0.5
 
@@ -48,19 +50,47 @@ def grid_partition(surface: Surface, along: int, across: int) -> Integers | None
     """Patch (k,) of each facet of a connected face, of ``along`` strips of ``across`` patches.
 
     Strips follow each other along the first tangent of the face and are cut along the second one,
-    or follow each other around its axis, as those of a ring, a bore or a shaft, and are cut
-    along it or away from it; whichever makes the more compact patches. None if there are patches
-    without facets. They are numbered as those of :func:`partition`.
+    or, on a ring, a bore or a shaft, follow each other around its axis and are cut along it or away
+    from it; whichever makes the more compact patches. None if the facets make no such grid. The
+    patches are numbered as those of :func:`partition`.
     """
     count = along * across
     best, least = None, np.inf
-    pairs = [frame[:2] for frame in itertools.islice(_frames(surface), 2)]
-    for u, v in [*(_along_first(surface, pair) for pair in pairs), _around(surface)]:
+    pairs = [_along_first(surface, frame[:2]) for frame in itertools.islice(_frames(surface), 2)]
+    for u, v in [*pairs, *([_around(surface)] if _closes(surface) else [])]:
         owner = _strips(u, v, surface.areas, count, along)
-        if (np.bincount(owner, minlength=count) > 0).all() and (
+        if _is_grid(u, v, surface.areas, owner, along, across) and (
                 cost := _cost(surface, owner, count)) < least * (1.0 - 1e-6):
             best, least = owner, cost
     return None if best is None else _numbered(surface, best, count)
+
+
+def _closes(surface: Surface) -> bool:
+    """Whether a connected face closes around an axis, by its numbers of corners, edges, facets."""
+    count = 3 if surface.facets.shape[1] in (3, 6) else 4
+    corners = surface.facets[:, :count]
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+    edges = np.unique(np.sort(ends, axis=1), axis=0)
+    return len(np.unique(corners)) - len(edges) + len(corners) == 0
+
+
+def _is_grid(
+    u: Array, v: Array, areas: Array, owner: Integers, along: int, across: int
+) -> bool:
+    """Whether strips follow each other along u, and their patches along v.
+
+    A grid of fewer lines of facets than strips would be cut across instead.
+    """
+    count = along * across
+    sizes = np.bincount(owner, areas, minlength=count)
+    if (sizes == 0.0).any():
+        return False
+    middles, places = (np.bincount(owner, areas * one, minlength=count).reshape(along, across)
+                       for one in (u, v))
+    strips = middles.sum(axis=1) / sizes.reshape(along, across).sum(axis=1)
+    steps = np.diff(places / sizes.reshape(along, across), axis=1)
+    return bool((np.diff(strips) > _APART * np.ptp(u) / along).all()
+                and (steps > _APART * np.ptp(v) / across).all())
 
 
 def _along_first(surface: Surface, pair: Array) -> tuple[Array, Array]:
