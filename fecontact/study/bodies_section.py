@@ -23,6 +23,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
     Geometry,
+    body_table,
     geometry_from_table,
     geometry_mesh,
     geometry_table,
@@ -123,8 +124,9 @@ class BodySections:
 
     def table(self, *, defaults: bool = True) -> dict[str, Any]:
         """The section as a table for TOML."""
-        parts = {name: to_table(getattr(self, name), defaults=defaults)
-                 for name in ("placement", "body", "basis")}
+        parts = {"placement": to_table(self.placement, defaults=defaults),
+                 "body": body_table(self.body, self.geometry, defaults=defaults),
+                 "basis": to_table(self.basis, defaults=defaults)}
         for key in ("contact", "contact_nodes"):
             parts["basis"].pop(key, None)
         return {"geometry": geometry_table(self.geometry, defaults=defaults),
