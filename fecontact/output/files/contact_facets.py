@@ -85,12 +85,12 @@ def contact_facets(basis: ModalBasis) -> ContactFacets:
         kept = touching[owner]
         chosen, owner = chosen[kept], owner[kept]
         return ContactFacets(facets[chosen], owner, np.ones(len(chosen), dtype=bool))
-    at, node = _candidates(field, basis.contact_nodes, touching)
+    at, node, own = _candidates(basis, field, touching)
     corners = field.nodes[facets[at]]
     vectors = facet_vectors(field.nodes, facets[at])
     looks, size = (vectors * basis.normals[node]).sum(axis=1), np.linalg.norm(vectors, axis=1)
-    facing = np.abs(looks) > _FACING * size
-    at, node, own = at[facing], node[facing], looks[facing] < 0.0
+    facing = np.where(own, -looks, looks) > _FACING * size
+    at, node, own = at[facing], node[facing], own[facing]
     # Of several contact nodes whose nodes a facet has all, the nearest one.
     away = np.linalg.norm(corners[facing].mean(axis=1) - basis.contact_places[node], axis=1)
     order = np.lexsort((away, at))
@@ -98,28 +98,50 @@ def contact_facets(basis: ModalBasis) -> ContactFacets:
     return ContactFacets(facets[at[first]], node[first], own[first])
 
 
-def _candidates(field: ModeShapes, n: int, touching: Any) -> tuple[Integers, Integers]:
-    """Facets and contact nodes in whose rows all nodes of the facet take part."""
+def _candidates(
+    basis: ModalBasis, field: ModeShapes, touching: Any
+) -> tuple[Integers, Integers, Any]:
+    """Facets and contact nodes in whose motion all nodes of the facet take part, and on which side.
+
+    True is the side of the contact node.
+    """
     import scipy.sparse as sp
 
+    n, N = basis.contact_nodes, len(field.nodes)
     rows = sp.coo_array(field.restriction.tocsr()[12 : 12 + 6 * n])
-    node, place, size = rows.row // 6, rows.col // 3, np.abs(rows.data)
-    # Rotations weigh with their arms: they hold corners on which displacements do not depend.
-    turns = (rows.row % 6 >= 3).astype(int)
+    row, column, values = rows.row, rows.col, rows.data
+    node, place, size = row // 6, column // 3, np.abs(values)
+    body = np.zeros(N, dtype=np.int64)
+    for number, one in enumerate(basis.parts):
+        body[one.nodes[0] : sum(one.nodes)] = number
+    # The weights of displacements along the normal have the sum one on a contact node's own body.
+    along = row % 6 == 2
+    weights = np.zeros((n, max(len(basis.parts), 1)))
+    np.add.at(weights, (node[along], body[place[along]]),
+              values[along] * basis.normals[node[along], column[along] % 3])
+    own = body[place] == weights.argmax(axis=1)[node]
+    # Rotations hold corners on which displacements do not depend. Those of feet reach deeper.
+    turns = row % 6 >= 3
     largest = np.zeros((2, n))
-    np.maximum.at(largest, (turns, node), size)
-    used = (size > _PART * largest[turns, node]) & touching[node]
-    part = sp.csr_array((np.ones(np.count_nonzero(used)), (node[used], place[used])),
-                        shape=(n, len(field.nodes)))
-    part.sum_duplicates()
-    part.data[:] = 1.0
+    np.maximum.at(largest, (turns.astype(int), node), size)
+    used = (size > _PART * largest[turns.astype(int), node]) & touching[node] & (own | ~turns)
     k, corners = field.outline.shape
-    facets = sp.csr_array((np.ones(k * corners), (field.outline.ravel(),
-                                                  np.repeat(np.arange(k), corners))),
-                          shape=(len(field.nodes), k))
-    shared = sp.coo_array(part @ facets)
-    whole = shared.data == corners
-    return shared.col[whole].astype(np.int64), shared.row[whole].astype(np.int64)
+    members = sp.csr_array((np.ones(k * corners), (field.outline.ravel(),
+                                                   np.repeat(np.arange(k), corners))),
+                           shape=(N, k))
+    found = []
+    for side in (True, False):
+        chosen = used & (own == side)
+        part = sp.csr_array((np.ones(np.count_nonzero(chosen)), (node[chosen], place[chosen])),
+                            shape=(n, N))
+        part.sum_duplicates()
+        part.data[:] = 1.0
+        shared = sp.coo_array(part @ members)
+        whole = shared.data == corners
+        found.append((shared.col[whole].astype(np.int64), shared.row[whole].astype(np.int64),
+                      np.full(np.count_nonzero(whole), side)))
+    at, which, sides = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
+    return at, which, sides
 
 
 def facet_vectors(nodes: Array, facets: Integers) -> Array:
