@@ -203,8 +203,9 @@ def _drawn_solids(
     vertex = np.zeros(len(field.nodes), dtype=np.int64)
     vertex[node[::-1]] = np.arange(len(node))[::-1]
     return DrawnBodies(
-        field.nodes[node], inverse.reshape(corners.shape), vertex[sharp_edges(field.nodes, corners)],
-        field.shapes[node], stress[node], modes, _labels_on(basis, field.nodes[node], node), owners)
+        field.nodes[node], inverse.reshape(corners.shape),
+        vertex[sharp_edges(field.nodes, corners)], field.shapes[node], stress[node], modes,
+        _labels_on(basis, field.nodes[node], node), owners)
 
 
 def _labels_on(
