@@ -240,6 +240,34 @@ def test_a_solid_that_starts_rigidly_flies_freely():
         np.concatenate([shift + np.cross(turn, [0.03, 0.02, 0.02]), turn]), rel=1e-6)
 
 
+def test_wear_of_a_solid_is_that_of_archard():
+    study = fc.Study.from_toml(PAD).with_(**{
+        "simulation.initial": "sliding", "ground.speed": 0.1, "load.normal": 100.0,
+        "drive": {"stiffness_x": 1e6, "stiffness_y": 1e6, "damping_x": 100.0, "damping_y": 100.0},
+        "wear": {"law": "archard", "coefficient": 1e-12, "blocks": 2, "period": 0.01,
+                 "acceleration": 10.0, "outputs": 11}})
+    history = study.wear_history()
+    # Coefficient times force times way, over ten cycles for each of two computed.
+    assert history.depth[-1] @ history.tributary == pytest.approx(
+        1e-12 * 100.0 * 10.0 * 0.1 * 0.02, rel=0.01)
+    assert history.tributary.sum() == pytest.approx(0.06 * 0.04)
+    with pytest.raises(fc.InputError, match=r"thickness = 0\.1 is for plane bodies"):
+        fc.integrate.wear_history(study.system(), history.law, 0.1, acceleration=1.0, blocks=1)
+
+
+def test_summaries_of_solids_see_all_directions():
+    from fecontact.analysis.run_facts import run_facts
+    from fecontact.sweeps.summaries import largest_displacement
+
+    run = fc.Study.from_toml(PAD).with_(**{
+        "gap": 1.0, "load.gravity": [0.0, 0.0, -9.81], "simulation.t_end": 0.01,
+        "simulation.initial": {"displacement": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]}}).run()
+    fallen = 0.5 * 9.81 * 0.01**2
+    assert largest_displacement(run) == pytest.approx(fallen, rel=1e-5)
+    assert dict(run_facts(run))["largest displacement"].startswith("491 µm at x = ")
+    assert dict(run_facts(run))["largest displacement"].count(" m") == 3
+
+
 PLANE = """
 geometry = { shape = "block", element_size = 0.02 }
 basis = { modes = 4, contact_nodes = 4 }
