@@ -47,6 +47,9 @@ def test_all_commands_take_a_solid(cli, place, monkeypatch):
     code, _, err = cli("plot", run, "history", "--point", "0.1,0.06,0.02,0")
     assert code == 1
     assert "of a solid x,y,z" in " ".join(err.split())
+    code, _, err = cli("plot", run, "history", "--point", "0.1,0.06")
+    assert code == 1
+    assert "3 coordinates, x, y, z" in " ".join(err.split())
     assert cli("export", run, "--format", "csv")[0] == 0
     code, out, err = cli("report", run)
     assert code == 0, err
@@ -76,7 +79,7 @@ def test_keys_that_do_not_fit_are_one_sentence(cli, place, monkeypatch):
                           ("load.gravity=[0, -9.81]", "[load]: gravity = [0.0, -9.81]"),
                           ("basis.contact_nodes=[20, 3]", "contact_nodes = [20, 3]"),
                           ("basis.contact=\"top\"", "does not face the ground")):
-        code, out, err = cli("run", "pad.toml", "--set", change)
+        code, _, err = cli("run", "pad.toml", "--set", change)
         assert code == 1
         assert words in err
         assert err.startswith("error: pad.toml: [")
