@@ -263,7 +263,7 @@ def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") ->
     return render(trajectory, target, frames=settings.frames, fps=settings.fps,
                   size=settings.size, colour=settings.colour, scale=settings.scale,
                   title=settings.title, t_start=settings.t_start, t_end=settings.t_end,
-                  progress=True)
+                  view=settings.view, progress=True)
 
 
 def write_report(stored: StoredRun, name: str, target: Path) -> Path:

@@ -352,6 +352,8 @@ class RenderSettings:
         Title shown at the top of the picture.
     t_start, t_end : float, optional
         Time interval to draw [s].
+    view : 'above' or 'below'
+        Where solids are seen from; from below their contact faces show.
     """
 
     frames: int = 200
@@ -362,6 +364,7 @@ class RenderSettings:
     title: str | None = None
     t_start: Annotated[float | None, Unit("s")] = None
     t_end: Annotated[float | None, Unit("s")] = None
+    view: Literal["above", "below"] = "above"
 
     def __post_init__(self) -> None:
         if self.frames < 1:
