@@ -366,12 +366,12 @@ class RenderSettings:
         Quantity that colours the body.
     scale : float, optional
         Magnification of displacements; by default chosen so that the largest is clearly visible.
-    view : 'above' or 'below'
-        Where solids are seen from; from below their contact faces show.
     title : str, optional
         Title shown at the top of the picture.
     t_start, t_end : float, optional
         Time interval to draw [s].
+    view : 'above' or 'below'
+        Where solids are seen from; from below their contact faces show.
     """
 
     frames: int = 200
@@ -379,10 +379,10 @@ class RenderSettings:
     size: tuple[int, int] = (960, 540)
     colour: Literal["displacement", "von_mises"] = "displacement"
     scale: float | None = None
-    view: Literal["above", "below"] = "above"
     title: str | None = None
     t_start: Annotated[float | None, Unit("s")] = None
     t_end: Annotated[float | None, Unit("s")] = None
+    view: Literal["above", "below"] = "above"
 
     def __post_init__(self) -> None:
         if self.frames < 1:

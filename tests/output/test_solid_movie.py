@@ -12,7 +12,7 @@ from test_solid_files import SIZE, moved, solid, stacked, system
 import fecontact as fc
 from fecontact.laws import ConstantFriction, EnergyWear, HeightMap, Sine
 from fecontact.output.files.frames import contact_forces, frame_indices
-from fecontact.output.plots.face_plans import face_plans
+from fecontact.output.plots.solids.plans import face_plans
 from fecontact.output.render import offscreen
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.scene import NODE_COLOURS
@@ -143,7 +143,8 @@ def test_patches_are_painted_with_their_pressures(run):
         image = scene.image(pressed)
         for node, place in enumerate(run.system.basis.contact_places):
             # Beside the middle, where lines of the facets do not run.
-            row, column = scene._camera.pixel(place + [0.004, 0.003, 0.0], image.shape)
+            row, column = scene._camera.pixel(place + np.array([0.004, 0.003, 0.0]),
+                                              image.shape)
             part = run.pressure[pressed, node] / run.pressure.max()
             assert close_to(image[row, column], colormaps["inferno"](part)[:3], 25), node
     assert len(set(np.round(run.pressure[pressed] / run.pressure.max(), 1))) > 1

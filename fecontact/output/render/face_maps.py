@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
-from fecontact.output.plots.face_plans import FacePlan, draw_plan
+from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan
 from fecontact.output.render.scene import DARK, NODE_COLOURS
 from fecontact.output.render.solid_motion import SolidMotion
 
@@ -20,7 +20,6 @@ PRESSURE_MAP, WEAR_MAP = "inferno", "copper_r"
 _SIDE = 0.03  # free on the left and right, of the width
 _TITLE = 1.6  # room above each map, in sizes of text
 _GAP = 0.5  # between maps
-_WIDEST = 1.5  # of a patch, the longest arrow
 
 
 class _Map(NamedTuple):
@@ -140,8 +139,10 @@ class FaceMaps:
             axes.set_title(one.title + seen, fontsize=0.92 * self.font, color=DARK, loc="center",
                            family="DejaVu Sans", pad=0.35 * self.font)
             lines = [line for line in axes.collections if line is not patches]
-            drawn.append((one, axes, patches, self._arrows(axes, one) if one.arrows else None,
-                          lines))
+            arrows = draw_arrows(axes, one.plan, np.zeros_like(one.plan.places),
+                                 self.motion.largest_friction, line=0.05 * self.font) if (
+                one.arrows) else None
+            drawn.append((one, axes, patches, arrows, lines))
         changing = [artist for _, _, patches, arrows, lines in drawn
                     for artist in (patches, arrows, *lines) if artist is not None]
         for artist in changing:
@@ -151,16 +152,3 @@ class FaceMaps:
         for artist in changing:
             artist.set_visible(True)
         return canvas, background, drawn
-
-    def _arrows(self, axes: Any, one: _Map) -> Any:
-        """Arrows from the middles of the patches, the longest 1.5 patches long."""
-        plan = one.plan
-        places = plan.places / plan.unit[0]
-        largest = self.motion.largest_friction
-        nodes = len(places)
-        reach = _WIDEST * plan.spacing / plan.unit[0]
-        return axes.quiver(*places.T, np.zeros(nodes), np.zeros(nodes), angles="xy",
-                           scale_units="xy", scale=largest / reach, color="white",
-                           edgecolor=DARK, linewidth=0.05 * self.font,
-                           width=0.10 * reach, units="xy", headwidth=3.6, headlength=4.2,
-                           headaxislength=3.8, zorder=3.0, clip_on=False)

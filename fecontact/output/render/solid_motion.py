@@ -13,7 +13,7 @@ from fecontact.core.units import quantity
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.wear import WearLaw
 from fecontact.output.files.frames import ground_shape
-from fecontact.output.plots.face_plans import FacePlan, face_plans
+from fecontact.output.plots.solids.plans import FacePlan, face_plans
 from fecontact.output.render.frames_data import Motion
 
 View = Literal["above", "below"]

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _ROUND = 0.5  # length of the mean normal below which a face goes around an axis
 _ALIGNED = 1e-6
 _BORDER = "#303030"
+# The longest arrow, in distances of neighbouring patches, and of the shorter side of the face.
+_REACH, _MOST = 1.3, 0.45
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,3 +225,18 @@ def draw_plan(axes: "Axes", plan: FacePlan, *, line: float = 0.6, frame: bool = 
         axes.set_xlabel(f"{plan.labels[0]} [{symbol}]")
         axes.set_ylabel(f"{plan.labels[1]} [{symbol}]")
     return patches
+
+
+def draw_arrows(
+    axes: "Axes", plan: FacePlan, arrows: Array, largest: float, *, line: float = 0.5
+) -> Any:
+    """Draw arrows (k, 2) from the middles of the patches, scaled by the largest; returns them."""
+    factor = plan.unit[0]
+    reach = min(_REACH * plan.spacing, _MOST * float(np.ptp(plan.box, axis=0).min())) / factor
+    drawn = axes.quiver(*(plan.places / factor).T, *arrows.T, angles="xy", scale_units="xy",
+                        scale=largest / reach, color="white", edgecolor=_BORDER, linewidth=line,
+                        width=0.10 * reach, units="xy", headwidth=3.6, headlength=4.2,
+                        headaxislength=3.8, minlength=0.02, zorder=3.0, clip_on=False)
+    # What reaches beyond a face takes no room from others.
+    drawn.set_in_layout(False)
+    return drawn
