@@ -178,8 +178,8 @@ def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
         ends = [float(corners.min()), float(corners.max())]
     profile, first, spacing = np.zeros(1), 0.0, 1.0
     if _drawn_wavy(ground):
-        reach = _BESIDE * max(ends[1] - ends[0], *(
-            [] if basis.dimension == 2 else [box[1] - box[0], box[3] - box[2]]))
+        sides = [] if basis.dimension == 2 else [box[1] - box[0], box[3] - box[2]]
+        reach = _BESIDE * max([ends[1] - ends[0], *sides])
         first = ends[0] - reach - float(along.max())
         last = ends[1] + reach - float(along.min())
         wave = ground.shortest_wavelength or (last - first)
