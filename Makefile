@@ -16,7 +16,7 @@ help: ## list the targets
 
 setup: $(READY) $(ALL) $(SYSTEM) ## install everything into .venv
 
-demo: $(READY) $(RUNS) $(SYSTEM) ## two studies from geometry to movie, into demo-output/
+demo: $(READY) $(RUNS) $(SYSTEM) ## three studies from geometry to movie, into demo-output/
 	@$(BIN)/fecontact demo demo-output
 
 test-fast: $(READY) $(ALL) $(SYSTEM) ## run the tests that take seconds

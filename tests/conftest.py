@@ -13,7 +13,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SLOW = {"test_documentation", "test_examples", "test_benchmarks", "test_site", "test_reference",
         "test_sweep_killed", "test_ending_signals",
         "test_two_mass_example", "test_shooting_of_beam", "test_branch_command",
-        "test_impact_orbits", "test_report_browser", "test_report_solid", "test_report_widget"}
+        "test_impact_orbits", "test_report_browser", "test_report_solid", "test_report_of_solids",
+        "test_report_widget"}
 
 # Files whose tests start processes, draw movies, compile or follow motions for long.
 LONG = {
@@ -27,7 +28,7 @@ LONG = {
     "test_friction_damper", "test_lap_joint",
     "test_sweep", "test_sweep_command", "test_sweep_strobed", "test_sweep_summaries",
     "test_movie", "test_analysis_plots", "test_trust", "test_damaged_files", "test_whole_files",
-    "test_cli", "test_cli_stop", "test_open", "test_locks", "test_bad_input",
+    "test_cli", "test_solid_commands", "test_cli_stop", "test_open", "test_locks", "test_bad_input",
     "test_poincare_scan", "test_branch_study", "test_orbits_by_shooting", "test_squeal",
     "test_convergence", "test_mode_convergence",
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",

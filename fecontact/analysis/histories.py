@@ -12,7 +12,7 @@ from fecontact.reduction.assembly.contact_faces import node_name
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 
-Point = str | int | tuple[float, float]
+Point = str | int | tuple[float, ...]
 
 _OF_POINTS = {"displacement": "m", "velocity": "m/s"}
 _OF_NODES = {"normal_force": "N", "friction_force": "N", "penetration": "m",
@@ -51,9 +51,9 @@ def history(
         'penetration', 'penetration_rate', 'slip_velocity', 'line_load', 'pressure' or
         'friction_work' of a contact node; 'total_normal_force', 'total_friction_force' or
         'total_friction_work' of the whole face.
-    point : str, int or (x, y)
+    point : str, int, (x, y) or (x, y, z)
         As for :meth:`Trajectory.displacement`.
-    component : 'x', 'y' or 'phi'
+    component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
         Component of displacements and velocities: tangential, normal, or rotation. Contact nodes
         of several bodies move relative to the other side, along their tangents and normals.
 
@@ -119,4 +119,4 @@ def point_name(point: Point, basis: ModalBasis | None = None) -> str:
         return point
     if isinstance(point, int | np.integer):
         return f"contact node {point}" if basis is None else node_name(basis, int(point))
-    return f"({point[0]:g}, {point[1]:g}) m"
+    return f"({', '.join(f'{place:g}' for place in point)}) m"

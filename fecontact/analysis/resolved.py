@@ -34,6 +34,7 @@ _FEWEST, _MORE, _MOST = 8, 16, 64  # subdivisions of an interval
 _WINDOW, _GAP = 256, 16  # intervals repeated in one run; largest gap skipped within it
 _NUMBERS = 20_000_000  # stored per run
 _STEPS = 1_000_000  # repeated per run
+_SMALL_SOLID = 40  # values of a state of a solid up to which that many steps are repeated
 _FAILURES = 8  # consecutive failures before the run is considered not repeatable
 _TOLD = 2e-3  # fraction of the time
 _NODES = 8  # contact nodes monitored besides the named points
@@ -95,7 +96,7 @@ def _resolved(run: Trajectory) -> Resolved:
         return Resolved(run, 0.0, "")
     total = float(run.time[-1] - run.time[0])
     flags, reason = _coarse(run), "they are jumps"
-    lost, left = 0.0, _STEPS
+    lost, left = 0.0, _most_steps(run)
     average = math.ceil(float(run.statistics.get("steps", 0)) / (len(run.time) - 1))
     for level in range(_LEVELS):
         if not flags.any():
@@ -122,6 +123,14 @@ def _resolved(run: Trajectory) -> Resolved:
     return Resolved(run, min(1.0, lost / total), reason)
 
 
+def _most_steps(run: Trajectory) -> int:
+    """Steps to repeat; of solids fewer, as each takes time by the third power of the state."""
+    size = run.states.shape[1]
+    if run.system.basis.dimension == 2 or size <= _SMALL_SOLID:
+        return _STEPS
+    return int(_STEPS * (_SMALL_SOLID / size) ** 3)
+
+
 def _room(run: Trajectory) -> int:
     """Number of output times that can still be added."""
     size = run.states.shape[1] + 8 * (run.system.basis.contact_nodes + 1)
@@ -132,7 +141,7 @@ def _coarse(run: Trajectory) -> Flags:
     """Flags (N - 1,) of the intervals that are too long for a straight line."""
     moved, rates = _motion(run)
     sizes, rate_sizes = _ranges(moved, rates)
-    normal, friction = run.normal_force, run.friction_force
+    normal, friction = run.normal_force, run.friction_forces
     forces = np.column_stack([normal.sum(axis=1), friction.sum(axis=1)])
     large = np.abs(forces).max(axis=0)
     spread = np.maximum(np.ptp(forces, axis=0), _SMALL_FORCE * large)

@@ -59,20 +59,23 @@ def largest_displacement(trajectory: Trajectory) -> tuple[float, str]:
         shapes, places = basis.mode_shapes.shapes, basis.mode_shapes.nodes
     else:
         used = np.abs(basis.T).any(axis=(1, 2))
-        shapes, places = basis.T[used, :2], basis.positions[used]
+        shapes, places = basis.T[used, : basis.dimension], basis.positions[used]
     rows = shapes.reshape(-1, basis.modes).T
     best, node = 0.0, 0
     for block in np.array_split(q, max(1, q.shape[0] * rows.shape[1] // 2**21)):
-        motion = np.linalg.norm((block @ rows).reshape(len(block), -1, 2), axis=2).max(axis=0)
+        motion = np.linalg.norm((block @ rows).reshape(len(block), -1, basis.dimension),
+                                axis=2).max(axis=0)
         if motion.max() > best:
             best, node = float(motion.max()), int(motion.argmax())
     body = [f" of {part.name}" for part in basis.parts
             if basis.mode_shapes is not None and part.nodes[0] <= node < sum(part.nodes)]
-    return best, f"x = {places[node, 0]:.4g} m, y = {places[node, 1]:.4g} m" + "".join(body)
+    where = ", ".join(f"{axis} = {at:.4g} m" for axis, at in zip(
+        "xyz", places[node].tolist(), strict=False))
+    return best, where + "".join(body)
 
 
 def contact_shares(trajectory: Trajectory, nodes: slice = slice(None)) -> dict[str, float]:
-    """Fractions of time and contact length of some nodes that are open, in stick and in slip."""
+    """Fractions of time and contact face of some nodes that are open, in stick and in slip."""
     weight = trajectory.system.basis.tributary[nodes]
     states = trajectory.contact_state[:, nodes]
     return {state.name.lower(): float(((states == state) @ (weight / weight.sum())).mean())
@@ -88,8 +91,9 @@ def notes(trajectory: Trajectory) -> list[str]:
     ground = trajectory.system.ground
     slope = ground.steepest_slope
     if slope > ROUGH_SLOPE:
-        what = ("friction acts along x" if ground.normal == "surface" else
-                "the contact force is vertical and friction acts along x")
+        along = "x" if trajectory.system.basis.dimension == 2 else "the level ground"
+        what = (f"friction acts along {along}" if ground.normal == "surface" else
+                f"the contact force is vertical and friction acts along {along}")
         found.append(f"The ground's slope reaches {slope:.2f}; above {ROUGH_SLOPE} it is a rough "
                      f"assumption that {what}.")
     return found

@@ -1,4 +1,4 @@
-"""The demonstration: two studies from geometry to movie."""
+"""The demonstration: three studies from geometry to movie."""
 
 import sys
 import time
@@ -12,7 +12,7 @@ from fecontact.cli.templates import TEMPLATES, template
 from fecontact.core.errors import MissingLibraryError
 from fecontact.core.files.atomic_write import output_folder, write_text
 
-SHOWN = ("beam", "pendulum")
+SHOWN = ("beam", "pendulum", "solid")
 
 
 @dataclass

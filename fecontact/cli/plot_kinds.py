@@ -139,14 +139,13 @@ def point_of(text: str) -> Point:
     """A point from a command line: ``B``, ``3`` for a contact node, ``0.1,0.02`` for a place."""
     if text.isdigit():
         return int(text)
-    first, comma, second = text.partition(",")
-    if not comma:
+    if "," not in text:
         return text
     try:
-        place = float(first), float(second)
-        if np.isfinite(place).all():
+        place = tuple(float(part) for part in text.split(","))
+        if len(place) in (2, 3) and np.isfinite(place).all():
             return place
         raise ValueError
     except ValueError:
         raise InputError(f"The point {text} must be a name, the number of a contact node, or a "
-                         f"place x,y in m.") from None
+                         f"place x,y in m, of a solid x,y,z.") from None

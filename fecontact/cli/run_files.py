@@ -12,6 +12,7 @@ from fecontact.core.errors import FecontactError, InputError
 
 if TYPE_CHECKING:
     from fecontact.integrate.trajectory import Trajectory
+    from fecontact.laws.wear import WearLaw
     from fecontact.reduction.assembly.interface_compliance import InterfaceCompliance
     from fecontact.study.sections import RenderSettings
     from fecontact.study.study import Study
@@ -256,14 +257,32 @@ def _same_run(study: "Study", stored: str | None, trust: bool | set[Path]) -> bo
                             sweep=study.sweep)
 
 
-def movie(trajectory: "Trajectory", target: Path, settings: "RenderSettings") -> Path:
+def wear_of(stored: StoredRun) -> "WearLaw | None":
+    """Wear law of the study of a run of solids, whose faces show the worn depth; None without."""
+    from fecontact.core.tables import from_table
+    from fecontact.study.sections import WearSettings
+
+    if stored.trajectory.system.basis.dimension == 2:
+        return None
+    try:
+        return from_table(WearSettings, tomllib.loads(stored.study or "").get("wear", {}),
+                          "[wear]").law_if_any
+    except FecontactError:
+        # The run can be drawn even if this version cannot read its study.
+        return None
+
+
+def movie(
+    trajectory: "Trajectory", target: Path, settings: "RenderSettings",
+    wear: "WearLaw | None" = None,
+) -> Path:
     """Render a run with a progress bar; returns the file or folder."""
     from fecontact.output.render.movie import render
 
     return render(trajectory, target, frames=settings.frames, fps=settings.fps,
                   size=settings.size, colour=settings.colour, scale=settings.scale,
                   title=settings.title, t_start=settings.t_start, t_end=settings.t_end,
-                  progress=True)
+                  view=settings.view, wear=wear, progress=True)
 
 
 def write_report(stored: StoredRun, name: str, target: Path) -> Path:

@@ -19,6 +19,7 @@ UNITS = {
     "W": ((1e-6, "µW"), (1e-3, "mW"), (1.0, "W"), (1e3, "kW")),
     "Hz": ((1.0, "Hz"), (1e3, "kHz")),
     "J/m": ((1e-9, "nJ/m"), (1e-6, "µJ/m"), (1e-3, "mJ/m"), (1.0, "J/m"), (1e3, "kJ/m")),
+    "J/m^2": ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"), (1e6, "MJ/m²")),
     "J": ((1e-9, "nJ"), (1e-6, "µJ"), (1e-3, "mJ"), (1.0, "J"), (1e3, "kJ")),
 }
 
@@ -43,7 +44,8 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
     size : float
         Largest magnitude to show, in ``unit``; zero gives ``unit`` itself.
     unit : str
-        SI unit: m, m/s, rad, rad/s, s, Hz, N, N/m, Pa, W, J or J/m.
+        SI unit: m, m/s, rad, rad/s, s, Hz, N, N/m, Pa, W, J, J/m or
+        J/m^2.
 
     Returns
     -------

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import along_outline
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.faces.contact_patches import (
+    Count,
     check_facets_down,
     contact_patches,
     face_surface,
@@ -39,11 +40,12 @@ class ContactNodes:
 
 def contact_groups(
     body: ElasticBody, boundaries: str | Sequence[str],
-    counts: Literal["all"] | int | Sequence[int | Literal["all"]],
+    counts: Count | Sequence[Count],
 ) -> ContactNodes:
     """Contact nodes on one or several boundaries, in the order of the boundaries, or on none.
 
-    ``counts`` is common to all boundaries or has one entry per boundary; see :func:`contact_nodes`.
+    ``counts`` is common to all boundaries or has one entry per boundary, see :func:`contact_nodes`;
+    two numbers for the one boundary of a solid are those along both of its directions.
 
     Raises
     ------
@@ -58,7 +60,9 @@ def contact_groups(
         for item in boundaries:
             require_kind("modal_basis: contact", str, name=item)
     names = (boundaries,) if isinstance(boundaries, str) else tuple(boundaries)
-    each: tuple[Any, ...] = (tuple(counts) if isinstance(counts, list | tuple)
+    grid = body.dimension == 3 and len(names) == 1 and isinstance(counts, list | tuple) and (
+        len(counts) == 2)
+    each: tuple[Any, ...] = (tuple(counts) if isinstance(counts, list | tuple) and not grid
                              else (counts,) * len(names))
     if not names:
         return ContactNodes(sp.csr_array((0, body.nodes.size)), np.zeros((0, body.dimension)),
@@ -90,7 +94,7 @@ def contact_groups(
 
 
 def contact_nodes(
-    body: ElasticBody, boundary: str, count: int | Literal["all"]
+    body: ElasticBody, boundary: str, count: Count
 ) -> ContactNodes:
     """Contact nodes on a named boundary, in their order along it.
 
@@ -101,8 +105,9 @@ def contact_nodes(
     tributary length.
 
     The face of a solid is cut into patches of facets of nearly equal area, which move and are
-    loaded likewise; with 'all', every facet is one. (The integrals of shape functions over
-    quadratic facets are zero or negative at corners.)
+    loaded likewise; with 'all', every facet is one; two numbers are those along its first and
+    second tangent, or around and across the axis of a ring, bore or shaft. (The integrals of shape
+    functions over quadratic facets are zero or negative at corners.)
 
     Raises
     ------
@@ -141,7 +146,7 @@ def face_nodes(body: ElasticBody, boundary: str) -> Integers:
 
 
 def face_segments(
-    body: ElasticBody, boundary: str, count: int, runs: Sequence[Pieces] | None = None,
+    body: ElasticBody, boundary: str, count: Count, runs: Sequence[Pieces] | None = None,
     key: str = "contact_nodes",
 ) -> tuple[list[Pieces], Array]:
     """Segments of equal length of a boundary, or of the successive pieces ``runs`` of it.

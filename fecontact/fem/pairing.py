@@ -29,6 +29,7 @@ from fecontact.fem.face_samples import (
     pressure_samples,
     segment_samples,
 )
+from fecontact.fem.faces.contact_patches import Count
 from fecontact.fem.faces.solid_pairing import (
     SolidFace,
     check_solids_apart,
@@ -140,7 +141,7 @@ class TwoPassPairing(Summarised):
 
 def pair_faces(
     bodies: Mapping[str, ElasticBody], face: str, other: str, *,
-    nodes: Literal["all"] | int = "all", nodes_on: Literal["finer", "face"] = "finer",
+    nodes: Count = "all", nodes_on: Literal["finer", "face"] = "finer",
     reach: float | None = None, overlap: float = 0.01,
 ) -> Pairing:
     """Pair contact nodes on one face with the closest places on another face or the ground.
@@ -155,10 +156,10 @@ def pair_faces(
     face, other : str
         "BODY.BOUNDARY"; ``other`` may be "ground", y = 0 (of solids z = 0), and both may be of one
         body.
-    nodes : "all" or int
+    nodes : "all" or int, of solids also (int, int)
         Every displacement node, or so many segments of equal length with their mean displacement,
         whose loads are even also where the meshes do not match. Of solids every facet, or patches
-        of about equal area.
+        of about equal area; two numbers are those along the first and the second tangent.
     nodes_on : "finer" or "face"
         Which face has the nodes: ``other`` if it is finer than ``face``, or ``face`` in any case.
     reach : float or None
@@ -194,7 +195,7 @@ def pair_faces(
 
 def pair_both_faces(
     bodies: Mapping[str, ElasticBody], face: str, other: str, *,
-    nodes: Literal["all"] | int = "all", reach: float | None = None, overlap: float = 0.01,
+    nodes: Count = "all", reach: float | None = None, overlap: float = 0.01,
 ) -> TwoPassPairing:
     """Pair two faces twice, with nodes on ``face`` and on ``other``, each with half its length.
 
@@ -231,7 +232,7 @@ def finer_face(bodies: Mapping[str, ElasticBody], face: str, other: str) -> str:
 
 
 def _in_space(
-    bodies: Mapping[str, ElasticBody], first: SolidFace, other: str, nodes: Literal["all"] | int,
+    bodies: Mapping[str, ElasticBody], first: SolidFace, other: str, nodes: Count,
     nodes_on: str, reach: float | None, overlap: float,
 ) -> Pairing:
     if other == "ground":
@@ -299,7 +300,7 @@ def _check_apart(first: Face, second: Face) -> None:
 
 
 def _paired(
-    face: Face, other: Face, nodes: Literal["all"] | int, reach: float | None, overlap: float
+    face: Face, other: Face, nodes: Count, reach: float | None, overlap: float
 ) -> Pairing:
     limit = max(face.extent, other.extent) if reach is None else float(reach)
     present = face_nodes(face.body, face.boundary)
@@ -359,7 +360,7 @@ def _described(
 
 
 def _on_ground(
-    face: Face, nodes: Literal["all"] | int, reach: float | None, overlap: float
+    face: Face, nodes: Count, reach: float | None, overlap: float
 ) -> Pairing:
     check_faces_down(face.body, face.boundary)
     if nodes == "all":

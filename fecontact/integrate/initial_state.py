@@ -10,6 +10,7 @@ from typing_extensions import TypeAliasType
 from fecontact.core.checks import as_floats, is_numeric, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
+from fecontact.fem.faces.frames import turned
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
@@ -18,6 +19,9 @@ from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.statics import equilibrium
 
+RigidMotion = (tuple[float, float, float]
+               | tuple[float, float, float, float, float, float])
+
 
 @dataclass(frozen=True)
 class RigidStart:
@@ -25,27 +29,28 @@ class RigidStart:
 
     Parameters
     ----------
-    displacement : (x, y, phi)
+    displacement : (x, y, phi), of solids (x, y, z, phi_x, phi_y, phi_z)
         Of the origin of coordinates [m, m, rad]; phi counter-clockwise.
-    velocity : (x, y, phi)
+    velocity : (x, y, phi), of solids (x, y, z, phi_x, phi_y, phi_z)
         Of the origin of coordinates [m/s, m/s, rad/s].
 
     Raises
     ------
     InputError
-        If either is not three finite numbers.
+        If either is not three or six finite numbers.
     """
 
-    displacement: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    displacement: RigidMotion = (0.0, 0.0, 0.0)
+    velocity: RigidMotion = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("displacement", "velocity"):
             given = getattr(self, name)
             values = as_floats(given, name) if is_numeric(given) else np.zeros(0)
-            if values.shape != (3,) or not np.isfinite(values).all():
+            if values.shape not in ((3,), (6,)) or not np.isfinite(values).all():
                 raise InputError(f"RigidStart: {name} = {shown(given)} must be three finite "
-                                 f"numbers: x [m], y [m] and phi [rad], or their rates.")
+                                 f"numbers: x [m], y [m] and phi [rad], or their rates; of a solid "
+                                 f"six: x, y, z, phi_x, phi_y and phi_z.")
             object.__setattr__(self, name, tuple(values.tolist()))
 
 
@@ -184,14 +189,16 @@ def _of_points(
     return q
 
 
-def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> Array:
+def _rigid(basis: ModalBasis, motion: RigidMotion, what: str) -> Array:
     q = np.zeros(basis.modes)
     wanted = np.array(motion)
     if not wanted.any():
         return q
-    x, y = basis.positions.T
-    target = np.stack([wanted[0] - wanted[2] * y, wanted[1] + wanted[2] * x,
-                       np.full(len(x), wanted[2])], axis=1)
+    if len(wanted) != len(basis.components):
+        raise InputError(f"initial: {what} = {tuple(motion)} must have {len(basis.components)} "
+                         f"numbers, {', '.join(basis.components)}.")
+    target = _rigid_in_space(basis, wanted) if basis.dimension == 3 else _rigid_in_plane(
+        basis, wanted)
     # Ignore points without rows (such as a missing B or C) and unused components.
     rigid = basis.angular_frequencies == 0.0
     rows = basis.T.reshape(-1, basis.modes)[:, rigid]
@@ -204,3 +211,19 @@ def _rigid(basis: ModalBasis, motion: tuple[float, float, float], what: str) -> 
         raise InputError(f"initial: {what} = {tuple(motion)} is not a motion that the body is free "
                          f"to make; it has {basis.rigid_modes} rigid modes.")
     return q
+
+
+def _rigid_in_plane(basis: ModalBasis, wanted: Array) -> Array:
+    """Motion (P, 3) of the points of a plane body that moves rigidly."""
+    x, y = basis.positions.T
+    return np.stack([wanted[0] - wanted[2] * y, wanted[1] + wanted[2] * x,
+                     np.full(len(x), wanted[2])], axis=1)
+
+
+def _rigid_in_space(basis: ModalBasis, wanted: Array) -> Array:
+    """Motion (P, 6) of the points of a solid; of contact nodes in their frames."""
+    found = np.tile(wanted, (len(basis.positions), 1))
+    found[:, :3] += np.cross(wanted[3:], basis.positions)
+    nodes = slice(2, 2 + basis.contact_nodes)
+    found[nodes] = turned(found[nodes, :, None], basis.normals)[:, :, 0]
+    return found

@@ -282,6 +282,10 @@ class Trajectory(ContactQuantities, Summarised):
         if basis.mode_shapes is None:
             raise InputError(f"The point {point} cannot be found: the modal basis holds no mode "
                              f"shapes; use a named point or a contact node.")
+        if np.shape(point) != (basis.dimension,):
+            axes = "x, y" if basis.dimension == 2 else "x, y, z"
+            raise InputError(f"The point {point} must have {basis.dimension} coordinates, {axes} "
+                             f"in m.")
         distance = np.linalg.norm(basis.mode_shapes.nodes - np.asarray(point, dtype=float), axis=1)
         nearest_node = int(np.argmin(distance))
         reach = np.ptp(basis.mode_shapes.nodes, axis=0).max()

@@ -2,7 +2,7 @@
 
 import warnings
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -38,7 +38,7 @@ class WearHistory(Summarised):
     ----------
     law : WearLaw
     thickness : float
-        Out-of-plane thickness of the face [m].
+        Out-of-plane thickness of the face [m]; one for solids.
     acceleration : float
         Cycles that each computed period stands for.
     x, tributary : (n,) arrays
@@ -103,7 +103,7 @@ class WearHistory(Summarised):
 def wear_history(
     system: ContactSystem,
     law: WearLaw,
-    thickness: float,
+    thickness: float | None,
     *,
     acceleration: float,
     blocks: int,
@@ -130,8 +130,8 @@ def wear_history(
         The system; its gap is that of the unworn body.
     law : EnergyWear or ArchardWear
         Wear law.
-    thickness : float
-        Out-of-plane thickness of the face [m].
+    thickness : float or None
+        Out-of-plane thickness of the face [m]; None for solids.
     acceleration : float
         Cycles that each computed period stands for, above zero.
     blocks, periods : int
@@ -161,7 +161,12 @@ def wear_history(
     """
     require_kind("wear_history", ContactSystem, system=system)
     require_kind("wear_history", WearLaw, law=law)
-    require_positive("wear_history", acceleration=acceleration, thickness=thickness)
+    solid = system.basis.dimension == 3
+    if solid and thickness is not None:
+        raise InputError(f"wear_history: thickness = {thickness!r} is for plane bodies; give None "
+                         f"for a solid.")
+    across = 1.0 if solid else cast(float, thickness)
+    require_positive("wear_history", acceleration=acceleration, thickness=across)
     for name, count, least in (("blocks", blocks, 1), ("periods", periods, 1),
                                ("settling", settling, 0)):
         if isinstance(count, bool) or not isinstance(count, int) or count < least:
@@ -191,7 +196,7 @@ def wear_history(
             if run.status is Status.INTERRUPTED:
                 break
             _end(run, f"block {block}")
-            added = acceleration * run.wear_depth(law, thickness)[-1]
+            added = acceleration * run.wear_depth(law, None if solid else across)[-1]
             _warn_of_swings(added, run, block)
             depth.append(depth[-1] + added)
             cycles.append(cycles[-1] + periods * acceleration)
@@ -206,7 +211,7 @@ def wear_history(
     if not works:
         raise KeyboardInterrupt
     return WearHistory(
-        law, float(thickness), float(acceleration), system.basis.contact_x,
+        law, float(across), float(acceleration), system.basis.contact_x,
         system.basis.tributary, gap, np.array(cycles), np.array(times), np.array(depth),
         np.array(forces), np.array(works), state, status)
 

@@ -14,6 +14,7 @@ from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.contact_face import ContactNodes, contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import numbered_rows
+from fecontact.fem.faces.contact_patches import Count
 from fecontact.fem.faces.surface import linear_facets
 from fecontact.fem.fields import body_elements, linear_cells, stress_of
 from fecontact.fem.pairing import Pairing, TwoPassPairing
@@ -42,7 +43,7 @@ def modal_basis(
     modes: int = 20,
     *,
     contact: str | Sequence[str] = "contact",
-    contact_nodes: Literal["all"] | int | Sequence[int | Literal["all"]] = "all",
+    contact_nodes: Count | Sequence[Count] = "all",
     B: Place | None = None,
     C: Place | None = None,
     points: Mapping[str, Place] | None = None,
@@ -66,7 +67,8 @@ def modal_basis(
         Boundary that touches the ground, facing -y, of solids -z; several interfaces; or none, ().
     contact_nodes : int or 'all', or one of them for each boundary
         Number of equal segments of the boundary, each a contact node with the mean displacement;
-        'all' takes every displacement node. Of solids patches of about equal area, or every facet.
+        'all' takes every displacement node. Of solids patches of about equal area, or every facet;
+        two numbers for one boundary are those along its first and second tangent.
     B, C : place, optional
         Excitation and load point: the name of a point or boundary of the mesh, coordinates, or a
         :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.

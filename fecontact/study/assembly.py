@@ -9,12 +9,14 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located, plain, shown
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
-from fecontact.laws.excitation import Load
+from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.reduction.assembly.links import NonlinearSpring
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.study.bodies_section import InterfaceSettings, Reduced
+from fecontact.study.dimension import require_dimension
 from fecontact.study.links_section import LinkSettings
 from fecontact.system.contact_system import (
     NO_FRICTION_LAW,
@@ -25,7 +27,7 @@ from fecontact.system.gap import Crown, gap_values
 
 
 class Described(Protocol):
-    """What of a study makes a contact system, beside ground and drive."""
+    """What of a study makes a contact system."""
 
     @property
     def normal(self) -> NormalLaw | None:
@@ -42,6 +44,14 @@ class Described(Protocol):
     @property
     def links(self) -> Mapping[str, LinkSettings]:
         """What joins several bodies."""
+
+    @property
+    def ground(self) -> Ground:
+        """The ground."""
+
+    @property
+    def drive(self) -> Drive:
+        """Drive at B."""
 
     @property
     def load(self) -> Load:
@@ -66,6 +76,7 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         For laws, loads or a gap that do not fit the basis; the message names the section.
     """
     basis, several = reduced.basis, reduced.gaps is not None
+    require_dimension(study, basis, title)
     springs = {name: one for name, one in study.links.items()
                if isinstance(one, NonlinearSpring)}
     groups = {name: count for name, count in basis.groups if name not in springs}

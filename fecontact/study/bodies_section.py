@@ -23,6 +23,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
     Geometry,
+    body_table,
     geometry_from_table,
     geometry_mesh,
     geometry_table,
@@ -123,8 +124,9 @@ class BodySections:
 
     def table(self, *, defaults: bool = True) -> dict[str, Any]:
         """The section as a table for TOML."""
-        parts = {name: to_table(getattr(self, name), defaults=defaults)
-                 for name in ("placement", "body", "basis")}
+        parts = {"placement": to_table(self.placement, defaults=defaults),
+                 "body": body_table(self.body, self.geometry, defaults=defaults),
+                 "basis": to_table(self.basis, defaults=defaults)}
         for key in ("contact", "contact_nodes"):
             parts["basis"].pop(key, None)
         return {"geometry": geometry_table(self.geometry, defaults=defaults),
@@ -149,8 +151,10 @@ class InterfaceSettings:
         One pass has contact nodes on one of the faces; two have them on both, which loads them more
         evenly. Totals refer to both passes together. For compliant laws, not on the ground and not
         where the other side slides.
-    nodes : int or 'all'
-        Every displacement node, or so many segments of equal length.
+    nodes : int or 'all', of solids also two integers
+        Every displacement node, or so many segments of equal length. Of solids every facet, so many
+        patches of about equal area, or ``[n, m]`` along the first and second tangent, or around and
+        across a ring, bore or shaft.
     nodes_on : 'finer' or 'face', optional
         Which face has the contact nodes: the finer of the two, or ``face``; by default the finer
         one, and ``face`` where the other side slides.
@@ -162,7 +166,8 @@ class InterfaceSettings:
     gap : float, list or Crown
         Added to the gaps of the geometry [m].
     sliding : SlidingTranslation or SlidingRotation, optional
-        Steady motion of the other side: ``{speed, direction}`` or ``{speed, centre}``.
+        Steady motion of the other side: ``{speed, direction}``, or ``{speed, centre}`` and, of
+        solids, ``axis``.
     """
 
     normal: NormalLaw | None = None
@@ -170,7 +175,7 @@ class InterfaceSettings:
     face: str | None = None
     other: str = "ground"
     passes: Literal[1, 2] = 1
-    nodes: int | Literal["all"] = "all"
+    nodes: int | Literal["all"] | tuple[int, int] = "all"
     nodes_on: Literal["finer", "face"] | None = None
     reach: Annotated[float | None, Unit("m")] = None
     overlap: float = 0.01
@@ -317,12 +322,25 @@ def _known_body(body: str, bodies: Mapping[str, Any], where: str) -> str:
 
 
 def body_meshes(study: Bodies, title: str) -> dict[str, Mesh]:
-    """Meshes of all bodies in their places."""
+    """Meshes of all bodies in their places.
+
+    Raises
+    ------
+    InputError, MeshError
+        For geometries that make no mesh, and for plane bodies beside solids.
+    """
     found = {}
     for name, one in study.bodies.items():
         mesh = geometry_mesh(one.geometry, study.folder, f"{title}: [bodies.{name}.geometry]:")
         with located(f"{title}: [bodies.{name}.placement]:", "Mesh"):
             found[name] = one.placement.placed(mesh)
+    kinds = {2: "a plane body", 3: "a solid"}
+    (first, mesh), *others = found.items()
+    for name, other in others:
+        if other.dimension != mesh.dimension:
+            raise InputError(f"{title}: [bodies.{name}.geometry] is {kinds[other.dimension]} and "
+                             f"[bodies.{first}.geometry] {kinds[mesh.dimension]}; bodies of one "
+                             f"study must be all plane or all solids, model them alike.")
     return found
 
 

@@ -98,3 +98,13 @@ def geometry_table(geometry: Geometry, *, defaults: bool = True) -> dict[str, An
     shape = {kind: name for name, kind in SHAPES.items()}.get(type(geometry))
     table = to_table(geometry, defaults=defaults)
     return table if shape is None else {"shape": shape, **table}
+
+
+def body_table(body: Any, geometry: Geometry, *, defaults: bool = True) -> dict[str, Any]:
+    """Table of a ``[body]``, without defaults of plane bodies where the shape is a solid."""
+    table = to_table(body, defaults=defaults)
+    if isinstance(geometry, SolidShape):
+        needed = to_table(body, defaults=False)
+        return {key: value for key, value in table.items()
+                if key in needed or key not in ("thickness", "plane")}
+    return table

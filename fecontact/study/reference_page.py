@@ -116,9 +116,10 @@ def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterato
     paragraphs = [_table(cls, _summary(cls)) for cls in classes]
     yield name, _section(name, *paragraphs)
     for cls in classes:
-        for key, hint in get_type_hints(cls).items():
-            if inner := _inner(hint):
-                yield from _sections(f"{name}.{key}", inner, printed)
+        hints = get_type_hints(cls)
+        for entry in fields(cls):
+            if inner := _inner(hints[entry.name]):
+                yield from _sections(f"{name}.{entry.name}", inner, printed)
 
 
 def _inner(hint: Any) -> list[Any]:

@@ -13,7 +13,7 @@ from fecontact.core.errors import (
     require_not_negative,
     require_positive,
 )
-from fecontact.core.tables import located
+from fecontact.core.tables import located, plain, shown
 from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody, Material
@@ -44,7 +44,7 @@ class BodySettings:
     youngs_modulus, poisson_ratio, density : float, optional
         [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
     thickness : float
-        Out-of-plane thickness of a plane body [m]; not of a solid.
+        Out-of-plane thickness of a plane body [m]; not for a solid.
     plane : 'stress' or 'strain'
         Plane stress for thin bodies, plane strain for long ones; not for a solid.
     degree : 1 or 2
@@ -83,7 +83,19 @@ class BodySettings:
         return replace(Material.named(self.material or "steel"), **given)
 
     def elastic_body(self, mesh: Mesh) -> ElasticBody:
-        """Elastic body on a mesh."""
+        """Elastic body on a mesh.
+
+        Raises
+        ------
+        InputError, MeshError
+            For keys of plane bodies with a solid mesh, and as :class:`fecontact.ElasticBody`.
+        """
+        if mesh.dimension == 3:
+            usual = BodySettings()
+            for key in ("thickness", "plane", "rotation"):
+                if (value := getattr(self, key)) != getattr(usual, key):
+                    raise InputError(f"ElasticBody: {key} = {shown(plain(value))} is for plane "
+                                     f"bodies, but the mesh is that of a solid; leave it out.")
         return ElasticBody(mesh, self.elastic_material, thickness=self.thickness,
                            plane=self.plane, degree=self.degree, fixed=self.fixed)
 
@@ -99,9 +111,12 @@ class BasisSettings:
         Number of modes, the rigid ones included.
     contact : str or list of str
         Boundary in contact with the ground, or several; each becomes an interface of its name.
-    contact_nodes : int or 'all', or list
+        Faces of solids look down, towards -z.
+    contact_nodes : int or 'all', of solids also two integers, or list
         Number of contact nodes, or 'all' for every mesh node of the boundary; a list has one entry
-        for each boundary.
+        for each boundary. A solid's face is cut into so many patches of about equal area, 'all'
+        makes every facet one, and ``[n, m]`` are numbers along its first and second tangent, x and
+        y, or around and across a ring.
     B, C : place, optional
         Excitation and load point: name of a point or boundary, [x, y], of solids [x, y, z], or a
         patch ``{at = name or place, radius = r}``.
@@ -118,7 +133,7 @@ class BasisSettings:
     loads : list of places
         Loads whose static response is added to the modes, for 'residual' and 'craig-bampton':
         'gravity' (and base acceleration), boundaries (pressure and shear), points (forces).
-    dashpots : mapping of point to [b_x, b_y]
+    dashpots : mapping of point to [b_x, b_y], of solids [b_x, b_y, b_z]
         Viscous dampers between points, or contact nodes by number, and the inertial frame
         [N s/m].
     select : list, optional
@@ -129,7 +144,8 @@ class BasisSettings:
 
     modes: int = 20
     contact: str | tuple[str, ...] = "contact"
-    contact_nodes: int | Literal["all"] | tuple[int | Literal["all"], ...] = "all"
+    contact_nodes: int | Literal["all"] | tuple[
+        int | Literal["all"] | tuple[int, int], ...] = "all"
     B: Place | None = None
     C: Place | None = None
     points: Mapping[str, Place] = field(default_factory=dict)
@@ -137,7 +153,7 @@ class BasisSettings:
     reduction: Literal["vibration", "residual", "craig-bampton"] = "vibration"
     tolerance: float = 0.1
     loads: tuple[Place, ...] = ()
-    dashpots: Annotated[Mapping[str, tuple[float, float]], Unit("N s/m")] = field(
+    dashpots: Annotated[Mapping[str, Coordinates], Unit("N s/m")] = field(
         default_factory=dict)
     select: tuple[int, ...] | None = None
     eigensolver: Literal["auto", "direct", "iterative"] = "auto"
@@ -146,7 +162,8 @@ class BasisSettings:
         if self.modes < 1:
             raise InputError(f"BasisSettings: modes = {self.modes} must be at least 1.")
         given = self.contact_nodes
-        counts = given if isinstance(given, tuple) else (given,)
+        counts = [count for one in (given if isinstance(given, tuple) else (given,))
+                  for count in (one if isinstance(one, tuple) else (one,))]
         if any(count != "all" and count < 1 for count in counts):
             raise InputError(f"BasisSettings: contact_nodes = {self.contact_nodes} must be at "
                              f"least 1, or \"all\".")
@@ -212,7 +229,8 @@ class SimulationSettings:
         Events that end the run when they first occur: 'touch-down', 'lift-off', 'stick', 'slip'.
     initial : 'rest', 'sliding', 'preload' or RigidStart
         Initial state; 'preload' for the end of the path of loads of ``[preload]``;
-        ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid-body motion.
+        ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid-body motion, of solids
+        ``[x, y, z, phi_x, phi_y, phi_z]``.
     """
 
     t_end: Annotated[float | None, Unit("s")] = None
@@ -352,6 +370,8 @@ class RenderSettings:
         Title shown at the top of the picture.
     t_start, t_end : float, optional
         Time interval to draw [s].
+    view : 'above' or 'below'
+        Where solids are seen from; from below their contact faces show.
     """
 
     frames: int = 200
@@ -362,6 +382,7 @@ class RenderSettings:
     title: str | None = None
     t_start: Annotated[float | None, Unit("s")] = None
     t_end: Annotated[float | None, Unit("s")] = None
+    view: Literal["above", "below"] = "above"
 
     def __post_init__(self) -> None:
         if self.frames < 1:

@@ -37,7 +37,12 @@ from fecontact.study.bodies_section import (
     bodies_from_tables,
     check_bodies,
 )
-from fecontact.study.geometry_section import Geometry, geometry_from_table, geometry_table
+from fecontact.study.geometry_section import (
+    Geometry,
+    body_table,
+    geometry_from_table,
+    geometry_table,
+)
 from fecontact.study.links_section import LinkSettings, link_table, links_from_tables
 from fecontact.study.models import StudyModels
 from fecontact.study.preload_section import PreloadSettings
@@ -253,6 +258,7 @@ class Study(Summarised, StudyModels):
                             for name, one in self.bodies.items()}}
         if self.geometry is not None:
             first = {"geometry": geometry_table(self.geometry, defaults=defaults)}
+            sections["body"] = body_table(self.body, self.geometry, defaults=defaults)
         if self.links:
             first["links"] = {name: link_table(one, defaults=defaults)
                               for name, one in self.links.items()}
@@ -376,6 +382,8 @@ class Study(Summarised, StudyModels):
             raise InputError(f"{title}: [wear] needs bodies of one thickness; give the same to all "
                              f"in [bodies.NAME.body].")
         system = self.system()
+        if system.basis.dimension == 3:
+            thickness = None
         with located(f"{title}: [wear]:", "wear_history:"):
             return wear_history(
                 system, law, thickness, acceleration=wanted.acceleration,

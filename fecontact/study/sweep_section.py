@@ -143,13 +143,13 @@ class Strobing:
     point : str or int
         Point whose displacement is kept once per period: 'B', 'C', a named point, or the number of
         a contact node.
-    component : 'x' or 'y'
+    component : 'x' or 'y', of solids also 'z'
     """
 
     transient_periods: int = 100
     keep: int = 64
     point: str | int = "B"
-    component: Literal["x", "y"] = "x"
+    component: Literal["x", "y", "z"] = "x"
 
     def __post_init__(self) -> None:
         require_kind("Strobing", int, transient_periods=self.transient_periods, keep=self.keep)

@@ -17,7 +17,6 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
 _PHASES = 8  # states per period, to measure the range of the motion
-_AXES = ("x", "y")
 
 
 def strobed_rows(
@@ -68,7 +67,7 @@ def strobe_times(period: float, strobing: Strobing) -> Array:
 
 def _row(case: SweepCase, system: ContactSystem, states: Array, strobing: Strobing) -> Row:
     m = system.basis.modes
-    row = system.basis.T[system.basis.point_index(strobing.point), _AXES.index(strobing.component)]
+    row = system.basis.point_row(strobing.point, strobing.component)
     once = states[len(states) - 1 - _PHASES * (strobing.keep - 1) :: _PHASES]
     return Row(case=case.key, values={"periods": _periods(states, once, system)}, reason="",
                points=(once[:, :m] @ row).tolist())

@@ -143,8 +143,10 @@ def _part(trajectory: Trajectory, state: ContactState) -> float:
 
 def largest_displacement(trajectory: Trajectory) -> float:
     """Largest displacement of B, C, the contact nodes and other named points at any time."""
-    rows = trajectory.system.basis.T[:, :2]
-    moved = np.einsum("pkm,tm->tpk", rows, trajectory.modal_coordinates)
+    basis = trajectory.system.basis
+    moved = np.einsum("pkm,tm->tpk", basis.T[:, : basis.dimension], trajectory.modal_coordinates)
+    if basis.dimension == 3:
+        return float(np.linalg.norm(moved, axis=-1).max())
     return float(np.hypot(moved[..., 0], moved[..., 1]).max())
 
 
@@ -231,7 +233,8 @@ def _power(trajectory: Trajectory, name: str) -> float:
 
 def wear_depth(trajectory: Trajectory, wear: WearLaw, thickness: float) -> float:
     """Largest wear depth along the face, by the law of ``[wear]``."""
-    return float(trajectory.wear_depth(wear, thickness)[-1].max())
+    solid = trajectory.system.basis.dimension == 3
+    return float(trajectory.wear_depth(wear, None if solid else thickness)[-1].max())
 
 
 def wear_rate(trajectory: Trajectory, wear: WearLaw, thickness: float) -> float:

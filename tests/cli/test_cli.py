@@ -430,7 +430,7 @@ def test_completion_names_every_command_to_the_shell(cli, shell):
         assert command in script
 
 
-def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
+def test_demo_makes_all_studies(cli, tmp_path, monkeypatch):
     from fecontact.cli import demo
 
     full = demo.template
@@ -447,7 +447,7 @@ def test_demo_makes_both_studies(cli, tmp_path, monkeypatch):
     assert code == 0, err
     assert "total" in out
     assert files_below(tmp_path / "d") == {
-        f"{name}{end}" for name in ("beam_on_wavy_ground", "pendulum_on_stop")
+        f"{name}{end}" for name in ("beam_on_wavy_ground", "pendulum_on_stop", "pad_on_belt")
         for end in (".toml", ".msh", ".vtkhdf", ".mp4", "-modes.png", "-history.png",
                     "-phase.png", "-contact_map.png", "-energies.png")}
 

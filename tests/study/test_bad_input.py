@@ -477,7 +477,7 @@ plot run.vtkhdf history -o x.txt | x.txt
 plot run.vtkhdf history -o folder.toml | folder.toml
 plot run.vtkhdf history --point Q | 'Q'
 plot run.vtkhdf history --point 99 | 99
-plot run.vtkhdf history --point 1,2,3 | 1,2,3
+plot run.vtkhdf history --point 1,2,3 | 2 coordinates, x, y
 plot run.vtkhdf history --point nan,nan | nan
 plot run.vtkhdf history --point 9,9 | 9
 plot run.vtkhdf history --component z | component

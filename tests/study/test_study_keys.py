@@ -22,8 +22,9 @@ def classes_within(hint):
             yield from classes_within(cls)
     elif is_dataclass(hint):
         yield hint
-        for inner in get_type_hints(hint).values():
-            yield from classes_within(inner)
+        hints = get_type_hints(hint)
+        for entry in fields(hint):
+            yield from classes_within(hints[entry.name])
     for part in get_args(hint):
         yield from classes_within(part)
 
@@ -57,7 +58,7 @@ def test_defaults_and_units_of_a_section():
     assert "| `speed` | a number | `0` | V, positive in +x [m/s]. |" in section
     assert "| `amplitude`, `wavelength`" not in section
     needed = study_keys("load.forces")
-    assert '| `component` | "x", "y" or "phi" | `"y"` |' in needed
+    assert '| `component` | "x", "y", "z", "phi", "phi_x", "phi_y" or "phi_z" | `"y"` |' in needed
     assert "| `signal` | a table of a law and its parameters |  | Its history" in needed
     laws = study_keys("interfaces.NAME")
     assert "total values refer to the face of the interface" in laws

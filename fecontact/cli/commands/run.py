@@ -104,6 +104,8 @@ def render(
         help="Quantity that colours the body.")] = None,
     scale: Annotated[float | None, Parameter(
         help="Magnification of displacements.")] = None,
+    view: Annotated[Literal["above", "below"] | None, Parameter(
+        help="Where solids are seen from; from below their contact faces show.")] = None,
     t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
     t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
     trust: Trust = False,
@@ -111,11 +113,12 @@ def render(
     """Render a run as a movie or as numbered pictures; defaults come from [render] of the study."""
     from dataclasses import replace
 
-    from fecontact.cli.run_files import movie, stored_run
+    from fecontact.cli.run_files import movie, stored_run, wear_of
     from fecontact.core.files.atomic_write import output_folder
 
     changes: dict[str, Any] = {
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
+        "view": view,
         "t_start": t_start, "t_end": t_end}
     stored = stored_run(file, trust, set_)
     from fecontact.core.tables import located
@@ -125,7 +128,7 @@ def render(
                            **{key: value for key, value in changes.items() if value is not None})
     target = output or stored.path.with_suffix(".mp4")
     with output_folder(target.parent):
-        echo_written(movie(stored.trajectory, target, settings))
+        echo_written(movie(stored.trajectory, target, settings, wear_of(stored)))
     warn_if_stale(file, stored.current)
 
 
@@ -139,10 +142,11 @@ def plot(
     set_: Changes = None,
     point: Annotated[list[str] | None, Parameter(
         negative=(), show_default=False,
-        help="Name of a point, number of a contact node, or place `x,y`; B by default. A history "
-        "takes several.")] = None,
-    component: Annotated[Literal["x", "y", "phi"] | None, Parameter(
-        help="Component of the motion; that of the drive by default.")] = None,
+        help="Name of a point, number of a contact node, or place `x,y` or `x,y,z`; B by default. "
+        "A history takes several.")] = None,
+    component: Annotated[Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None, Parameter(
+        help="Component of the motion, of solids x, y, z, phi_x, phi_y or phi_z, else x, y or phi; "
+        "that of the drive by default.")] = None,
     quantity: Annotated[str, Parameter(
         help="Quantity for spectra: velocity, displacement, normal_force, ...")] = "velocity",
     highest_hz: Annotated[float | None, Parameter(help="Highest frequency to plot [Hz].")] = None,

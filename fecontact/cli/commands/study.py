@@ -14,10 +14,11 @@ def init(
     file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
-    shape: Annotated[Literal["beam", "pendulum", "block", "pad", "mesh", "sweep"], Parameter(
+    shape: Annotated[Literal["beam", "pendulum", "block", "pad", "solid", "mesh", "sweep"],
+                     Parameter(
         help="Beam on wavy ground, pendulum on a stop, block on a moving belt, a pad on a block, "
-        "which are two bodies, a part from a mesh file of your own, or a sweep over the speed of a "
-        "belt.")] = "beam",
+        "which are two bodies, a solid pad on a belt in space, a part from a mesh file of your "
+        "own, or a sweep over the speed of a belt.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:

@@ -1,12 +1,12 @@
-"""Template study files; the demonstration runs two of them."""
+"""Template study files; the demonstration runs three of them."""
 
 from importlib.resources import files
 
 TEMPLATES = {"beam": "beam_on_wavy_ground", "pendulum": "pendulum_on_stop",
-             "block": "block_on_belt", "pad": "pad_on_block",
+             "block": "block_on_belt", "pad": "pad_on_block", "solid": "pad_on_belt",
              "mesh": "own_mesh", "sweep": "sweep_of_block"}
 
 
 def template(shape: str) -> str:
-    """Text of a template: a shape, pad for two bodies, mesh for one's own, or a sweep."""
+    """Text of a template: a shape, pad for two bodies, mesh for one's own, solid, or a sweep."""
     return files(__name__).joinpath(f"{TEMPLATES[shape]}.toml").read_text(encoding="utf-8")

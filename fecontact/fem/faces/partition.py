@@ -6,6 +6,7 @@ second moments and differences of area is taken, so that a face with a grid of f
 its lines. Nothing is random; equal faces are cut equally.
 """
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,6 +21,8 @@ _UNEQUAL = 10.0
 _AROUND = 2
 # Coordinates closer than this fraction of the extent count as equal.
 _SAME = 1e-7
+# Least distance of the middles of neighbours in a grid of patches, of their mean distance.
+_APART = 0.3
 # A face is flat enough to have a direction if its mean normal is at least so long.
 _FLAT = 0.5
 
@@ -40,6 +43,69 @@ def partition(surface: Surface, count: int) -> Integers:
         which = part == number
         owner[which] = first + _cut(surface.only(which), share)
         first += share
+    return _numbered(surface, owner, count)
+
+
+def grid_partition(surface: Surface, along: int, across: int) -> Integers | None:
+    """Patch (k,) of each facet of a connected face, of ``along`` strips of ``across`` patches.
+
+    Strips follow each other along the first tangent of the face and are cut along the second one,
+    or, on a ring, a bore or a shaft, follow each other around its axis and are cut along it or away
+    from it; whichever makes the more compact patches. None if the facets make no such grid. The
+    patches are numbered as those of :func:`partition`.
+    """
+    count = along * across
+    best, least = None, np.inf
+    pairs = [_along_first(surface, frame[:2]) for frame in itertools.islice(_frames(surface), 2)]
+    for u, v in [*pairs, *([_around(surface)] if _closes(surface) else [])]:
+        owner = _strips(u, v, surface.areas, count, along)
+        if _is_grid(u, v, surface.areas, owner, along, across) and (
+                cost := _cost(surface, owner, count)) < least * (1.0 - 1e-6):
+            best, least = owner, cost
+    return None if best is None else _numbered(surface, best, count)
+
+
+def _closes(surface: Surface) -> bool:
+    """Whether a connected face closes around an axis, by its numbers of corners, edges, facets."""
+    count = 3 if surface.facets.shape[1] in (3, 6) else 4
+    corners = surface.facets[:, :count]
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+    edges = np.unique(np.sort(ends, axis=1), axis=0)
+    return len(np.unique(corners)) - len(edges) + len(corners) == 0
+
+
+def _is_grid(
+    u: Array, v: Array, areas: Array, owner: Integers, along: int, across: int
+) -> bool:
+    """Whether strips follow each other along u, and their patches along v.
+
+    A grid of fewer lines of facets than strips would be cut across instead.
+    """
+    count = along * across
+    sizes = np.bincount(owner, areas, minlength=count)
+    if (sizes == 0.0).any():
+        return False
+    middles, places = (np.bincount(owner, areas * one, minlength=count).reshape(along, across)
+                       for one in (u, v))
+    strips = middles.sum(axis=1) / sizes.reshape(along, across).sum(axis=1)
+    steps = np.diff(places / sizes.reshape(along, across), axis=1)
+    return bool((np.diff(strips) > _APART * np.ptp(u) / along).all()
+                and (steps > _APART * np.ptp(v) / across).all())
+
+
+def _along_first(surface: Surface, pair: Array) -> tuple[Array, Array]:
+    """Two coordinates (2, k) of the facets, that which rises most along the first tangent first."""
+    mean = surface.area_vectors.sum(axis=0)
+    size = float(np.linalg.norm(mean))
+    if size <= _FLAT * surface.areas.sum():
+        return pair[0], pair[1]
+    first = surface.centres @ frames_of(mean[None] / size)[0][0]
+    rises = np.abs((pair - pair.mean(axis=1)[:, None]) @ (first - first.mean()))
+    return (pair[0], pair[1]) if rises[0] >= rises[1] * (1.0 - 1e-9) else (pair[1], pair[0])
+
+
+def _numbered(surface: Surface, owner: Integers, count: int) -> Integers:
+    """The patches (k,) numbered along x, then y, then z of their centres."""
     centres = surface.patches(owner).centres
     places = np.round(centres / (1e-6 * max(float(np.ptp(surface.centres, axis=0).max()), 1e-300)))
     rank = np.empty(count, dtype=np.int64)

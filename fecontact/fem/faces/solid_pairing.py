@@ -8,7 +8,7 @@ without a partner do not count to the area of their patch.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,12 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
-from fecontact.fem.faces.contact_patches import check_facets_down, contact_patches, face_surface
+from fecontact.fem.faces.contact_patches import (
+    Count,
+    check_facets_down,
+    contact_patches,
+    face_surface,
+)
 from fecontact.fem.faces.frames import tangents_of
 from fecontact.fem.faces.surface import Patches, Surface
 from fecontact.fem.pairing_report import PairingReport, closed_gaps
@@ -137,8 +142,7 @@ def _at(corners: Array, local: Array) -> tuple[Array, Array, Array]:
 
 
 def paired_solids(
-    face: SolidFace, other: SolidFace, count: int | Literal["all"], reach: float | None,
-    overlap: float,
+    face: SolidFace, other: SolidFace, count: Count, reach: float | None, overlap: float,
 ) -> dict[str, Any]:
     """What :class:`fecontact.fem.Pairing` holds of two faces of solids.
 
@@ -203,7 +207,7 @@ def paired_solids(
 
 
 def grounded_solid(
-    face: SolidFace, count: int | Literal["all"], reach: float | None, overlap: float
+    face: SolidFace, count: Count, reach: float | None, overlap: float
 ) -> dict[str, Any]:
     """The same of a face above the ground, z = 0."""
     surface = face.surface

@@ -9,14 +9,17 @@ import numpy as np
 from numba import types
 
 from fecontact.core.checks import as_floats
-from fecontact.core.compiled import CompiledLaw, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, i8, kernel, matrix, vector
 from fecontact.core.errors import InputError, require_finite, require_positive
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
+from fecontact.laws.data_columns import read_columns
 from fecontact.laws.signatures import ground_surface, surface_at
 
 # Leading parameters of the kernel: level, origin, spacing, numbers of points.
 _HEAD = 7
+
+_UNEVEN = 0.01  # of the spacing: rounding of the places in a file
 
 
 @kernel(types.void(i8, vector, vector, vector, matrix))
@@ -63,6 +66,25 @@ def _spline(x, y, p):
             zyy / (p[4] * p[4]))
 
 
+def _even_places(where: str, axis: str, given: Array) -> tuple[float, float, int]:
+    """First place, distance and number of the different places along an axis."""
+    order = np.sort(given)
+    step = float(np.ptp(order)) / max(len(order) - 1, 1)
+    places = order[np.append(True, np.diff(order) > 1e-3 * step)]
+    count = len(places)
+    if count < 2:
+        raise InputError(f"{where} has one {axis} only, {order[0]:g}; a map of heights needs at "
+                         f"least four different x and y.")
+    spacing = float(places[-1] - places[0]) / (count - 1)
+    away = np.abs(places - np.linspace(places[0], places[-1], count))
+    if away.max() > _UNEVEN * spacing:
+        worst = int(away.argmax())
+        raise InputError(f"{where} has uneven places in {axis}: {places[worst]:g} is not a whole "
+                         f"number of spacings, {spacing:g} m, from {places[0]:g}; interpolate the "
+                         f"heights to an even grid.")
+    return float(places[0]), spacing, count
+
+
 @dataclass(frozen=True)
 class HeightMap:
     r"""Heights of the ground below solids, measured over a grid that repeats itself.
@@ -78,25 +100,33 @@ class HeightMap:
     heights : (N, M) sequence
         Heights z at N places in x and M in y, positive out of the ground; at least 4 x 4 [m].
     spacing_x, spacing_y : float
-        h_x and h_y, distances of the points, positive [m].
+        h_x and h_y, distances of the points, positive; required with heights [m].
     origin_x, origin_y : float
         Place of the first point [m].
+    file : str, optional
+        Text or CSV file with columns x, y and height [m], one line for each point of the grid in
+        any order, instead of all the others; lines before the first line of numbers are a header.
+        It is read once; then ``file`` is None.
 
     Raises
     ------
     InputError
-        For heights that are not a grid of finite numbers, or are too few.
+        For heights that are not a grid of finite numbers, or are too few, and for files whose
+        points are not those of an even grid.
     """
 
-    kernel: ClassVar[CompiledLaw] = _spline
+    kernel: ClassVar = _spline
 
-    heights: Annotated[tuple[tuple[float, ...], ...], Unit("m")]
-    spacing_x: Annotated[float, Unit("m")]
-    spacing_y: Annotated[float, Unit("m")]
+    heights: Annotated[tuple[tuple[float, ...], ...], Unit("m")] = ()
+    spacing_x: Annotated[float, Unit("m")] = 0.0
+    spacing_y: Annotated[float, Unit("m")] = 0.0
     origin_x: Annotated[float, Unit("m")] = 0.0
     origin_y: Annotated[float, Unit("m")] = 0.0
+    file: str | None = None
 
     def __post_init__(self) -> None:
+        if self.file is not None:
+            self._read(self.file)
         require_positive("HeightMap", spacing_x=self.spacing_x, spacing_y=self.spacing_y)
         require_finite("HeightMap", origin_x=self.origin_x, origin_y=self.origin_y)
         grid = as_floats(self.heights, "HeightMap: heights")
@@ -104,6 +134,25 @@ class HeightMap:
             raise InputError(f"HeightMap: heights of shape {grid.shape} must be a grid of finite "
                              f"numbers, at least 4 x 4.")
         object.__setattr__(self, "heights", tuple(tuple(row) for row in grid.tolist()))
+
+    def _read(self, file: str) -> None:
+        """Take over the heights, the spacing and the origin of a file."""
+        for name in ("heights", "spacing_x", "spacing_y", "origin_x", "origin_y"):
+            if np.size(given := getattr(self, name)) and np.any(given):
+                raise InputError(f"HeightMap: file = {file!r} cannot be combined with {name}; give "
+                                 f"the file alone, or the heights and their spacing.")
+        x, y, z = read_columns("HeightMap", file, ("x", "y", "height"))
+        where = f"HeightMap: file = '{file}'"
+        first, step, n = _even_places(where, "x", x)
+        first_y, step_y, m = _even_places(where, "y", y)
+        at = np.rint((x - first) / step) * m + np.rint((y - first_y) / step_y)
+        if len(z) != n * m or len(np.unique(at)) != n * m:
+            raise InputError(f"{where} has {len(z)} lines, but its {n} different x and {m} "
+                             f"different y make a grid of {n * m} points; give each point once.")
+        heights = z[np.argsort(at)].reshape(n, m)
+        for name, value in (("heights", heights), ("spacing_x", step), ("spacing_y", step_y),
+                            ("origin_x", first), ("origin_y", first_y), ("file", None)):
+            object.__setattr__(self, name, value)
 
     def parameters(self) -> Array:
         """Level, origin, spacing, numbers of points and the coefficients c."""

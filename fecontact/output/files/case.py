@@ -41,6 +41,9 @@ _OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
 _OF_LAWS = {"penetration_rate": "m/s", "ground_rate": "m/s", "contact_energy": "J"}
 _CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
             "slip_velocity": "m/s", "contact_state": "0 open, 1 stick, 2 slip"}
+# In space, along both tangents.
+_IN_SPACE = {"friction_force": "friction_forces", "slip_velocity": "slip_velocities"}
+_TANGENTS = ("t", "t2")
 # Columns of a contact history, in order.
 _COLUMNS = ("normal_force", "friction_force", "penetration", "penetration_rate", "slip_velocity",
             "ground_rate")
@@ -215,7 +218,14 @@ def _read_of_laws(stored: Any, basis: ModalBasis, count: int) -> tuple[Any, Any,
     if not all(name in stored for name in _OF_LAWS):
         return None
     shape = count, basis.contact_nodes
-    return (np.stack([array(stored, name, shape) for name in _COLUMNS], axis=2),
+    if basis.dimension == 2:
+        history = [array(stored, name, shape) for name in _COLUMNS]
+    else:
+        read = {name: array(stored, _IN_SPACE.get(name, name),
+                            (*shape, 2) if name in _IN_SPACE else shape) for name in _COLUMNS}
+        history = [read[name][..., 0] if name in _IN_SPACE else read[name] for name in _COLUMNS]
+        history += [read[name][..., 1] for name in _IN_SPACE]
+    return (np.stack(history, axis=2),
             array(stored, "contact_state", shape, "i"),
             array(stored, "contact_energy", (count,)))
 
@@ -234,12 +244,16 @@ def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
     kept = {name: unit for name, unit in _OPTIONAL.items()
             if getattr(trajectory, name) is not None}
     of_laws = _of_laws(trajectory) if law_files(system_tables(trajectory.system)) else {}
-    for name, unit in (_STATE | kept | _CONTACT | _OF_LAWS).items():
+    contact = _CONTACT if trajectory.system.basis.dimension == 2 else {
+        _IN_SPACE.get(name, name): unit for name, unit in _CONTACT.items()}
+    for name, unit in (_STATE | kept | contact | _OF_LAWS).items():
         if name in _OF_LAWS and not of_laws:
             continue
         data = group.create_dataset(name, data=of_laws[name] if name in of_laws
                                     else getattr(trajectory, name))
         data.attrs["unit"] = unit
+        if name in _IN_SPACE.values():
+            data.attrs["component_names"] = list(_TANGENTS)
     if trajectory.events is not None:
         events = group.create_group("events")
         for name, unit in (("time", "s"), ("node", ""), ("states", "as y = [q, q', z]")):

@@ -12,6 +12,7 @@ from fecontact.core.files.atomic_write import replaced
 from fecontact.fem.fields import BodyFields
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.dataset import columns, coordinates, to_xarray, variables
+from fecontact.output.files.vtu import VtuField, write_vtu
 
 SUFFIXES = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc"}
 
@@ -141,7 +142,7 @@ def export_fields(fields: BodyFields, path: str | Path) -> Path:
     """Write displacement and stress over a body as a VTU file, for ParaView and other programs.
 
     At the nodes of the undeformed body: ``displacement`` [m], ``stress_xx``, ``stress_yy``,
-    ``stress_zz``, ``stress_xy`` and ``von_mises`` [Pa].
+    ``stress_zz``, ``stress_xy``, of solids ``stress_yz`` and ``stress_xz``, and ``von_mises`` [Pa].
 
     Returns
     -------
@@ -155,13 +156,19 @@ def export_fields(fields: BodyFields, path: str | Path) -> Path:
     """
     require_kind("export_fields", BodyFields, fields=fields)
     path = as_path(path, "fields")
-    from fecontact.fem.mesh_files import write_fields
-
-    stresses = zip(("xx", "yy", "zz", "xy"), fields.stress.T, strict=True)
-    write_fields(path, fields.nodes, fields.cells, {
-        "displacement": fields.displacement,
-        **{f"stress_{name}": values for name, values in stresses},
-        "von_mises": fields.von_mises})
+    if path.suffix.lower() != ".vtu":
+        raise InputError(f"{path}: fields are written as VTU files; choose a name that ends in "
+                         f".vtu.")
+    d = fields.nodes.shape[1]
+    moved = np.zeros((len(fields.nodes), 3))
+    moved[:, :d] = fields.displacement
+    with replaced(path) as part:
+        write_vtu(part, fields.nodes, fields.cells, [
+            VtuField("displacement", "Point", moved, ("x", "y", "z")),
+            *(VtuField(f"stress_{name}", "Point", values) for name, values in zip(
+                ("xx", "yy", "zz", "xy", "yz", "xz")[: 4 if d == 2 else 6], fields.stress.T,
+                strict=True)),
+            VtuField("von_mises", "Point", fields.von_mises)])
     return path
 
 

@@ -10,6 +10,8 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.ground.ground import Ground
+from fecontact.output.files.contact_facets import contact_facets
 from fecontact.reduction.assembly.contact_faces import contact_directions
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -74,45 +76,62 @@ def body_numbers(basis: ModalBasis) -> NDArray[np.int32]:
 
 
 def displacement(field: ModeShapes, q: Array) -> Array:
-    """Displacements (F, N, 2) of the nodes [m] at modal coordinates q (F, m)."""
-    nodes, _, modes = field.shapes.shape
-    return np.asarray(q @ field.shapes.reshape(2 * nodes, modes).T).reshape(len(q), nodes, 2)
+    """Displacements (F, N, d) of the nodes [m] at modal coordinates q (F, m)."""
+    nodes, d, modes = field.shapes.shape
+    return np.asarray(q @ field.shapes.reshape(d * nodes, modes).T).reshape(len(q), nodes, d)
 
 
 def von_mises(field: ModeShapes, q: Array) -> Array:
     """Von Mises stress (F, N) at the nodes [Pa] at modal coordinates q (F, m)."""
-    nodes, _, modes = field.stress.shape
-    components = field.stress.transpose(1, 0, 2).reshape(4 * nodes, modes)
-    xx, yy, zz, xy = np.moveaxis((q @ components.T).reshape(len(q), 4, nodes), 1, 0)
-    square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2
+    nodes, count, modes = field.stress.shape
+    components = field.stress.transpose(1, 0, 2).reshape(count * nodes, modes)
+    xx, yy, zz, *shears = np.moveaxis((q @ components.T).reshape(len(q), count, nodes), 1, 0)
+    square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
+    for shear in shears:
+        square = square + 3.0 * shear**2
     return np.sqrt(square)
 
 
 def cell_stress(field: ModeShapes, q: Array) -> Array:
-    """Stresses (F, M, 4) xx, yy, zz, xy of the cells, means of their corners [Pa]."""
+    """Stresses (F, M, 4) xx, yy, zz, xy, or (F, M, 6) with yz, xz, of the cells [Pa].
+
+    They are the means of their corners.
+    """
     count, corners = field.cells.shape
-    modes = field.stress.shape[2]
+    _, components, modes = field.stress.shape
     # Corner by corner: all at once would hold the stress of each cell several times.
     mean = sum(field.stress[field.cells[:, corner]] for corner in range(corners)) / corners
-    return np.asarray(q @ mean.reshape(4 * count, modes).T).reshape(len(q), count, 4)
+    return np.asarray(q @ mean.reshape(components * count, modes).T).reshape(
+        len(q), count, components)
 
 
 def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
-    """Forces (F, n, 2) of the other side on the contact nodes, along x and y [N].
+    """Forces (F, n, d) of the other side on the contact nodes, along the axes [N].
 
-    ``F n - R t`` with normal and tangent of each node: [-R - F y_R', F] on the ground, where y_R'
-    is the slope of the ground below a node, or zero for contact forces that stay vertical.
+    ``F n - R t`` with normal and tangent of each node, in space both of its tangents: [-R - F y_R',
+    F] on the ground, where y_R' is the slope of the ground below a node, or zero for contact forces
+    that stay vertical.
     """
     tangents, normals = contact_directions(trajectory.system.basis)
     forces = _local_forces(trajectory, which)
-    return np.asarray(forces[..., :1] * tangents + forces[..., 1:] * normals)
+    if trajectory.system.basis.dimension == 2:
+        return np.asarray(forces[..., :1] * tangents + forces[..., 1:] * normals)
+    axes = np.concatenate([tangents, normals[:, None]], axis=1)
+    return np.einsum("fnk,nkd->fnd", forces, axes)
 
 
 def _local_forces(trajectory: Trajectory, which: Any) -> Array:
-    """Forces (F, n, 2) on the contact nodes along tangents and normals [N]."""
+    """Forces (F, n, d) on the contact nodes along tangents and normals [N]."""
     normal, along = trajectory.normal_force[which], -trajectory.friction_force[which]
     ground, basis = trajectory.system.ground, trajectory.system.basis
-    if ground.wavy and ground.normal == "surface":
+    leans = ground.wavy and ground.normal == "surface"
+    if basis.dimension == 3:
+        tangential = -trajectory.friction_forces[which]
+        if leans:
+            tangential = tangential - (basis.ground_nodes * normal)[..., None] * (
+                _slopes_below(trajectory, which))
+        return np.concatenate([tangential, normal[..., None]], axis=-1)
+    if leans:
         places = basis.contact_x + trajectory.modal_coordinates[which] @ basis.contact_T[:, 0].T
         along = along - basis.ground_nodes * normal * np.array([
             ground.slope(place, time)
@@ -120,27 +139,55 @@ def _local_forces(trajectory: Trajectory, which: Any) -> Array:
     return np.stack([along, normal], axis=-1)
 
 
+def _slopes_below(trajectory: Trajectory, which: Any) -> Array:
+    """Slopes (F, n, 2) of the ground along x and y below the contact nodes of solids."""
+    system, basis = trajectory.system, trajectory.system.basis
+    travel = np.array([system.prescribed_motion.travel(float(time))
+                       for time in trajectory.time[which]])
+    moved = np.einsum("fm,nkm->fnk", trajectory.modal_coordinates[which],
+                      basis.contact_T[:, :2])
+    places = basis.contact_places[:, :2] + moved - travel
+    return ground_shape(system.ground, places[..., 0], places[..., 1])[..., 1:]
+
+
+def ground_shape(ground: Ground, x: Array, y: Array) -> Array:
+    """Height [m] and slopes along x and y (..., 3) of ground at places of its own frame."""
+    if ground.height_map is not None:
+        return ground.height_map.shape(x, y)[..., :3]
+    a, b = ground.wave_direction
+    along = a * x + b * y + ground.travel(0.0)
+    slope = ground.slope(along)
+    return np.stack([ground.height(along), a * slope, b * slope], axis=-1)
+
+
 def nodal_contact_force(trajectory: Trajectory, which: Any = slice(None)) -> Array:
-    """Contact forces (F, N, 2) along x and y, distributed over the mesh nodes [N].
+    """Contact forces (F, N, d) along the axes, distributed over the mesh nodes [N].
 
     What acts on one body acts reversed on the other one, at the feet of its contact nodes; the
     total is preserved.
     """
     field = require_field(trajectory)
     forces = _local_forces(trajectory, which)
-    n = forces.shape[1]
-    rows = field.restriction.tocsr()[6 : 6 + 3 * n]
-    moments = np.zeros((*forces.shape[:2], 1))
-    spread = rows.T @ np.concatenate([forces, moments], axis=2).reshape(len(forces), 3 * n).T
-    return np.asarray(spread).T.reshape(len(forces), len(field.nodes), 2)
+    _, n, d = forces.shape
+    each = 3 * (d - 1)
+    rows = field.restriction.tocsr()[2 * each : (2 + n) * each]
+    moments = np.zeros((*forces.shape[:2], each - d))
+    spread = rows.T @ np.concatenate([forces, moments], axis=2).reshape(len(forces), each * n).T
+    return np.asarray(spread).T.reshape(len(forces), len(field.nodes), d)
 
 
-def contact_owners(field: ModeShapes, n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def contact_owners(basis: ModalBasis) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Mesh nodes (k,) of the contact faces, and the contact node (k,) that each belongs to.
 
-    It is the one of the n contact nodes in whose motion the mesh node has the largest part. Where
-    two bodies meet, the nodes of both faces have one.
+    It is the contact node in whose motion the mesh node has the largest part; of solids one whose
+    patch it lies on. Where two bodies meet, the nodes of both faces have one.
     """
+    field, n = basis.mode_shapes, basis.contact_nodes
+    assert field is not None
+    if basis.dimension == 3:
+        found = contact_facets(basis).at_nodes(len(field.nodes))
+        touching = np.flatnonzero(found >= 0)
+        return touching, found[touching].astype(np.intp)
     rows = abs(field.restriction.tocsr()[6 : 6 + 3 * n]).tocoo()
     moves = rows.row % 3 < 2  # not by rotation, which takes part of all its neighbours
     owner, node, part = rows.row[moves] // 3, rows.col[moves] // 2, rows.data[moves]
@@ -159,7 +206,7 @@ def nodal_contact_states(
     ``owners`` are those of :func:`contact_owners`, where they are needed again and again.
     """
     field = require_field(trajectory)
-    touching, owner = owners or contact_owners(field, trajectory.system.basis.contact_nodes)
+    touching, owner = owners or contact_owners(trajectory.system.basis)
     found = trajectory.contact_state[which]
     states = np.full((len(found), len(field.nodes)), -1, dtype=np.int8)
     states[:, touching] = found[:, owner]

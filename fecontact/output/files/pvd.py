@@ -3,22 +3,13 @@
 import re
 from pathlib import Path
 
-import numpy as np
-
 from fecontact.core.errors import InputError
 from fecontact.core.files.atomic_write import output_folder, replaced, replaced_folder
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.case import Case, read_case
-from fecontact.output.files.frames import (
-    body_numbers,
-    contact_owners,
-    displacement,
-    frame_indices,
-    nodal_contact_force,
-    nodal_contact_states,
-    require_field,
-    von_mises,
-)
+from fecontact.output.files.fields_of_frames import FrameFields
+from fecontact.output.files.frames import body_numbers, frame_indices, require_field
+from fecontact.output.files.vtu import VtuField, write_vtu
 
 
 def export_pvd(
@@ -29,8 +20,9 @@ def export_pvd(
 
     Each frame holds ``displacement`` [m], ``velocity`` [m/s], ``von_mises`` [Pa], ``contact_force``
     [N] and ``contact_state`` (0 open, 1 stick, 2 slip, -1 no contact node) at the nodes of the
-    undeformed body, as in :func:`fecontact.write_case`, and with several bodies the number ``body``
-    of each.
+    undeformed body and ``stress`` [Pa] of its cells, of solids also ``contact_pressure``,
+    ``contact_traction`` [Pa] and ``contact_state`` of cells on the contact faces, as in
+    :func:`fecontact.write_case`, and with several bodies the number ``body`` of each.
 
     Parameters
     ----------
@@ -68,25 +60,17 @@ def export_pvd(
     name = folder.name
     collection = path if beside else folder / f"{name}.pvd"
     _require_free(folder)
-    from fecontact.fem.mesh_files import write_fields
-
-    basis = trajectory.system.basis
-    body = {"body": body_numbers(basis)} if basis.parts else {}
-    owners = contact_owners(field, basis.contact_nodes)
+    basis, fields = trajectory.system.basis, FrameFields(trajectory)
+    body = ([VtuField("body", "Point", numbers := body_numbers(basis)),
+             VtuField("body", "Cell", numbers[field.cells[:, 0]])] if basis.parts else [])
     with output_folder(folder.parent), replaced_folder(folder) as part:
         names = []
         for number, index in enumerate(indices):
-            now = slice(index, index + 1)
-            q, rate = trajectory.modal_coordinates[now], trajectory.modal_velocities[now]
+            found = fields.at(slice(index, index + 1))
             names.append(f"{name}_{number:04d}.vtu")
-            write_fields(part / names[-1], field.nodes, field.cells, {
-                "displacement": displacement(field, q)[0].astype(np.float32),
-                "velocity": displacement(field, rate)[0].astype(np.float32),
-                "von_mises": von_mises(field, q)[0].astype(np.float32),
-                "contact_force": nodal_contact_force(trajectory, now)[0].astype(np.float32),
-                "contact_state": nodal_contact_states(trajectory, now, owners)[0],
-                **body,
-            })
+            write_vtu(part / names[-1], field.nodes, field.cells, [
+                *(VtuField(one.name, one.of, one.flat(found[one.of, one.name]), one.components)
+                  for one in fields.kinds), *body], float(trajectory.time[index]))
         times = trajectory.time[indices].tolist()
         if not beside:
             (part / collection.name).write_text(_collection(names, times), encoding="utf-8")

@@ -19,6 +19,14 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import gap_values
 from fecontact.system.interfaces import checked_sliding
+from fecontact.system.kernels import (
+    FRICTION_ACROSS,
+    FRICTION_FORCE,
+    NORMAL_FORCE,
+    PENETRATION,
+    SLIP_ACROSS,
+    SLIP_VELOCITY,
+)
 from fecontact.system.tables import law_tables, sliding_from_tables, system_parts
 
 LAW_PARTS = ("normal", "friction")
@@ -64,7 +72,7 @@ class RecordedSystem(ContactSystem):
     Attributes
     ----------
     history : function
-        Contact quantities (N, n, 6) of times and states.
+        Contact quantities (N, n, 6), in space (N, n, 8), of times and states.
     energy, sticking : functions
         Contact energy (N,) [J] of penetrations, and whether nodes stick, (N, n), of slip
         velocities, normal and friction forces.
@@ -103,7 +111,7 @@ class RecordedSystem(ContactSystem):
         raise InputError(self.needs)
 
     def contact_history(self, times: Array, states: Array) -> Array:
-        """Recorded contact quantities (N, n, 6)."""
+        """Recorded contact quantities (N, n, 6), in space (N, n, 8)."""
         return np.asarray(self.history(np.column_stack([times, states])))
 
     def stored_energy(self, penetration: Array) -> Array:
@@ -133,7 +141,7 @@ def recorded_system(
         The file, for messages.
     state : mapping
         ``time``, ``modal_coordinates``, ``modal_velocities`` and, with memory, ``memory``.
-    contact : (N, n, 6) array
+    contact : (N, n, 6) array, in space (N, n, 8)
         See :meth:`ContactSystem.contact_history`.
     contact_state : (N, n) integer array
         Values of :class:`fecontact.ContactState`.
@@ -152,7 +160,12 @@ def recorded_system(
     memory = state.get("memory")
     rows = np.column_stack([state["time"], state["modal_coordinates"], state["modal_velocities"],
                             *(() if memory is None else (memory,))])
-    normal, friction, penetration, slip = (contact[:, :, k] for k in (0, 1, 2, 4))
+    normal, friction, penetration, slip = (contact[:, :, k] for k in (
+        NORMAL_FORCE, FRICTION_FORCE, PENETRATION, SLIP_VELOCITY))
+    if basis.dimension == 3:
+        # As contact states ask for them: sizes of what has two directions.
+        friction, slip = (np.linalg.norm(contact[:, :, [k, across]], axis=-1) for k, across in (
+            (FRICTION_FORCE, FRICTION_ACROSS), (SLIP_VELOCITY, SLIP_ACROSS)))
     return RecordedSystem(
         basis, gap=tables.get("gap", 0.0), sliding=sliding_from_tables(tables, where), **parts,
         **laws,

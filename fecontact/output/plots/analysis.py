@@ -13,13 +13,13 @@ from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.run import thinned
+from fecontact.output.plots.run import direction_row, thinned
 from fecontact.output.plots.style import COLOURS, DASHES, add_note, distinct_colours
 from fecontact.reduction.assembly.contact_faces import shown_faces
 
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 _COLUMNS = 1000  # most points of a line
 _ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
 _DECADES = 5.0  # range of a logarithmic axis below its highest value
-_AXES = ("x", "y")
-
 
 def plot_spectrum(
     trajectory: Trajectory,
@@ -173,7 +171,7 @@ def plot_poincare(
         As for :func:`plot_spectrum`.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
-    component : "x" or "y"
+    component : "x" or "y", of solids "z" too
         Direction of the motion.
     period, phase
         As for :func:`fecontact.analysis.strobed_states`.
@@ -185,9 +183,7 @@ def plot_poincare(
         or a file that cannot be written.
     """
     require_kind("plot_poincare", Trajectory, trajectory=trajectory)
-    if component not in _AXES:
-        raise InputError(f"component = {component!r} is not known; choose from {choices(_AXES)}.")
-    row = _AXES.index(component)
+    row = direction_row(trajectory, component)
     found = strobed_states(trajectory, period=period, phase=phase,
                            t_start=float(trajectory.time[0]))
     basis = trajectory.system.basis
@@ -219,7 +215,8 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     of similar values have one scale.
 
     Wear by Archard's law is proportional to the integral of pressure times slip, which with a
-    constant coefficient is the friction work over that coefficient.
+    constant coefficient is the friction work over that coefficient. Of solids work per area [J/m^2]
+    and slip distance over the faces.
 
     Parameters
     ----------
@@ -232,6 +229,10 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
         For another suffix, or a file that cannot be written.
     """
     require_kind("plot_friction_work", Trajectory, trajectory=trajectory)
+    if trajectory.system.basis.dimension == 3:
+        from fecontact.output.plots.solids.maps import friction_work_maps
+
+        return friction_work_maps(trajectory, path)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     faces = shown_faces(trajectory.system.basis, "friction work")

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.wear import WearLaw
 from fecontact.output.plots.face_panels import similar
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import STATE_COLOURS, add_note, state_names
@@ -25,7 +27,10 @@ _COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
 _COLUMNS = 1500
 
 
-def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
+def plot_contact_map(
+    trajectory: Trajectory, *, times: Sequence[float] | None = None, wear: WearLaw | None = None,
+    path: str | Path | None = None,
+) -> "Figure":
     """Plot pressure [Pa] and state of the contact nodes over time and position.
 
     For a basis without thickness, the line load [N/m] takes the place of the pressure. In runs with
@@ -38,19 +43,37 @@ def plot_contact_map(trajectory: Trajectory, *, path: str | Path | None = None) 
     the ground and on faces along x, else over the arc length of the face, which increases along its
     tangents. Maps of similar loads share one scale.
 
+    Faces of solids have two directions: below the shares of the states over time are maps of
+    pressure, friction on the body as arrows, and state at some times. They are seen along the
+    normals, from the body through its face; faces around an axis are unrolled.
+
     Parameters
     ----------
     trajectory : Trajectory
         The run.
+    times : sequence of float, optional
+        Of solids, the times of the maps, up to eight [s]; four by default.
+    wear : EnergyWear or ArchardWear, optional
+        Of solids, adds maps of the depth worn since the start of the run.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
     InputError
-        For another suffix, or a file that cannot be written.
+        For another suffix, or a file that cannot be written; for times out of the run, and for
+        times or wear of plane bodies.
     """
     require_kind("plot_contact_map", Trajectory, trajectory=trajectory)
+    require_kind("plot_contact_map", (WearLaw, type(None)), wear=wear)
+    if trajectory.system.basis.dimension == 3:
+        from fecontact.output.plots.solids.maps import contact_maps
+
+        return contact_maps(trajectory, times, wear, path)
+    for name, given in (("times", times), ("wear", wear)):
+        if given is not None:
+            raise InputError(f"plot_contact_map: {name} = {given!r} is for solids, but this run "
+                             f"has plane bodies, whose maps show all times; leave it out.")
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     basis = trajectory.system.basis

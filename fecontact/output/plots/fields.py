@@ -7,16 +7,19 @@ import numpy as np
 
 from fecontact.core.checks import require_kind, require_scale
 from fecontact.core.errors import require_choice
+from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.fem.fields import BodyFields
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis
+from fecontact.output.plots.solids.surface import draw_surface, draw_triad, view_axes
 from fecontact.output.plots.style import stress_limit
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_STRESSES = ("xx", "yy", "zz", "xy")
+_STRESSES = ("xx", "yy", "zz", "xy", "yz", "xz")
 _DRAWN_DISPLACEMENT = 0.07  # largest one by default, relative to the body's extent
 # Inches: width, limits of the height, and what title and labels take of it.
 _WIDTH, _LARGEST, _LEAST, _WORDS = 9.0, 8.5, 2.5, 0.8
@@ -35,8 +38,8 @@ def plot_stress(
     ----------
     fields : BodyFields
         What :func:`fecontact.static_solution` or :meth:`fecontact.ModalBasis.fields` gives.
-    component : 'von_mises', 'xx', 'yy', 'zz' or 'xy'
-        The stress that colours the body.
+    component : 'von_mises', 'xx', 'yy', 'zz' or 'xy', of solids 'yz' and 'xz' too
+        The stress that colours the body, of solids their surface.
     scale : float, optional
         Magnification of displacements; by default chosen so that the largest is clearly visible.
     path : str or Path, optional
@@ -48,11 +51,10 @@ def plot_stress(
         For an unknown component, a scale that is not a number above zero, another
         suffix, or a file that cannot be written.
     """
-    from matplotlib.collections import LineCollection
-    from matplotlib.tri import Triangulation
-
     require_kind("plot_stress", BodyFields, fields=fields)
-    require_choice("plot_stress", "component", component, ("von_mises", *_STRESSES))
+    d = fields.nodes.shape[1]
+    require_choice("plot_stress", "component", component,
+                   ("von_mises", *_STRESSES[: 4 if d == 2 else 6]))
     if scale is not None:
         require_scale("plot_stress", scale)
     stress = fields.von_mises if component == "von_mises" else (
@@ -63,6 +65,8 @@ def plot_stress(
         scale = _DRAWN_DISPLACEMENT * extent / moved if moved else 1.0
     places = fields.nodes + scale * fields.displacement
     everything = np.vstack([fields.nodes, places])
+    if d == 3:
+        everything = everything @ view_axes()[:2].T
     width, height = np.ptp(everything, axis=0)
     factor, unit = suitable_unit(float(np.abs(stress).max()), "Pa")
     peak = int(np.abs(stress).argmax())
@@ -71,28 +75,47 @@ def plot_stress(
     cut = top < largest
     name = "von Mises stress" if component == "von_mises" else f"stress {component}"
     signed = component != "von_mises"
-    cells = fields.cells
-    if cells.shape[1] == 4:
-        cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     drawn_height = float(np.clip(0.75 * _WIDTH * height / width + _WORDS, _LEAST, _LARGEST))
     with new_figure(_WIDTH, drawn_height + 0.35 * cut, path) as figure:
         axis = figure.subplots()
-        drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress / factor,
-                               shading="gouraud", cmap="RdBu_r" if signed else "viridis",
-                               vmin=-top if signed else 0.0, vmax=top, rasterized=True)
-        for nodes, colour in ((fields.nodes, "#8c8c8c"), (places, "#303030")):
-            axis.add_collection(LineCollection(list(nodes[fields.outline]), colors=colour,
-                                               linewidths=0.8))
-        margin = 0.02 * max(width, height)
+        colours: dict[str, Any] = {"cmap": "RdBu_r" if signed else "viridis"}
+        margin = (0.02 if d == 2 else 0.06) * max(width, height)
         low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin
+        if d == 2:
+            drawn = _draw_plane(axis, fields, places, stress / factor, vmin=-top if signed else 0.0,
+                                vmax=top, **colours)
+            name_axis(axis, "x", "x [m]", everything[:, 0])
+            name_axis(axis, "y", "y [m]", everything[:, 1])
+        else:
+            drawn = draw_surface(axis, places, fields.outline, stress / factor, rest=fields.nodes,
+                                 low=-top if signed else 0.0, high=top, **colours)
+            draw_triad(axis, 0.07 * max(width, height), low + 0.5 * margin)
+            axis.set_axis_off()
         axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
                  title=f"displacements times {scale:.3g}" if moved else "")
-        name_axis(axis, "x", "x [m]", everything[:, 0])
-        name_axis(axis, "y", "y [m]", everything[:, 1])
         ends: Any = ("both" if signed else "max") if cut else "neither"
         figure.colorbar(drawn, ax=axis, label=f"{name} [{unit}]", extend=ends)
         if cut:
-            axis.plot(*places[peak], "o", markersize=7.0, markerfacecolor="none", color="#d55e00",
+            at = places[peak] if d == 2 else view_axes()[:2] @ places[peak]
+            axis.plot(*at, "o", markersize=7.0, markerfacecolor="none", color="#d55e00",
                       label=f"peak {stress[peak] / factor:.3g} {unit}")
             figure.legend(loc="outside lower right")
     return figure
+
+
+def _draw_plane(
+    axis: "Axes", fields: BodyFields, places: Array, stress: Array, **options: Any
+) -> Any:
+    """A plane body with its outline, undeformed and deformed."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    cells = fields.cells
+    if cells.shape[1] == 4:
+        cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress,
+                           shading="gouraud", rasterized=True, **options)
+    for nodes, colour in ((fields.nodes, "#8c8c8c"), (places, "#303030")):
+        axis.add_collection(LineCollection(list(nodes[fields.outline]), colors=colour,
+                                           linewidths=0.8))
+    return drawn

@@ -10,6 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.solids.surface import draw_surface, seen_box
 from fecontact.reduction.assembly.bodies_convergence import BodiesConvergence
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.convergence import ModeConvergence
@@ -54,8 +55,9 @@ def plot_modes(
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise InputError(f"count = {count!r} must be a whole number of at least one mode.")
     field, shown = basis.mode_shapes, min(count, basis.modes)
-    size = np.ptp(field.nodes, axis=0)
-    reach = _DRAWN_DISPLACEMENT * float(np.linalg.norm(size))
+    reach = _DRAWN_DISPLACEMENT * float(np.linalg.norm(np.ptp(field.nodes, axis=0)))
+    solid = basis.dimension == 3
+    size = np.subtract(*seen_box(field.nodes)[::-1]) if solid else np.ptp(field.nodes, axis=0)
     aspect = (size[0] + 2.0 * reach) / (size[1] + 2.0 * reach)
     columns = min(shown, 6, int(np.ceil(np.sqrt(1.8 * shown / aspect))))
     rows = -(-shown // columns)
@@ -67,7 +69,8 @@ def plot_modes(
             axis.set_axis_off()
         names = mode_names(basis)
         for mode, axis in zip(_first_modes(basis, shown), grid.flat, strict=False):
-            drawn = _draw_mode(axis, field, mode, reach, basis.parts)
+            drawn = (_draw_solid_mode(axis, field, mode, reach) if solid else
+                     _draw_mode(axis, field, mode, reach, basis.parts))
             hertz = basis.frequencies_hz[mode]
             axis.set_title(names[mode] + ("\n" if basis.parts else ": ")
                            + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
@@ -136,10 +139,10 @@ def _body_convergence(meshes: "Axes", modes: "Axes", result: ModeConvergence) ->
     for i, values in enumerate(_distance(result.frequencies_hz).T):
         hertz = result.frequencies_hz[-1, i]
         meshes.loglog(sizes, values, "o-", label=f"f{i + 1} = {hertz:.5g} Hz")
-    for values, axis, style in zip(_distance(result.compliance).T, "xy", ("s--", "^--"),
-                                   strict=True):
+    for values, axis, style in zip(_distance(result.compliance).T, "xyz", ("s--", "^--", "v--"),
+                                   strict=False):
         meshes.loglog(sizes, values, style, color="#707070", label=f"contact compliance in {axis}")
-    for values, axis, style in zip(result.missing.T, "xy", ("s-", "^-"), strict=True):
+    for values, axis, style in zip(result.missing.T, "xyz", ("s-", "^-", "v-"), strict=False):
         modes.semilogx(result.modes, 100.0 * values, style, label=f"in {axis}")
     return result.modes
 
@@ -170,6 +173,18 @@ def _bodies_convergence(meshes: "Axes", modes: "Axes", result: BodiesConvergence
 def _distance(values: Array) -> Array:
     """Relative distance (L - 1, k) of each mesh but the last from it."""
     return np.asarray(np.abs(values[:-1] / values[-1] - 1.0))
+
+
+def _draw_solid_mode(axis: "Axes", field: ModeShapes, mode: int, reach: float) -> Any:
+    shape = field.shapes[:, :, mode]
+    amplitude = np.linalg.norm(shape, axis=1)
+    largest = float(amplitude.max()) or 1.0
+    drawn = draw_surface(axis, field.nodes + reach / largest * shape, field.outline,
+                         amplitude / largest, rest=field.nodes, cmap="viridis", low=0.0, high=1.0)
+    low, high = seen_box(field.nodes)
+    axis.set(xlim=(low[0] - reach, high[0] + reach), ylim=(low[1] - reach, high[1] + reach),
+             aspect="equal")
+    return drawn
 
 
 def _draw_mode(

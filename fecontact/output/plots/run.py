@@ -22,7 +22,7 @@ from fecontact.output.plots.style import (
     add_note,
     distinct_colours,
 )
-from fecontact.reduction.assembly.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import ContactFace, contact_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +36,7 @@ ENERGY_TERMS = (
     ("energy lost", "lost", ("modal_damping", "dashpots", "contact_damping", "friction")),
 )
 
-_AXES = ("x", "y")
+_AXES = ("x", "y", "z")
 
 _MOST_MIDDLES = 5  # of contact nodes shown without being asked for
 _LINE_BINS = 2000  # a long line is drawn by minimum and maximum of each
@@ -54,7 +54,8 @@ def plot_history(
     points : sequence of str, int or (x, y)
         As for :meth:`Trajectory.displacement`; B and the contact node in the middle by default,
         of several bodies that of each interface. Contact nodes between bodies show their relative
-        motion along tangent and normal.
+        motion along tangent and normal, those of solids along both tangents and the normal.
+        Friction of solids is shown by its size and direction, or by x and y on the ground.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -76,9 +77,10 @@ def plot_history(
     motions = [("displacement", "m", [trajectory.displacement(point) for point in points]),
                ("velocity", "m/s", [trajectory.velocity(point) for point in points])]
     motions = [(name, unit, _without_round_off(values)) for name, unit, values in motions]
-    moving = [row for row in range(2) if any(
+    d = trajectory.system.basis.dimension
+    moving = [row for row in range(d) if any(
         value[:, row].any() for _, _, values in motions for value in values)] or [0]
-    rubs = trajectory.friction_force.any()
+    rubs = bool(trajectory.friction_forces.any())
     panels: list[Any] = [[f"{name} {_AXES[row]}" for name, _, _ in motions] for row in moving]
     panels.append(["normal force", "friction force" if rubs else "normal force"])
     with new_figure(10.0, 2.5 * len(panels), path) as figure:
@@ -95,10 +97,12 @@ def plot_history(
                 for number, (point, value) in enumerate(zip(points, values, strict=True)):
                     axis.plot(*thinned(time, value[:, row] / factor), color=colours[number],
                               linewidth=1.2 if number else 2.0, label=_label(point, trajectory))
-        for panel, name, forces in (
-                ("normal force", "normal force", trajectory.normal_force),
-                ("friction force", f"friction force in -{'x' if single else 't'}",
-                 trajectory.friction_force))[: 1 + rubs]:
+        normal = "normal force", "normal force", trajectory.normal_force
+        friction = ("friction force", f"friction force in -{'x' if single else 't'}",
+                    trajectory.friction_force)
+        if d == 3 and rubs:
+            _friction_in_space(axes["friction force"], trajectory, time, faces)
+        for panel, name, forces in (normal, friction)[: 1 + (rubs and d == 2)]:
             totals = [forces[:, face.nodes].sum(axis=1) for face in faces]
             factor = _labelled(axes[panel], f"total {name}", "N", *totals)
             for face, total, colour in zip(faces, totals, ["#303030"] if single else
@@ -117,8 +121,37 @@ def plot_history(
 
 def _without_round_off(values: list[Array]) -> list[Array]:
     """Histories (N, k) with components below a billionth of the largest set to zero."""
-    largest = max(float(np.abs(value[:, :2]).max()) for value in values)
+    d = 2 if values[0].shape[1] <= 3 else 3
+    largest = max(float(np.abs(value[:, :d]).max()) for value in values)
     return [np.where(np.abs(value).max(axis=0) > 1e-9 * largest, value, 0.0) for value in values]
+
+
+def _friction_in_space(
+    axis: "Axes", trajectory: Trajectory, time: Array, faces: Sequence[ContactFace]
+) -> None:
+    """Total friction on the body of a solid along x and y, or the size of that of interfaces."""
+    forces = -np.einsum("fnk,nkd->fnd", trajectory.friction_forces,
+                        trajectory.system.basis.tangents)
+    totals = [forces[:, face.nodes].sum(axis=1) for face in faces]
+    sizes = [np.linalg.norm(total, axis=1) for total in totals]
+    if faces[0].name:
+        factor = _labelled(axis, "size of total friction", "N", *sizes)
+        for face, size, colour in zip(faces, sizes, distinct_colours(len(faces)), strict=True):
+            axis.plot(*thinned(time, size / factor), color=colour, label=face.name)
+        return
+    factor = _labelled(axis, "total friction on the body", "N", totals[0], sizes[0])
+    axis.plot(*thinned(time, sizes[0] / factor), color="#b8b4ad", linewidth=2.4, label="size")
+    for row, colour in ((0, "#303030"), (1, COLOURS[1])):
+        axis.plot(*thinned(time, totals[0][:, row] / factor), color=colour, label=_AXES[row])
+    axis.legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98), ncols=3)
+
+
+def direction_row(trajectory: Trajectory, component: str) -> int:
+    """Row of a direction of motion; InputError for one that the bodies do not have."""
+    axes = _AXES[: trajectory.system.basis.dimension]
+    if component not in axes:
+        raise InputError(f"component = {component!r} is not known; choose from {choices(axes)}.")
+    return axes.index(component)
 
 
 def plot_phase(
@@ -133,7 +166,7 @@ def plot_phase(
         The run.
     point : str, int or (x, y)
         As for :meth:`Trajectory.displacement`.
-    component : "x" or "y"
+    component : "x" or "y", of solids "z" too
         Direction of the motion.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
@@ -145,9 +178,7 @@ def plot_phase(
         written.
     """
     require_kind("plot_phase", Trajectory, trajectory=trajectory)
-    if component not in _AXES:
-        raise InputError(f"component = {component!r} is not known; choose from {choices(_AXES)}.")
-    row = _AXES.index(component)
+    row = direction_row(trajectory, component)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     with new_figure(6.4, 5.2, path) as figure:
@@ -159,15 +190,24 @@ def plot_phase(
         factor = _labelled(plane, f"velocity {component}", "m/s", v)
         plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
         plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
-        ground = trajectory.system.ground
-        speed = ground.speed if ground.motion is None else 0.0
+        speed = _ground_speed(trajectory, row)
         # The speed of a much faster ground would flatten the curve.
-        if row == 0 and 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
+        if 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
             plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
                           label="ground")
         plane.legend(loc="best")
         plane.set_title(_label(point, trajectory))
     return figure
+
+
+def _ground_speed(trajectory: Trajectory, row: int) -> float:
+    """Steady speed of the ground along an axis [m/s]; zero where it has none everywhere."""
+    ground, d = trajectory.system.ground, trajectory.system.basis.dimension
+    if ground.rotation_speed or row == d - 1:
+        return 0.0
+    if row == 0:
+        return ground.speed if ground.motion is None else 0.0
+    return ground.speed_y if ground.motion_y is None else 0.0
 
 
 def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
@@ -227,7 +267,8 @@ def usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
 def _label(point: Point, trajectory: Trajectory) -> str:
     """Name of a point, and whether its motion is relative to another body."""
     basis = trajectory.system.basis
-    return point_name(point, basis) + ", relative (t, n)" * is_relative(point, basis)
+    way = ", relative (t, n)" if basis.dimension == 2 else ", relative (t, t2, n)"
+    return point_name(point, basis) + way * is_relative(point, basis)
 
 
 def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:

@@ -26,7 +26,8 @@ def plot_wear(
 ) -> "Figure":
     """Plot the worn profile and the line load along the face, and the depth over the cycles.
 
-    Columns of similar values have one scale.
+    Columns of similar values have one scale. Of solids, whose basis has to be given, depth and mean
+    pressure over the faces, and the depth over the cycles.
 
     Parameters
     ----------
@@ -47,9 +48,12 @@ def plot_wear(
     require_kind("plot_wear", WearHistory, history=history)
     length, blocks = history.tributary, len(history.cycles) - 1
     faces = _faces(history, basis)
+    if basis is not None and basis.dimension == 3:
+        from fecontact.output.plots.solids.maps import wear_maps
+
+        return wear_maps(history, basis, _title(history), path)
     shown = np.unique(np.linspace(1, blocks, _PROFILES).round().astype(int))
-    title = (f"{type(history.law).__name__}, {_cycles(history.acceleration, 4)} per computed "
-             f"period")
+    title = _title(history)
     with new_figure(max(9.0, 5.0 * len(faces)), 8.0, path) as figure:
         panels = figure.subplots(3, len(faces), squeeze=False)
         deepest = [float(history.depth[:, face.nodes].max()) for face in faces]
@@ -87,6 +91,11 @@ def plot_wear(
             panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         figure.align_ylabels(panels[:, 0])
     return figure
+
+
+def _title(history: WearHistory) -> str:
+    return (f"{type(history.law).__name__}, {_cycles(history.acceleration, 4)} per computed "
+            f"period")
 
 
 def _cycles(number: float, digits: int = 6) -> str:

@@ -32,6 +32,8 @@ def _totals(trajectory: Trajectory, part: Any) -> list[_Line]:
     """Sums of normal and friction forces over the chosen times; no friction without any."""
     normal, friction = trajectory.normal_force, -trajectory.friction_force
     faces = contact_faces(trajectory.system.basis)
+    if trajectory.system.basis.dimension == 3:
+        return _totals_in_space(trajectory, part)
     if not faces[0].name:
         lines = [_Line("normal force", normal[part].sum(axis=1), _DARK)]
         if friction.any():
@@ -47,12 +49,34 @@ def _totals(trajectory: Trajectory, part: Any) -> list[_Line]:
     return lines
 
 
+def _totals_in_space(trajectory: Trajectory, part: Any) -> list[_Line]:
+    """Sums of the normal forces, and of friction along x and y; of interfaces its size."""
+    basis = trajectory.system.basis
+    faces, normal = contact_faces(basis), trajectory.normal_force[part]
+    friction = -np.einsum("fnk,nkd->fnd", trajectory.friction_forces[part], basis.tangents)
+    if not faces[0].name:
+        lines = [_Line("normal", normal.sum(axis=1), _DARK)]
+        for axis, name in enumerate("xy"):
+            if friction[..., axis].any():
+                lines.append(_Line(f"friction {name}", friction[..., axis].sum(axis=1),
+                                   COLOURS[(0, 1)[axis]]))
+        return lines
+    lines = []
+    for face, colour in zip(faces, distinct_colours(len(faces)), strict=True):
+        lines.append(_Line(f"{face.name}: normal", normal[:, face.nodes].sum(axis=1), colour))
+        if friction[:, face.nodes].any():
+            total = np.linalg.norm(friction[:, face.nodes].sum(axis=1), axis=1)
+            lines.append(_Line(f"{face.name}: friction", total, colour, DASHES))
+    return lines
+
+
 @dataclass(frozen=True, eq=False)
 class ForceChart:
     """A strip with the sums of the forces on the body over the time that is drawn.
 
     The normal forces are positive in +y, friction in +x, as the arrows of the scene: -R. With
-    several bodies, sums of each interface along its normals and tangents.
+    several bodies, sums of each interface along its normals and tangents. In space normal forces,
+    and friction on the body along x and y; of interfaces the size of its sum.
 
     Attributes
     ----------
@@ -88,14 +112,17 @@ class ForceChart:
         left, below = 7.0 * self.font / self.width, 3.4 * self.font / self.height
         motion, trajectory = self.motion, self.motion.trajectory
         first, last = float(motion.times[0]), float(motion.times[-1])
-        if last > first:
+        # To repeat runs of solids may take minutes.
+        if last > first and trajectory.system.basis.dimension == 2:
             trajectory = resolved(trajectory.between(first, last)).trajectory
         part = (first <= trajectory.time) & (trajectory.time <= last)
         totals = _totals(trajectory, part)
         columns = 4 if len(totals) > 2 else 2
+        columns = min(columns, max(2, int(self.width / (13.0 * self.font))))
         # The legend stands above the axes, where the cursor does not cross it.
         above = 1.8 * self.font * -(-len(totals) // columns) / self.height
-        axes: Any = figure.add_axes((left, below, 0.97 - left, 0.98 - above - below))
+        right = min(0.97, 1.0 - 1.9 * self.font / self.width)
+        axes: Any = figure.add_axes((left, below, right - left, 0.98 - above - below))
         time_unit, symbol = suitable_unit(float(np.abs(motion.times).max()), "s")
         largest = max(float(np.abs(line.values).max()) for line in totals)
         unit, force_symbol = suitable_unit(largest, "N")

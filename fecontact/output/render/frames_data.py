@@ -37,9 +37,10 @@ def _way(sliding: Sliding) -> str:
     """Direction and speed of a prescribed sliding."""
     speed = abs(sliding.speed)
     if isinstance(sliding, SlidingRotation):
-        arrow, size = "↺" if sliding.speed > 0.0 else "↻", quantity(speed, "rad/s")
+        arrow = "↺" if sliding.speed * sliding.axis[2] >= 0.0 else "↻"
+        size = quantity(speed, "rad/s")
     else:
-        x, y = np.sign(sliding.speed) * np.asarray(sliding.direction)
+        x, y = np.sign(sliding.speed) * np.asarray(sliding.direction)[:2]
         arrow = "→↗↑↖←↙↓↘"[round(np.arctan2(y, x) / (0.25 * np.pi)) % 8]
         size = quantity(speed, "m/s")
     return f"{arrow} {size}" if sliding.motion is None else f"{arrow} in time"
@@ -120,7 +121,7 @@ class Motion:
 
     @cached_property
     def forces(self) -> Array:
-        """Forces (F, n + f, 2) on the contact nodes and on their feet, along x and y [N]."""
+        """Forces (F, n + f, d) on the contact nodes and on their feet, along the axes [N]."""
         forces = contact_forces(self.trajectory, self.indices)
         return np.concatenate([forces, -forces[:, self.footed]], axis=1)
 
@@ -151,12 +152,12 @@ class Motion:
         system = self.trajectory.system
         if not system.sliding:
             return ()
-        feet = contact_sides(system.basis)[1]
+        feet, d = contact_sides(system.basis)[1], system.basis.dimension
         found: dict[str, None] = {}
         for face in contact_faces(system.basis):
             if face.name not in system.sliding:
                 continue
-            nodes = feet[2 * face.nodes.start : 2 * face.nodes.stop].indices // 2
+            nodes = feet[d * face.nodes.start : d * face.nodes.stop].indices // d
             other = [part.name for part in system.basis.parts
                      if len(nodes) and part.nodes[0] <= nodes[0] < sum(part.nodes)]
             found[f"{other[0] if other else 'ground'} {_way(system.sliding[face.name])}"] = None
@@ -206,21 +207,26 @@ class Motion:
     @cached_property
     def box(self) -> tuple[float, float, float, float]:
         """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
-        low = np.minimum(self.mode_shapes.nodes.min(axis=0), self._extremes[0])
-        high = np.maximum(self.mode_shapes.nodes.max(axis=0), self._extremes[1])
+        low, high = self.bounds
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+    @cached_property
+    def bounds(self) -> Array:
+        """Smallest and largest coordinates (2, d) that the drawn body reaches [m]."""
+        return np.stack([np.minimum(self.mode_shapes.nodes.min(axis=0), self._extremes[0]),
+                         np.maximum(self.mode_shapes.nodes.max(axis=0), self._extremes[1])])
 
     @cached_property
     def ground_level(self) -> float:
         """Drawn height of the flat ground: under the lowest contact node by its gap [m]."""
         if not self.has_ground:
-            return self.box[2]
+            return float(self.bounds[0, -1])
         basis = self.trajectory.system.basis
-        heights = basis.positions[2 : 2 + basis.contact_nodes, 1][basis.ground_nodes]
+        heights = basis.contact_places[basis.ground_nodes, -1]
         return float(heights.min() - self.scale * self.gap)
 
     def body(self, frame: int) -> tuple[Array, Array]:
-        """Drawn positions (N, 2) of the nodes [m] and their colour values (N,) in SI units."""
+        """Drawn positions (N, d) of the nodes [m] and their colour values (N,) in SI units."""
         q = self._q(frame)
         motion = displacement(self.mode_shapes, q)[0]
         colours = np.linalg.norm(motion, axis=1) if self.colour == "displacement" else \
@@ -228,7 +234,7 @@ class Motion:
         return self.mode_shapes.nodes + self._scaled(motion[None], q)[0], colours
 
     def contact_places(self, frame: int) -> Array:
-        """Drawn positions (n + f, 2) of the contact nodes and of their feet [m]."""
+        """Drawn positions (n + f, d) of the contact nodes and of their feet [m]."""
         q = self._q(frame)
         places, rows = self.contact_rows
         return places + self._scaled((rows @ q[0])[None], q)[0]
@@ -254,15 +260,15 @@ class Motion:
 
     @cached_property
     def contact_rows(self) -> tuple[Array, Array]:
-        """Places (n + f, 2) of contact nodes and feet, and their displacements (n + f, 2, m)."""
+        """Places (n + f, d) of contact nodes and feet, and their displacements (n + f, d, m)."""
         basis, field = self.trajectory.system.basis, self.mode_shapes
-        places = basis.positions[2 : 2 + basis.contact_nodes]
+        places, d = basis.contact_places, basis.dimension
         if not several_bodies(basis):
-            return places, basis.contact_T[:, :2]
+            return places, basis.contact_T[:, :d]
         own, feet = contact_sides(basis)
-        shapes = field.shapes.reshape(2 * len(field.nodes), basis.modes)
-        rows = [np.asarray(side @ shapes).reshape(-1, 2, basis.modes) for side in (own, feet)]
-        foot_places = np.asarray(feet @ field.nodes.reshape(-1)).reshape(-1, 2)
+        shapes = field.shapes.reshape(d * len(field.nodes), basis.modes)
+        rows = [np.asarray(side @ shapes).reshape(-1, d, basis.modes) for side in (own, feet)]
+        foot_places = np.asarray(feet @ field.nodes.reshape(-1)).reshape(-1, d)
         return (np.concatenate([places, foot_places[self.footed]]),
                 np.concatenate([rows[0], rows[1][self.footed]]))
 
@@ -289,16 +295,17 @@ class Motion:
         return self.has_ground and self.trajectory.system.ground.wavy
 
     def _drift(self, q: Array) -> Array:
-        """Mean displacement (k,) along the ground of the contact nodes on it [m]."""
-        if not self.has_ground:
-            return np.zeros(len(q))
+        """Mean displacement (k, d - 1) along the ground of the contact nodes on it [m]."""
         basis = self.trajectory.system.basis
-        return np.asarray(q @ basis.contact_T[basis.ground_nodes, 0].mean(axis=0))
+        along = basis.dimension - 1
+        if not self.has_ground:
+            return np.zeros((len(q), along))
+        return np.asarray(q @ basis.contact_T[basis.ground_nodes, :along].mean(axis=0).T)
 
     def _scaled(self, motion: Array, q: Array) -> Array:
-        """Drawn motion (k, N, 2) from displacements (k, N, 2) at coordinates q (k, m)."""
+        """Drawn motion (k, N, d) from displacements (k, N, d) at coordinates q (k, m)."""
         drawn = self.scale * motion
-        drawn[..., 0] += (self._drift_scale - self.scale) * self._drift(q)[:, None]
+        drawn[..., :-1] += (self._drift_scale - self.scale) * self._drift(q)[:, None]
         return drawn
 
     def _q(self, frame: int) -> Array:
@@ -307,7 +314,7 @@ class Motion:
 
     @cached_property
     def _extremes(self) -> tuple[Array, Array]:
-        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        low, high = np.full((2, self.trajectory.system.basis.dimension), [[np.inf], [-np.inf]])
         for which in blocks(self.indices, len(self.mode_shapes.nodes)):
             q = self.trajectory.modal_coordinates[which]
             places = self.mode_shapes.nodes + self._scaled(displacement(self.mode_shapes, q), q)
@@ -323,7 +330,7 @@ class Motion:
             motion = displacement(self.mode_shapes, q)
             size = np.linalg.norm(motion, axis=2).max()
             largest["displacement"] = max(largest["displacement"], float(size))
-            motion[..., 0] -= self._wavy * self._drift(q)[:, None]
+            motion[..., :-1] -= self._wavy * self._drift(q)[:, None]
             size = np.linalg.norm(motion, axis=2).max()
             largest["shape"] = max(largest["shape"], float(size))
         return largest

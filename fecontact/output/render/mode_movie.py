@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from fecontact.output.render.movie import MOVING, Image, Progress, target, write
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Strips, pixels
 from fecontact.output.render.scene import COLOUR_MAPS, BodyScene
+from fecontact.output.render.solid_scene import SolidScene
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -31,7 +33,7 @@ class ModeMotion:
     Attributes
     ----------
     mode_shapes : ModeShapes
-    shape : (N, 2) complex array
+    shape : (N, d) complex array
         Displacements of the nodes; its size does not matter.
     phases : (F,) array
         [rad].
@@ -51,9 +53,8 @@ class ModeMotion:
     def _unit_shape(self) -> ComplexArray:
         """The shape with a largest displacement of one within the period."""
         # The displacement of a node runs on an ellipse; this is its longer half-axis.
-        x, y = self.shape.T
-        power = np.abs(x) ** 2 + np.abs(y) ** 2
-        longest = np.sqrt(0.5 * (power + np.abs(x**2 + y**2))).max()
+        power = sum(np.abs(part) ** 2 for part in self.shape.T)
+        longest = np.sqrt(0.5 * (power + np.abs(sum(part**2 for part in self.shape.T)))).max()
         return np.asarray(self.shape / (longest or 1.0))
 
     @property
@@ -64,13 +65,18 @@ class ModeMotion:
     @cached_property
     def box(self) -> tuple[float, float, float, float]:
         """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
-        moved = self._reach * np.abs(self._unit_shape)
-        low = (self.mode_shapes.nodes - moved).min(axis=0)
-        high = (self.mode_shapes.nodes + moved).max(axis=0)
+        low, high = self.bounds
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
+    @cached_property
+    def bounds(self) -> Array:
+        """Smallest and largest coordinates (2, d) that the drawn body reaches [m]."""
+        moved = self._reach * np.abs(self._unit_shape)
+        return np.stack([(self.mode_shapes.nodes - moved).min(axis=0),
+                         (self.mode_shapes.nodes + moved).max(axis=0)])
+
     def body(self, frame: int) -> tuple[Array, Array]:
-        """Drawn positions (N, 2) [m] and displacements (N,) relative to the largest."""
+        """Drawn positions (N, d) [m] and displacements (N,) relative to the largest."""
         moved = (self._unit_shape * np.exp(1j * self.phases[frame])).real
         return self.mode_shapes.nodes + self._reach * moved, np.linalg.norm(moved, axis=1)
 
@@ -170,7 +176,8 @@ def render_mode(
 def _images(motion: ModeMotion, size: tuple[int, int], title: str) -> Iterator[Image]:
     strips = _ModeStrips(*size, title)
     height = size[1] - strips.header_height - strips.footer_height
-    with BodyScene(motion, size[0], height, line=1.2 * strips.size, fineness=MOVING) as scene:
+    drawing: Any = BodyScene if motion.mode_shapes.nodes.shape[1] == 2 else SolidScene
+    with drawing(motion, size[0], height, line=1.2 * strips.size, fineness=MOVING) as scene:
         for frame, phase in enumerate(motion.phases.tolist()):
             yield strips.around(scene.image(frame), phase)
 

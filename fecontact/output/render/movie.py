@@ -18,11 +18,15 @@ from fecontact.core.files.atomic_write import beside, put, replaced, unwritable
 from fecontact.core.interrupts import held_back_interrupt
 from fecontact.core.progress import counting_bar, shown
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.wear import WearLaw
 from fecontact.output.files.frames import frame_indices, require_field
 from fecontact.output.render.frames_data import Colour, Motion
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.scene import Scene
+from fecontact.output.render.solid_motion import SolidMotion, View
+from fecontact.output.render.solid_overlay import SolidOverlay
+from fecontact.output.render.solid_scene import SolidScene
 
 Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
@@ -47,13 +51,15 @@ def render(
     title: str | None = None,
     t_start: float | None = None,
     t_end: float | None = None,
+    view: View = "above",
+    wear: WearLaw | None = None,
     progress: bool | Progress | None = None,
 ) -> Path:
     """Draw a run as a movie or as numbered pictures, whole or not at all.
 
     It shows the deformed body over its undeformed outline, the ground, the contact nodes coloured
-    by state, contact forces as arrows, and above flat bodies the total forces over time; see
-    docs/analysis.md.
+    by state, contact forces as arrows, and above flat bodies the total forces over time. Beside
+    solids are maps of their contact faces and the forces; see docs/analysis.md.
 
     Parameters
     ----------
@@ -77,6 +83,10 @@ def render(
         Shown at the top.
     t_start, t_end : float, optional
         Part of the run to draw [s].
+    view : "above" or "below"
+        Where solids are seen from.
+    wear : EnergyWear or ArchardWear, optional
+        Adds maps of the depth that solids have worn.
     progress : bool or callable, optional
         True for a progress bar; a function is called as ``progress(done, total)`` after each frame.
 
@@ -97,7 +107,7 @@ def render(
     indices = frame_indices(trajectory.time, frames, t_start, t_end)
     if not len(indices):
         raise InputError("frames = 0 makes no movie; give at least 1.")
-    motion = Motion(trajectory, indices, colour, scale)
+    motion = _motion(trajectory, indices, colour, scale, view, wear)
     lasting = float(motion.times[-1] - motion.times[0])
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
     require_rendering(size, MOVING)
@@ -150,6 +160,8 @@ def picture(
     colour: Colour = "displacement",
     scale: float | None = None,
     title: str | None = None,
+    view: View = "above",
+    wear: WearLaw | None = None,
 ) -> Path:
     """Draw a run at one time, as a frame of :func:`render` over the whole run.
 
@@ -161,7 +173,7 @@ def picture(
         ``NAME.png``.
     time : float, optional
         The nearest output time is drawn; the last by default [s].
-    size, colour, scale, title
+    size, colour, scale, title, view, wear
         See :func:`render`.
 
     Returns
@@ -183,7 +195,7 @@ def picture(
     at = len(trajectory.time) - 1 if time is None else int(np.argmin(np.abs(trajectory.time
                                                                             - time)))
     chosen = frame_indices(trajectory.time, _STILL_FRAMES)
-    motion = Motion(trajectory, np.union1d(chosen, [at]), colour, scale)
+    motion = _motion(trajectory, np.union1d(chosen, [at]), colour, scale, view, wear)
     require_rendering(size, _STILL)
     frame = int(np.searchsorted(motion.indices, at))
     (image,) = _images(motion, size, title, None, only=frame)
@@ -192,12 +204,34 @@ def picture(
     return path
 
 
+def _motion(
+    trajectory: Trajectory, indices: NDArray[np.intp], colour: Colour, scale: float | None,
+    view: View, wear: WearLaw | None,
+) -> Motion:
+    if trajectory.system.basis.dimension == 3:
+        return SolidMotion(trajectory, indices, colour, scale, view, wear)
+    for name, given, usual in (("view", view, "above"), ("wear", wear, None)):
+        if given != usual:
+            raise InputError(f"{name} = {given!r} is for solids, but this run has plane bodies; "
+                             f"leave it out.")
+    return Motion(trajectory, indices, colour, scale)
+
+
 def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: float | None,
             only: int | None = None) -> Iterator[Image]:
     """Pictures (height, width, 3) of all frames of a motion, or of one."""
-    furniture = Overlay(motion, *size, title, slowness)
-    scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
-                  fineness=MOVING if only is None else _STILL)
+    fineness = MOVING if only is None else _STILL
+    furniture: Overlay
+    scene: Scene | SolidScene
+    if isinstance(motion, SolidMotion):
+        solid = SolidOverlay(motion, *size, title, slowness)
+        furniture = solid
+        scene = SolidScene(motion, solid.scene_width, solid.scene_height,
+                           line=1.2 * solid.size, fineness=fineness)
+    else:
+        furniture = Overlay(motion, *size, title, slowness)
+        scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
+                      fineness=fineness)
     with scene:
         for frame in range(len(motion.indices)) if only is None else (only,):
             yield furniture.around(scene.image(frame), frame)

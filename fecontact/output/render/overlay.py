@@ -21,7 +21,7 @@ from fecontact.output.render.scene import (
 Image = NDArray[np.uint8]
 
 _DPI = 100
-_FONT = 10.5  # points at 960 x 540
+FONT = 10.5  # points at 960 x 540
 _LEAST_CHART = 90.0  # pixels at 960 x 540
 _MOST_CHART = 0.6  # of the room between title and legend
 _SPARE = 1.04  # height of a scene below a chart, relative to what it needs
@@ -62,7 +62,7 @@ class Strips:
         return figure, FigureCanvasAgg(figure)
 
     def _text(self, figure: Any, x: float, y: float, text: str, **options: Any) -> Any:
-        options = {"fontsize": _FONT * self.size, "color": DARK, "va": "center",
+        options = {"fontsize": FONT * self.size, "color": DARK, "va": "center",
                    "family": "DejaVu Sans"} | options
         return figure.text(x, y, text, **options)
 
@@ -71,7 +71,7 @@ class Strips:
         figure, canvas = self._strip(self.width, self.header_height)
         beside = self._text(figure, 0.81, 0.46, note, ha="right")
         if title:
-            drawn = self._text(figure, 0.03, 0.46, title, fontsize=1.25 * _FONT * self.size)
+            drawn = self._text(figure, 0.03, 0.46, title, fontsize=1.25 * FONT * self.size)
             room = beside.get_window_extent(canvas.get_renderer()).x0 - 0.05 * self.width
             text = title
             while drawn.get_window_extent(canvas.get_renderer()).width > room and len(text) > 1:
@@ -80,13 +80,18 @@ class Strips:
         return pixels(canvas)
 
     def colour_scale(
-        self, figure: Any, label: str, largest: float, colours: str, beyond: bool = False
+        self, figure: Any, label: str, largest: float, colours: str, beyond: bool = False,
+        span: tuple[float, float] = (0.03, 0.42),
     ) -> None:
-        """Draw the colour scale from zero into the lower strip, pointed if values lie beyond."""
+        """Draw the colour scale from zero into the lower strip, pointed if values lie beyond.
+
+        ``span`` are its left end and its width, as parts of the strip.
+        """
         from matplotlib import colormaps
         from matplotlib.ticker import MaxNLocator
 
-        axes = figure.add_axes((0.03, 0.42, 0.42, 0.17))
+        left, width = span
+        axes = figure.add_axes((left, 0.42, width, 0.17))
         axes.imshow(np.linspace(0.0, 1.0, 256)[None], aspect="auto", cmap=colormaps[colours],
                     extent=(0.0, largest, 0.0, 1.0))
         axes.set_yticks([])
@@ -94,12 +99,12 @@ class Strips:
             axes.fill([1.0, 1.0, 1.025], [0.0, 1.0, 0.5], transform=axes.transAxes, clip_on=False,
                       facecolor=colormaps[colours](1.0), edgecolor=DARK,
                       linewidth=0.7 * self.size)
-        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
-        axes.tick_params(labelsize=0.9 * _FONT * self.size, colors=DARK, length=3 * self.size,
+        axes.xaxis.set_major_locator(MaxNLocator(6 if width > 0.3 else 4, steps=[1, 2, 2.5, 5, 10]))
+        axes.tick_params(labelsize=0.9 * FONT * self.size, colors=DARK, length=3 * self.size,
                          width=0.7 * self.size, pad=2 * self.size)
         for spine in axes.spines.values():
             spine.set(linewidth=0.7 * self.size, color=DARK)
-        self._text(figure, 0.03, 0.80, label)
+        self._text(figure, left, 0.80, label)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +152,7 @@ class Overlay(Strips):
 
     @cached_property
     def _chart(self) -> ForceChart:
-        return ForceChart(self.motion, self.width, self.chart_height, _FONT * self.size)
+        return ForceChart(self.motion, self.width, self.chart_height, FONT * self.size)
 
     @cached_property
     def _header(self) -> Image:
@@ -166,7 +171,7 @@ class Overlay(Strips):
     def _clock_parts(self) -> tuple[Any, Any, Any]:
         figure, canvas = self._strip(round(0.17 * self.width), self.header_height)
         text = self._text(figure, 1.0 - 0.03 / 0.17, 0.46, "", ha="right",
-                          fontsize=1.1 * _FONT * self.size)
+                          fontsize=1.1 * FONT * self.size)
         return figure, canvas, text
 
     def _clock(self, frame: int) -> Image:

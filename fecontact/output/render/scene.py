@@ -83,7 +83,7 @@ class BodyScene:
             self._pyvista: Any = pyvista
             self._shown = motion
             self._fineness = fineness
-            self._names = [(_label_image(name, _LABEL_SIZE * line), node)
+            self._names = [(label_image(name, _LABEL_SIZE * line), node)
                            for name, node in motion.labels]
             self._plotter: Any = self._pyvista.Plotter(
                 off_screen=True, window_size=[fineness * width, fineness * height])
@@ -102,10 +102,10 @@ class BodyScene:
         """Picture (height, width, 3) of a frame."""
         self._draw(frame)
         self._plotter.render()
-        image = _reduced(np.asarray(self._plotter.screenshot(None, return_img=True)),
+        image = reduced(np.asarray(self._plotter.screenshot(None, return_img=True)),
                          self._fineness)
         for label, node in self._names:
-            _blend(image, label, *self._pixel(self._body.points[node, :2], image.shape))
+            blend(image, label, *self._pixel(self._body.points[node, :2], image.shape))
         return image
 
     def _pixel(self, place: Array, shape: tuple[int, ...]) -> tuple[int, int]:
@@ -331,7 +331,7 @@ def _needed(body: float, below: float) -> float:
     return max(body / (1.0 - _DEPTH - _MARGIN), (body + below) / (1.0 - 3.0 * _MARGIN))
 
 
-def _label_image(text: str, size: float) -> NDArray[np.float64]:
+def label_image(text: str, size: float) -> NDArray[np.float64]:
     """A name in dark letters with a pale rim, (h, w, 4) from 0 to 1; ``size`` in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -352,7 +352,7 @@ def _label_image(text: str, size: float) -> NDArray[np.float64]:
     return drawn[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
-def _blend(image: NDArray[np.uint8], label: NDArray[np.float64], row: int, column: int) -> None:
+def blend(image: NDArray[np.uint8], label: NDArray[np.float64], row: int, column: int) -> None:
     """Draw a label into a picture, centred at a pixel and moved inside where it would leave it."""
     height, width = (min(given, room) for given, room in zip(label.shape, image.shape[:2],
                                                              strict=False))
@@ -363,7 +363,7 @@ def _blend(image: NDArray[np.uint8], label: NDArray[np.float64], row: int, colum
     part[:] = np.round((1.0 - alpha) * part + 255.0 * alpha * drawn[..., :3])
 
 
-def _reduced(image: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+def reduced(image: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     """Means of factor x factor pixels of an image."""
     rows = image[::factor].astype(np.uint16)
     for k in range(1, factor):

@@ -26,6 +26,8 @@ _ALONE = 1e-4  # error of a mode that is shown alone, of its largest value
 _VON_MISES = {4: 7.0**0.5, 6: 13.0**0.5}
 _PEAK = 0.98  # part of the nodes whose largest stress lies within the colour range
 _PEAKED = 1.5  # ratio of the peak to that stress above which the peak is left out of the range
+# What contact faces of solids are painted with.
+PRESSURE, STATE = "contact pressure", "contact state"
 _BLOCK = 2**18  # numbers of a field over nodes and times that stay in cache
 
 
@@ -42,7 +44,7 @@ class _Reached:
 class Motions:
     """What a page shows of modal coordinates (N, m): their ranges over bodies and time.
 
-    ``drift`` (m,) is the motion along x that is not magnified.
+    ``drift`` (m,) or (2, m) is the motion along x (and y) that is not magnified.
     """
 
     bodies: DrawnBodies
@@ -59,7 +61,8 @@ class Motions:
         if self.drift is None or not self.drift.any():
             return self._whole
         shapes = self.bodies.shapes.copy()
-        shapes[:, 0] -= self.drift
+        for axis, rows in enumerate(np.atleast_2d(self.drift)):
+            shapes[:, axis] -= rows
         return _reached(shapes, self.coordinates, _length)
 
     @cached_property
@@ -105,8 +108,9 @@ class Motions:
         low = (nodes + scale * moved.low).min(axis=0)
         high = (nodes + scale * moved.high).max(axis=0)
         if self.drift is not None:
-            drift = self.coordinates @ self.drift
-            low[0], high[0] = low[0] + drift.min(), high[0] + drift.max()
+            for axis, rows in enumerate(np.atleast_2d(self.drift)):
+                drift = self.coordinates @ rows
+                low[axis], high[axis] = low[axis] + drift.min(), high[axis] + drift.max()
         ends = [np.minimum(low, nodes.min(axis=0)), np.maximum(high, nodes.max(axis=0))]
         return [float(end) for end in np.stack(ends, axis=1).ravel()]
 
@@ -195,6 +199,9 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
     used = [k for k in range(len(bodies.components)) if bodies.stress[:, k].any()]
     steps = motions.shape_steps()
     stress, names = bodies.stress[:, used], [bodies.components[k] for k in used]
+    touching = bodies.touching
+    owned: dict[str, Any] = {} if not touching.any() else {
+        "owners": payload.add(bodies.owners), "own": 3 * int(np.count_nonzero(~touching))}
     return {
         "dimension": bodies.dimension,
         "points": payload.add(bodies.nodes, 1e-7 * bodies.extent),
@@ -204,10 +211,11 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
         "stress": payload.add(stress, np.tile(steps[1], len(used))),
         "components": names,
         "paints": [*(["von Mises stress"] if used else []), "displacement",
-                   *(f"stress {name}" for name in names), "none"],
+                   *(f"stress {name}" for name in names),
+                   *([PRESSURE, STATE] if owned else []), "none"],
         "parts": [{"name": name, "label": node} for name, node in bodies.labels],
         "modes": bodies.modes,
         "largest": {"displacement": motions.largest_displacement,
                     "stress": motions.stress_range, "peak": motions.largest_stress},
-        "peak": motions.peak_node,
+        "peak": motions.peak_node, **owned,
     }

@@ -12,7 +12,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.run import ENERGY_TERMS, usual_points
 from fecontact.output.plots.style import ENERGY_COLOURS, distinct_colours
 from fecontact.output.report.payload import SMALLEST, Payload
-from fecontact.reduction.assembly.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
 
 _STEP = 1e-4  # of curves, of their largest value
 _FLAT = 1e-9  # of the largest motion, below which a curve is round-off
@@ -25,6 +25,7 @@ def chart_tables(
 
     Curves that stay zero are left out, and so are charts without curves.
     """
+    d = run.system.basis.dimension
     points = tuple(points) or usual_points(run)
     names = [_name(point, run) for point in points]
     colours = distinct_colours(len(points))
@@ -32,8 +33,8 @@ def chart_tables(
     moved: dict[tuple[str, int, int], tuple[int, int]] = {}
     for what, unit in (("displacement", "m"), ("velocity", "m/s")):
         values = [getattr(run, what)(point) for point in points]
-        largest = max((float(np.abs(one[:, :2]).max()) for one in values), default=0.0)
-        for axis, letter in enumerate("xy"):
+        largest = max((float(np.abs(one[:, :d]).max()) for one in values), default=0.0)
+        for axis, letter in enumerate("xyz"[:d]):
             curves = {k: one[:, axis] for k, one in enumerate(values)
                       if np.abs(one[:, axis]).max() > _FLAT * largest}
             if not curves:
@@ -41,18 +42,30 @@ def chart_tables(
             moved |= {(what, axis, k): (len(charts), row) for row, k in enumerate(curves)}
             charts.append(_chart(f"{what} {letter}", unit, [
                 (names[k], colours[k], curve) for k, curve in curves.items()], payload))
-    phases = [{"title": names[k] + f", {'xy'[axis]}", "x": moved["displacement", axis, k],
+    phases = [{"title": names[k] + f", {'xyz'[axis]}", "x": moved["displacement", axis, k],
                "y": place} for (what, axis, k), place in moved.items()
               if what == "velocity" and ("displacement", axis, k) in moved]
     faces = contact_faces(run.system.basis)
     shades = distinct_colours(len(faces))
-    for title, forces in (("total normal force", run.normal_force),
-                          ("total friction force", run.friction_force)):
-        totals = [(face.name, shade, forces[:, face.nodes].sum(axis=1))
-                  for face, shade in zip(faces, shades, strict=True)]
+    for title, sums in _total_forces(run, [face.nodes for face in faces]):
+        totals = [(face.name, shade, total)
+                  for face, shade, total in zip(faces, shades, sums, strict=True)]
         if any(total.any() for _, _, total in totals):
             charts.append(_chart(title, "N", totals, payload))
     return charts, phases
+
+
+def _total_forces(run: Trajectory, faces: Sequence[slice]) -> list[tuple[str, list[Array]]]:
+    """Titles and total forces (N,) of each face; of solids friction along both tangents."""
+    found = [("total normal force", [run.normal_force[:, nodes].sum(axis=1) for nodes in faces])]
+    totals = [run.friction_forces[:, nodes].sum(axis=1) for nodes in faces]
+    if run.system.basis.dimension == 2:
+        return [*found, ("total friction force", [total[:, 0] for total in totals])]
+    ways = ("t", "t2") if several_bodies(run.system.basis) else ("-x", "-y")
+    found += [(f"total friction force along {way}", [total[:, k] for total in totals])
+              for k, way in enumerate(ways)]
+    return [*found, ("magnitude of the total friction force",
+                     [np.linalg.norm(total, axis=1) for total in totals])]
 
 
 def energy_charts(run: Trajectory, payload: Payload) -> list[dict[str, Any]]:
@@ -70,7 +83,8 @@ def energy_charts(run: Trajectory, payload: Payload) -> list[dict[str, Any]]:
 
 def _name(point: Point, run: Trajectory) -> str:
     basis = run.system.basis
-    return point_name(point, basis) + " (t, n)" * is_relative(point, basis)
+    own = " (t, n)" if basis.dimension == 2 else " (t, t2, n)"
+    return point_name(point, basis) + own * is_relative(point, basis)
 
 
 def _chart(

@@ -1,5 +1,6 @@
 """Contact of a page: places, states and forces of the contact nodes, and the ground."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -7,10 +8,13 @@ import numpy as np
 
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
+from fecontact.fem.faces.frames import tangents_of
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.ground.ground import Ground
 from fecontact.output.files.frames import contact_forces
 from fecontact.output.plots.style import STATE_COLOURS, state_names
 from fecontact.output.render.frames_data import Motion
+from fecontact.output.report.bodies import PRESSURE, STATE
 from fecontact.output.report.drawing import DrawnContact, DrawnGround
 from fecontact.output.report.payload import SMALLEST, Payload
 from fecontact.reduction.assembly.contact_faces import (
@@ -18,24 +22,33 @@ from fecontact.reduction.assembly.contact_faces import (
     contact_directions,
     touching_faces,
 )
+from fecontact.reduction.modal_basis import ModalBasis
 
 _FORCE = 0.95e-4  # largest error of a force, of the largest force
 _ROWS = 3e-6  # step of the rows of contact nodes, of their largest value
 _PROFILE = 24  # points of the ground's profile per wave
 _MOST_POINTS = 20_000  # of the profile
+_ROUND = 0.5  # length of the mean normal below which a face goes around an axis
+_OPEN = "#dddddd"  # of open contact on the faces of solids
 _BESIDE = 0.6  # ground drawn on either side of the bodies, of their width
 
 
 def drawn_contact(run: Trajectory, motion: Motion | None) -> DrawnContact:
     """Contact nodes of a run; with a motion to draw also where they and their feet are."""
-    axes = np.stack(contact_directions(run.system.basis), axis=1)
-    names = state_names(run)
+    basis, names = run.system.basis, state_names(run)
+    tangents, normals = contact_directions(basis)
+    solid = basis.dimension == 3
+    axes = (np.concatenate([tangents, normals[:, None]], axis=1) if solid
+            else np.stack([tangents, normals], axis=1))
     found = DrawnContact(
         faces=[{"title": face.title or "contact", "label": face.label,
                 "first": face.nodes.start, "abscissa": face.abscissa.tolist(),
-                "sizes": face.tributary.tolist()} for face in _touching(run)],
+                "sizes": face.tributary.tolist()}
+               | ({"plan": _plan(basis, face).T.tolist()} if solid else {})
+               for face in _touching(run)],
         axes=axes, forces=np.einsum("tnk,nik->tni", contact_forces(run), axes),
-        states=np.minimum(run.contact_state, len(names) - 1), names=names)
+        states=np.minimum(run.contact_state, len(names) - 1), names=names,
+        areas=basis.tributary if solid else None)
     if motion is None:
         return found
     places, rows = motion.contact_rows
@@ -63,6 +76,8 @@ def contact_table(contact: DrawnContact, payload: Payload) -> dict[str, Any]:
         "largest": largest,
         "axes": payload.add(contact.axes, 1e-9),
     }
+    if contact.areas is not None:
+        found["areas"] = contact.areas.tolist()
     if contact.places is not None and contact.rows is not None:
         sizes = np.abs(contact.rows).max(axis=(0, 1), initial=0.0)
         steps = np.where(sizes > 0.0, _ROWS * sizes, 1.0)
@@ -92,37 +107,88 @@ def _touching(run: Trajectory) -> tuple[ContactFace, ...]:
         return ()
 
 
+def _plan(basis: ModalBasis, face: ContactFace) -> Array:
+    """Places (k, 2) of the contact nodes of a solid's face in its mean tangent plane [m].
+
+    Those of a face around an axis, such as a bore, are unrolled about it.
+    """
+    places, normals = basis.contact_places[face.nodes], basis.normals[face.nodes]
+    share = face.tributary / face.tributary.sum()
+    mean = share @ normals
+    size = float(np.linalg.norm(mean))
+    if size > _ROUND:
+        return np.asarray(places @ tangents_of((mean / size)[None])[0].T)
+    axis = np.linalg.eigh((share[:, None] * normals).T @ normals)[1][:, 0]
+    along, across = tangents_of(axis[None])[0]
+    arm = places - share @ places
+    x, y = arm @ along, arm @ across
+    return np.column_stack([np.hypot(x, y).mean() * np.arctan2(y, x), arm @ axis])
+
+
+def painted_ends(contact: DrawnContact) -> dict[str, list[float]]:
+    """Values at both ends of the colours of what the contact faces of solids are painted with."""
+    assert contact.areas is not None
+    largest = float((np.abs(contact.forces[:, :, -1]) / contact.areas).max(initial=0.0))
+    return {PRESSURE: [0.0, largest or 1.0], STATE: [-0.5, len(contact.names) - 0.5]}
+
+
+def state_colours(contact: DrawnContact, shades: int) -> list[list[int]]:
+    """Colours of the states, from 0 to 255, as a map of so many shades."""
+    colours = [STATE_COLOURS.get(name, _OPEN) for name in contact.names]
+    rgb = [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in colours]
+    return [rgb[k * len(rgb) // shades] for k in range(shades)]
+
+
 def drift_rows(motion: Motion) -> Array:
     """Mean displacement (m,) along wavy ground of the contact nodes on it; zero on flat ground.
+
+    In space (2, m), along x and y.
 
     A wavy ground is drawn in its true length, so that drift of the bodies along it, ``drift @ q``,
     is not magnified either.
     """
     basis = motion.trajectory.system.basis
-    if not (motion.has_ground and motion.trajectory.system.ground.wavy):
-        return np.zeros(basis.modes)
-    return np.asarray(basis.contact_T[basis.ground_nodes, 0].mean(axis=0))
+    along = 0 if basis.dimension == 2 else slice(2)
+    rows = basis.contact_T[:, along]
+    if not (motion.has_ground and _drawn_wavy(motion.trajectory.system.ground)):
+        return np.zeros(rows.shape[1:])
+    return np.asarray(rows[basis.ground_nodes].mean(axis=0))
 
 
-def drawn_ground(motion: Motion, ends: tuple[float, float]) -> DrawnGround | None:
-    """The ground of a run under bodies between two abscissae; None without it."""
+def _drawn_wavy(ground: Ground) -> bool:
+    """Whether waves of the ground are drawn: those along one direction are."""
+    return ground.wavy and ground.height_map is None
+
+
+def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
+    """The ground of a run under bodies in a box [x0, x1, y0, y1, ...]; None without it."""
     if not motion.has_ground:
         return None
     ground, run = motion.trajectory.system.ground, motion.trajectory
-    basis = run.system.basis
-    travel = np.array([ground.travel(float(time)) for time in run.time])
+    basis, direction = run.system.basis, np.array(ground.wave_direction)
+    way = np.array([ground.travel(float(time)) for time in run.time])
+    ends, travel, along = box[:2], way, way
+    if basis.dimension == 3:
+        across = Ground(speed=ground.speed_y, motion=ground.motion_y)
+        travel = np.column_stack([way, [across.travel(float(time)) for time in run.time],
+                                  ground.rotation_speed * run.time])
+        along = travel[:, :2] @ direction
+        # Heights are told along a direction over the box around the bodies.
+        corners = np.array([(x, y) for x in box[:2] for y in box[2:4]]) @ direction
+        ends = [float(corners.min()), float(corners.max())]
     profile, first, spacing = np.zeros(1), 0.0, 1.0
-    if ground.wavy:
-        reach = _BESIDE * (ends[1] - ends[0])
-        first = ends[0] - reach - float(travel.max())
-        last = ends[1] + reach - float(travel.min())
+    if _drawn_wavy(ground):
+        sides = [] if basis.dimension == 2 else [box[1] - box[0], box[3] - box[2]]
+        reach = _BESIDE * max([ends[1] - ends[0], *sides])
+        first = ends[0] - reach - float(along.max())
+        last = ends[1] + reach - float(along.min())
         wave = ground.shortest_wavelength or (last - first)
         x = np.linspace(first, last, int(np.clip(_PROFILE * (last - first) / wave, 2,
                                                  _MOST_POINTS)))
         profile, spacing = ground.height(x + ground.travel(0.0), 0.0), float(x[1] - x[0])
     places = basis.positions[2 : 2 + basis.contact_nodes]
     return DrawnGround(float(places[basis.ground_nodes, -1].min()), motion.gap, travel, profile,
-                       first, spacing, drift_rows(motion))
+                       first, spacing, drift_rows(motion), ground.wave_direction, ground.centre)
 
 
 def ground_table(ground: DrawnGround, payload: Payload) -> dict[str, Any]:
@@ -133,5 +199,6 @@ def ground_table(ground: DrawnGround, payload: Payload) -> dict[str, Any]:
         "profile": payload.add(profile, max(1e-4 * float(np.ptp(profile)), SMALLEST)),
         "first": ground.first, "spacing": ground.spacing,
         "travel": payload.add(travel, max(1e-6 * float(np.abs(travel).max()), SMALLEST)),
-        "drift": ground.drift.tolist(),
+        "drift": ground.drift.ravel().tolist(), "direction": ground.direction,
+        "centre": ground.centre,
     }

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from fecontact.core.types import Array, Integers
+from fecontact.output.files.contact_facets import contact_facets
 from fecontact.output.render.frames_data import body_labels
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.mode_shapes import ModeShapes
 from fecontact.reduction.report import BasisReport
 
 # Stresses in their order, in the plane and in space.
@@ -43,6 +45,9 @@ class DrawnBodies:
         Name, frequency in Hz, damping ratio and kind of each mode, as text.
     labels : tuple of (str, int)
         Names of several bodies and the nodes at which they are written.
+    owners : (P,) integer array or None
+        In space the contact node to whose patch each node belongs, -1 for none. Nodes between
+        patches are there for each; triangles of patches come last.
     """
 
     nodes: Array
@@ -52,6 +57,14 @@ class DrawnBodies:
     stress: Array
     modes: list[list[str]]
     labels: tuple[tuple[str, int], ...] = ()
+    owners: Integers | None = None
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """Whether each triangle (k,) is part of a patch."""
+        if self.owners is None:
+            return np.zeros(len(self.triangles), dtype=bool)
+        return np.asarray((self.owners[self.triangles] >= 0).all(axis=1))
 
     @property
     def dimension(self) -> int:
@@ -93,6 +106,8 @@ class DrawnContact:
         Contact nodes of the feet.
     sliding : tuple of str
         What slides by prescription.
+    areas : (n,) array or None
+        Of the patches of solids [m^2].
     """
 
     faces: list[dict[str, object]]
@@ -104,11 +119,14 @@ class DrawnContact:
     rows: Array | None = None
     feet: Integers | tuple[int, ...] = ()
     sliding: tuple[str, ...] = ()
+    areas: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnGround:
     """The ground below the bodies: its height is ``profile(x - travel)`` above its level.
+
+    In space x is the distance along ``direction``.
 
     Attributes
     ----------
@@ -116,15 +134,19 @@ class DrawnGround:
         Height of the lowest contact node at rest [m].
     gap : float
         Smallest gap below the contact nodes [m].
-    travel : (N,) array
-        In +x at all times [m].
+    travel : (N,) or (N, 3) array
+        In +x at all times [m]; in space along x and y and about ``centre`` [rad].
     profile : (k,) array
         Heights [m] at equal distances; one zero for flat ground.
     first, spacing : float
         Abscissa of the first height, and distance [m].
-    drift : (m,) array
-        Mean displacement of the contact nodes in x per modal coordinate, which wavy ground, drawn
-        in its true length, does not magnify; zero on flat ground.
+    drift : (m,) or (2, m) array
+        Mean displacement of the contact nodes in x (and y) per modal coordinate, which wavy ground,
+        drawn in its true length, does not magnify; zero on flat ground.
+    direction : (float, float)
+        Along which the height varies.
+    centre : (float, float)
+        About which it turns [m].
     """
 
     level: float
@@ -134,6 +156,8 @@ class DrawnGround:
     first: float
     spacing: float
     drift: Array
+    direction: tuple[float, float] = (1.0, 0.0)
+    centre: tuple[float, float] = (0.0, 0.0)
 
     @property
     def wavy(self) -> bool:
@@ -154,8 +178,49 @@ def drawn_bodies(basis: ModalBasis) -> DrawnBodies:
         mode_names(basis), basis.frequencies_hz, ratios, kinds, strict=True)]
     # Rigid modes without the round-off of their stresses.
     stress = field.stress * (basis.angular_frequencies > 0.0)
+    if basis.dimension == 3:
+        return along_edges(_drawn_solids(basis, field, stress, modes))
     return DrawnBodies(field.nodes, as_triangles(field.cells), field.outline, field.shapes, stress,
                        modes, body_labels(basis))
+
+
+def _drawn_solids(
+    basis: ModalBasis, field: ModeShapes, stress: Array, modes: list[list[str]]
+) -> DrawnBodies:
+    """The surface of solids, whose patches have nodes of their own."""
+    facets, n = field.outline, basis.contact_nodes
+    patches = contact_facets(basis)
+    # Places of the facets of patches in the outline, by their nodes.
+    known = np.sort(np.concatenate([facets, patches.facets]), axis=1)
+    number = np.unique(known, axis=0, return_inverse=True)[1].ravel()
+    found = np.full(number.max() + 1, -1)
+    found[number[len(facets):]] = patches.owner
+    owner = found[number[: len(facets)]]
+    corners = as_triangles(facets)
+    triangle_owner = np.repeat(owner, len(corners) // len(facets))
+    key, inverse = np.unique(corners * (n + 1) + triangle_owner[:, None] + 1, return_inverse=True)
+    node, owners = key // (n + 1), key % (n + 1) - 1
+    vertex = np.zeros(len(field.nodes), dtype=np.int64)
+    vertex[node[::-1]] = np.arange(len(node))[::-1]
+    return DrawnBodies(
+        field.nodes[node], inverse.reshape(corners.shape),
+        vertex[sharp_edges(field.nodes, corners)], field.shapes[node], stress[node], modes,
+        _labels_on(basis, field.nodes[node], node), owners)
+
+
+def _labels_on(
+    basis: ModalBasis, places: Array, node: Integers
+) -> tuple[tuple[str, int], ...]:
+    """Names of several bodies and the nodes of the surface next to the middles of their tops."""
+    found = []
+    for part in basis.parts:
+        own = np.flatnonzero((part.nodes[0] <= node) & (node < sum(part.nodes)))
+        if not len(own):
+            continue
+        low, high = places[own].min(axis=0), places[own].max(axis=0)
+        top = np.array([*0.5 * (low + high)[:2], high[2]])
+        found.append((part.name, int(own[np.linalg.norm(places[own] - top, axis=1).argmin()])))
+    return tuple(found)
 
 
 def as_triangles(facets: Integers) -> Integers:
@@ -171,6 +236,8 @@ def as_triangles(facets: Integers) -> Integers:
 def along_edges(bodies: DrawnBodies) -> DrawnBodies:
     """The same bodies with their nodes in the order of a walk along edges of their triangles.
 
+    Triangles of patches stay behind the others.
+
     Fields differ little from one node to the next, so that large surfaces take half of the room.
     """
     count = len(bodies.nodes)
@@ -182,10 +249,11 @@ def along_edges(bodies: DrawnBodies) -> DrawnBodies:
         order += depth_first_order(graph, first, directed=False, return_predecessors=False).tolist()
     place = np.argsort(order)
     triangles = place[bodies.triangles]
+    owners = None if bodies.owners is None else bodies.owners[order]
     return replace(
         bodies, nodes=bodies.nodes[order], shapes=bodies.shapes[order],
         stress=bodies.stress[order], edges=place[bodies.edges],
-        triangles=triangles[np.argsort(triangles.min(axis=1), kind="stable")],
+        triangles=triangles[np.lexsort((triangles.min(axis=1), bodies.touching))], owners=owners,
         labels=tuple((name, int(place[node])) for name, node in bodies.labels))
 
 

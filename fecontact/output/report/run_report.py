@@ -17,7 +17,7 @@ from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.case import library_versions
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.scene import COLOUR_MAPS
-from fecontact.output.report.bodies import Motions, bodies_table
+from fecontact.output.report.bodies import PRESSURE, STATE, Motions, bodies_table
 from fecontact.output.report.charts import chart_tables, energy_charts
 from fecontact.output.report.contact import (
     contact_table,
@@ -25,6 +25,8 @@ from fecontact.output.report.contact import (
     drawn_ground,
     drift_rows,
     ground_table,
+    painted_ends,
+    state_colours,
 )
 from fecontact.output.report.drawing import DrawnGround, drawn_bodies
 from fecontact.output.report.page import write_page
@@ -32,6 +34,7 @@ from fecontact.output.report.payload import Payload
 
 _SHADES = 64  # of a colour map
 _VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
+_PAINTS = {"von_mises": "von Mises stress"}
 _NOT_OF_RUNS = ("branch", "sweep", "wear", "preload", "render", "output")  # sections of a study
 
 
@@ -124,13 +127,18 @@ def run_block(
         "contact": None, "ground": None, "maps": colour_maps(),
     }
     if system.basis.contact_nodes:
-        header["contact"] = contact_table(drawn_contact(found, motion), payload)
+        contact = drawn_contact(found, motion)
+        header["contact"] = contact_table(contact, payload)
     if motion is not None:
         motions = Motions(drawn_bodies(system.basis), found.modal_coordinates, drift_rows(motion))
         scale = _visible_scale(motions, motion) if scale is None else float(scale)
         box = motions.box(scale)
-        header |= moving_tables(motions, scale, box, drawn_ground(motion, (box[0], box[1])),
-                                payload)
+        header |= moving_tables(motions, scale, box, drawn_ground(motion, box), payload)
+        if "owners" in header["bodies"]:
+            header["bodies"]["ends"] = painted_ends(contact)
+            header["maps"][STATE] = state_colours(contact, _SHADES)
+        if motion.has_ground and system.ground.height_map is not None:
+            told.append("The ground is drawn flat: its map of heights is not shown.")
     return payload.block(header)
 
 
@@ -201,12 +209,14 @@ def _facts(run: Trajectory, found: Trajectory) -> list[tuple[str, str]]:
 
 
 def colour_maps() -> dict[str, list[list[int]]]:
-    """Colours of displacement, von Mises stress and signed components, from 0 to 255."""
+    """Colours of displacement, von Mises stress, pressure and signed components, 0 to 255."""
     from matplotlib import colormaps
 
     at = np.linspace(0.0, 1.0, _SHADES)
     return {what: np.asarray(colormaps[name](at, bytes=True))[:, :3].astype(int).tolist()
-            for what, name in {**COLOUR_MAPS, "component": "coolwarm"}.items()}
+            for what, name in {**{_PAINTS.get(what, what): name
+                                  for what, name in COLOUR_MAPS.items()},
+                               PRESSURE: "viridis", "component": "coolwarm"}.items()}
 
 
 def require_page(path: Path) -> Path:

@@ -19,6 +19,16 @@ _CLOSED = set("{}()[];,:?=*/<>&|!%.`")
 _SHORTER = tuple((re.compile(pattern), instead) for pattern, instead in (
     (r"\bconst\b", "let"), (r";}", "}"), (r"\((\w+)\)=>", r"\1=>"),
     (r"(?<![\w.$])0\.(?=\d)", "."), (r"\btrue\b", "!0"), (r"\bfalse\b", "!1")))
+# Constants of WebGL as its standard fixes them.
+_OF_WEBGL = {
+    "ARRAY_BUFFER": 34962, "BLEND": 3042, "CLAMP_TO_EDGE": 33071, "COLOR_BUFFER_BIT": 16384,
+    "DEPTH_BUFFER_BIT": 256, "DEPTH_TEST": 2929, "DYNAMIC_DRAW": 35048,
+    "ELEMENT_ARRAY_BUFFER": 34963, "FLOAT": 5126, "FRAGMENT_SHADER": 35632, "LINEAR": 9729,
+    "LINES": 1, "ONE": 1, "ONE_MINUS_SRC_ALPHA": 771, "POLYGON_OFFSET_FILL": 32823, "RGBA": 6408,
+    "SRC_ALPHA": 770, "STATIC_DRAW": 35044, "TEXTURE_2D": 3553, "TEXTURE_MIN_FILTER": 10241,
+    "TEXTURE_WRAP_S": 10242, "TRIANGLES": 4, "UNSIGNED_BYTE": 5121, "UNSIGNED_INT": 5125,
+    "VERTEX_SHADER": 35633}
+_GL = re.compile(rf"\bgl\.({'|'.join(_OF_WEBGL)})\b")
 _WORDS = frozenset(
     """async await break case catch class const constructor continue default delete do else
     export extends false finally for from function get if import in instanceof let new null
@@ -37,7 +47,8 @@ _ALIKE = frozenset(
 
 def shortened(text: str) -> str:
     """A script that does the same in fewer letters."""
-    tokens = _tokens(_COMMENTS.sub("", text))
+    plain = _GL.sub(lambda match: str(_OF_WEBGL[match[1]]), _COMMENTS.sub("", text))
+    tokens = _tokens(plain)
     roles = _roles(tokens)
     names = _new_names(tokens, roles)
     found = []
@@ -50,7 +61,7 @@ def shortened(text: str) -> str:
             found.append((kind, token))
     # Globals that never change and are used often.
     globals_ = ",".join(f"{names[name]}={name}" for name in sorted(_ALIKE & names.keys()))
-    return (f"let {globals_};" if globals_ else "") + _joined(found)
+    return (f"let {globals_};" if globals_ else "") + _joined(_together(found))
 
 
 def _tokens(text: str) -> list[tuple[str, str]]:
@@ -132,6 +143,38 @@ def _new_names(tokens: list[tuple[str, str]], roles: list[str]) -> dict[str, str
     private = [name for name in ours if name[0] == "#"]
     return dict(zip([name for name in ours if name[0] != "#"], fresh, strict=False)) | {
         name: "#" + short for name, short in zip(private, ascii_letters, strict=False)}
+
+
+def _together(tokens: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Declarations that follow each other as one."""
+    found: list[tuple[str, str]] = []
+    declares, begins = [False], True  # the statement at each depth; whether one begins here
+    at = 0
+    while at < len(tokens):
+        kind, token = tokens[at]
+        at += 1
+        found.append((kind, token))
+        if kind == "blank":
+            continue
+        if begins:
+            declares[-1] = token in ("const", "let")
+        begins = kind == "sign" and token in ";{}"
+        if kind != "sign":
+            continue
+        if token in "([{":
+            declares.append(False)
+        elif token in ")]}":
+            declares.pop()
+            # What a block ends is no declaration, but an object may end one.
+            begins = token == "}" and not declares[-1]
+        elif token == ";" and declares[-1]:
+            ahead = next((k for k in range(at, len(tokens)) if tokens[k][0] != "blank"), at)
+            if ahead < len(tokens) and tokens[ahead][1] in ("const", "let"):
+                found[-1] = ("sign", ",")
+                begins, at = False, ahead + 1
+                while at < len(tokens) and tokens[at][0] == "blank":
+                    at += 1
+    return found
 
 
 def _is_method(code: list[tuple[str, str]], at: int) -> bool:

@@ -52,6 +52,13 @@ function layer(canvas, width, height) {
   return context;
 }
 
+// Letters of labels.
+function letters(c, textAlign) {
+  c.font = `11px ${css("--font")}`;
+  c.fillStyle = css("--soft");
+  c.textAlign = textAlign;
+}
+
 class Chart {
   // lines: [{name, colour, x?, y}] with arrays; without x over the time of the clock.
   constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart" }) {
@@ -111,8 +118,7 @@ class Chart {
     this.py = (value) => bottom - (bottom - top) * (value - y[0]) / (y[1] - y[0]);
     this.range = { x, y };
     c.clearRect(0, 0, this.width, this.height);
-    c.font = `11px ${css("--font")}`;
-    c.fillStyle = css("--soft");
+    letters(c, "right");
     c.strokeStyle = css("--grid");
     c.lineWidth = 1;
     const xs = ticks(...x, clamp((right - left) / 70, 2, 10)), ys = ticks(...y, this.height / 32);
@@ -121,7 +127,6 @@ class Chart {
     for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
     c.stroke();
     c.textBaseline = "middle";
-    c.textAlign = "right";
     for (const [value, text] of ys) c.fillText(text, left - 6, this.py(value));
     this.bottomLabels(c, xs);
     c.save();

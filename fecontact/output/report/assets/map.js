@@ -53,10 +53,8 @@ class ContactMap extends Chart {
     c.fillRect(left, top, columns, rows);
     c.imageSmoothingEnabled = false;
     c.drawImage(small, left, top, columns, rows);
-    c.font = `11px ${css("--font")}`;
-    c.fillStyle = css("--soft");
+    letters(c, "right");
     c.textBaseline = "middle";
-    c.textAlign = "right";
     const millimetres = (k) => (1e3 * face.abscissa[order[k]]).toPrecision(3).replace(/\.0*$/, "");
     c.fillText(millimetres(0), left - 6, top + 8);
     c.fillText(millimetres(n - 1), left - 6, bottom - 8);
@@ -93,9 +91,7 @@ class Footprint extends ContactMap {
       c.fillRect(width / 2 + size * (x - (left + right) / 2) - w / 2 + 0.5,
         (height - 20) / 2 - size * (plan[1][k] - (low + high) / 2) - h / 2 + 0.5, w - 1, h - 1);
     });
-    c.font = `11px ${css("--font")}`;
-    c.fillStyle = css("--soft");
-    c.textAlign = "center";
+    letters(c, "center");
     c.fillText(`${quantity(right - left + sides[0], "m")} × ${quantity(high - low + sides[1], "m")}`, width / 2, height - 6);
   }
 }

@@ -219,32 +219,35 @@ class Player {
       0.5 * this.#height - this.size * (t[1] * p[0] + t[4] * p[1] + t[7] * p[2])];
   }
 
-  // Between stored instants coordinates are interpolated, so that slow motion is smooth.
-  #coordinates() {
-    const { values, columns } = this.data.coordinates, { index, times, time } = this.clock;
+  // Between stored instants numbers are interpolated, so that slow motion is smooth.
+  #now({ values, columns }, out) {
+    const { index, times, time } = this.clock;
     const next = min(index + 1, times.length - 1);
     const part = next > index ? clamp((time - times[index]) / (times[next] - times[index]), 0, 1) : 0;
     for (let k = 0; k < columns; k++) {
-      this.q[k] = (1 - part) * values[index * columns + k] + part * values[next * columns + k];
+      out[k] = (1 - part) * values[index * columns + k] + part * values[next * columns + k];
     }
+    return out;
   }
 
   #evaluate() {
     const { bodies, ground } = this.data, { d, count, q } = this;
-    let scale = this.scale, drift = 0;
+    let scale = this.scale, drift = [0, 0];
     if (this.mode >= 0) {
       q.fill(0);
       q[this.mode] = Math.sin(this.phase);
       scale = this.#shake();
     } else {
-      this.#coordinates();
-      if (ground?.wavy) drift = (1 - scale) * ground.drift.reduce((sum, row, k) => sum + row * q[k], 0);
+      this.#now(this.data.coordinates, q);
+      // In space along x, then along y.
+      if (ground?.wavy) ground.drift.forEach((row, k) => { drift[k < q.length ? 0 : 1] += (1 - scale) * row * q[k % q.length]; });
     }
     times(bodies.shapes, count * d, q, this.moved);
     const { places, moved } = this, points = bodies.points.values;
     for (let p = 0; p < count; p++) {
       for (let k = 0; k < d; k++) places[3 * p + k] = points[p * d + k] + scale * moved[p * d + k];
-      places[3 * p] += drift;
+      places[3 * p] += drift[0];
+      places[3 * p + 1] += drift[1];
     }
     this.#drawn = { scale, drift };
     this.#colour();
@@ -265,16 +268,21 @@ class Player {
     const kinds = bodies.components.length, alone = this.mode >= 0;
     if (paint.includes("stress")) times(bodies.stress, count * kinds, this.q, stress);
     const part = bodies.components.indexOf(paint.slice(7)), mises = paint === "von Mises stress";
+    const { contact } = this.data, { index } = this.clock, ends = bodies.ends?.[paint];
     const order = ["xx", "yy", "zz", "xy", "yz", "zx"].map((name) => bodies.components.indexOf(name));
     for (let p = 0; p < count; p++) {
-      if (mises) values[p] = vonMises(stress, p * kinds, order);
+      if (ends) {
+        const node = bodies.owners.values[p], { state, forces } = contact;
+        values[p] = node < 0 ? 0 : ends[0] ? state.values[node * state.rows + index]
+          : forces.values[(node * d + d - 1) * forces.rows + index] / contact.areas[node];
+      } else if (mises) values[p] = vonMises(stress, p * kinds, order);
       else if (part >= 0) values[p] = stress[p * kinds + part];
       else values[p] = hypot(moved[p * d], moved[p * d + 1], d > 2 ? moved[p * d + 2] : 0);
     }
     const swing = abs(Math.sin(this.phase)) || 1;
     let end = paint === "displacement" ? bodies.largest.displacement : bodies.largest.stress;
     if (alone) end = values.reduce((sum, value) => max(sum, abs(value)), 0) / swing;
-    this.#limits = [part >= 0 ? -end : 0, end || 1];
+    this.#limits = ends ?? [part >= 0 ? -end : 0, end || 1];
   }
 
   draw() {
@@ -317,9 +325,14 @@ class Player {
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 64, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, Uint8Array.from(map));
       this.#texture = paint;
     }
-    gl.uniform4f(at.plain, 0.55, 0.62, 0.68, paint === "none" ? 1 : 0);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.#faces.buffer);
-    gl.drawElements(gl.TRIANGLES, this.#faces.size, gl.UNSIGNED_INT, 0);
+    const { buffer, size } = this.#faces, { bodies } = data;
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+    // Of contact, faces alone are coloured.
+    const first = bodies.ends?.[paint] ? bodies.own : paint === "none" ? size : 0;
+    gl.uniform4f(at.plain, 0.55, 0.62, 0.68, 1);
+    gl.drawElements(gl.TRIANGLES, first, gl.UNSIGNED_INT, 0);
+    gl.uniform4f(at.plain, 0, 0, 0, 0);
+    gl.drawElements(gl.TRIANGLES, size - first, gl.UNSIGNED_INT, 4 * first);
     gl.uniform4f(at.plain, ...css("--outline").split(",").map(Number), 1);
     gl.uniform1f(at.solid, 0);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.#edges.buffer);
@@ -328,20 +341,17 @@ class Player {
 
   #shades() {
     const { maps } = this.data;
-    return maps[this.paint === "displacement" ? "displacement"
-      : this.paint === "von Mises stress" ? "von_mises" : "component"];
+    return maps[this.paint] ?? maps.component;
   }
 
   // Height of the ground and way that it has gone at the drawn instant.
   #groundNow() {
-    const { ground } = this.data, { scale } = this.#drawn, { index, times, time } = this.clock;
-    const { values } = ground.travel, next = min(index + 1, times.length - 1);
-    const part = next > index ? clamp((time - times[index]) / (times[next] - times[index]), 0, 1) : 0;
-    const way = (ground.wavy ? 1 : scale) * ((1 - part) * values[index] + part * values[next]);
+    const { ground } = this.data, { scale } = this.#drawn, [a, b] = ground.direction;
+    const way = this.#now(ground.travel, []).map((one) => (ground.wavy ? 1 : scale) * one);
     const level = ground.level - scale * ground.gap, profile = ground.profile.values;
-    return { way, height: (x) => {
+    return { way, height: (x, y) => {
       if (!ground.wavy) return level;
-      const at = clamp((x - way - ground.first) / ground.spacing, 0, profile.length - 1);
+      const at = clamp(((this.d > 2 ? a * (x - way[0]) + b * (y - way[1]) : x - way[0]) - ground.first) / ground.spacing, 0, profile.length - 1);
       const k = min(floor(at), profile.length - 2);
       return level + scale * (profile[k] + (at - k) * (profile[k + 1] - profile[k]));
     } };
@@ -351,15 +361,11 @@ class Player {
     const c = this.#under, { box, ground } = this.data, [left, right] = box;
     c.clearRect(0, 0, this.#width, this.#height);
     if (!ground || this.mode >= 0) return;
-    const { way, height } = this.#groundNow(), [[first], [second]] = ticks(left, right, 12);
-    const spacing = second - first, lines = (low, high, draw) => {
-      // Marks move with the ground.
-      for (let k = Math.ceil((low - way) / spacing); k * spacing + way < high; k++) draw(k * spacing + way);
-    };
+    const { way, height } = this.#groundNow(), [[first], [second]] = ticks(left, right, 12), spacing = second - first;
     c.strokeStyle = css("--mark");
     c.fillStyle = css("--ground");
     c.lineWidth = 1;
-    if (this.d === 3) return this.#drawPlane(c, height, lines);
+    if (this.d === 3) return this.#drawPlane(c, height, way, spacing);
     const world = (px) => (px - 0.5 * this.#width) / this.size + this.#centre[0];
     c.beginPath();
     for (let px = 0; px <= this.#width; px += 2) c.lineTo(px, this.project(0, height(world(px)))[1]);
@@ -371,35 +377,43 @@ class Player {
     c.fill();
     c.strokeStyle = css("--mark");
     c.beginPath();
-    lines(world(0), world(this.#width), (x) => {
+    // Marks move with the ground.
+    for (let k = Math.ceil((world(0) - way[0]) / spacing), x; (x = k * spacing + way[0]) < world(this.#width); k++) {
       const [px, py] = this.project(x, height(x));
       c.moveTo(px, py + 5);
       c.lineTo(px - 6, py + 15);
-    });
+    }
     c.stroke();
   }
 
   // In space a sheet below the bodies: they lie before it as seen from above, and from below it is
   // seen through.
-  #drawPlane(c, height, lines) {
+  #drawPlane(c, height, [wayX, wayY, angle], spacing) {
     const [left, right, front, back] = this.data.box, room = 0.2 * max(right - left, back - front);
-    const [x0, x1, y0, y1] = [left - room, right + room, front - room, back + room];
-    const along = (y, from, to) => {
-      for (let k = 0; k <= 96; k++) {
-        const x = from + (to - from) * k / 96;
-        c.lineTo(...this.project(x, y, height(x)));
-      }
-    };
+    const wide = right - left + 2 * room, deep = back - front + 2 * room, [cx, cy] = this.data.ground.centre;
+    const at = (x, y) => this.project(x, y, height(x, y));
+    c.save();
     c.beginPath();
-    along(y0, x0, x1);
-    along(y1, x1, x0);
-    c.closePath();
+    for (let k = 0; k < 4; k += 1 / 64) {
+      c.lineTo(...at(left - room + wide * clamp(min(k, 3 - k), 0, 1), front - room + deep * clamp(min(k - 1, 4 - k), 0, 1)));
+    }
     c.fill();
-    lines(x0, x1, (x) => {
-      c.moveTo(...this.project(x, y0, height(x)));
-      c.lineTo(...this.project(x, y1, height(x)));
-    });
+    c.clip();
+    c.beginPath();
+    // A net that moves and turns with the ground, around what of it lies below the middle.
+    const turned = (x, y, sine, cosine = Math.cos(angle)) => [cosine * x - sine * y, sine * x + cosine * y];
+    const sine = Math.sin(angle), x0 = cx + wayX, y0 = cy + wayY, reach = round(hypot(wide, deep) / 2 / spacing + 1) * spacing;
+    const [x1, y1] = turned((left + right) / 2 - x0, (front + back) / 2 - y0, -sine).map((one) => round(one / spacing) * spacing);
+    for (let x = x1 - reach; x < x1 + reach; x += spacing) {
+      for (let y = y1 - reach; y < y1 + reach; y += spacing) {
+        [[0, spacing], [0, 0], [spacing, 0]].forEach(([u, v], k) => {
+          const [p, q] = turned(x + u, y + v, sine);
+          c[k ? "lineTo" : "moveTo"](...at(x0 + p, y0 + q));
+        });
+      }
+    }
     c.stroke();
+    c.restore();
   }
 
   #drawOver() {
@@ -416,7 +430,7 @@ class Player {
       c.strokeText(name, ...at);
       c.fillText(name, ...at);
     }
-    if (this.paint !== "none") this.#bar(c);
+    if (!["none", "contact state"].includes(this.paint)) this.#bar(c);
   }
 
   #drawContact(c, contact) {
@@ -427,7 +441,8 @@ class Player {
     for (let k = 0; k < size; k++) {
       const p = [0, 0, 0];
       for (let i = 0; i < d; i++) p[i] = contact.places.values[k * d + i] + scale * moved[k * d + i];
-      p[0] += drift;
+      p[0] += drift[0];
+      p[1] += drift[1];
       shown.push(this.project(...p));
       // Seen through the body: a normal points into it.
       let towards = 0;
@@ -490,13 +505,11 @@ class Player {
       c.fillStyle = `rgb(${one})`;
       c.fillRect(left + width * k / 64, top, width / 64 + 0.6, 7);
     });
-    c.font = `11px ${css("--font")}`;
-    c.fillStyle = css("--soft");
+    letters(c, "left");
     c.textBaseline = "top";
-    const alone = this.mode >= 0, what = this.paint.includes("stress") ? "Pa" : "m";
+    const alone = this.mode >= 0, what = this.paint === "displacement" ? "m" : "Pa";
     const [low, high] = this.#limits, { peak } = this.data.bodies.largest;
-    const beyond = what === "Pa" && !alone && high < peak;
-    c.textAlign = "left";
+    const beyond = this.paint.includes("stress") && !alone && high < peak;
     c.fillText(alone ? "" : quantity(low, what), left, top + 11);
     c.textAlign = "right";
     c.fillText(alone ? "largest" : quantity(high, what) + (beyond ? `, peak ${quantity(peak, what)}` : ""),

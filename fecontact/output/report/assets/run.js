@@ -43,7 +43,7 @@ async function build(host, data, told) {
       height: 220, kind: "phase", lines: [{ name: "", colour: other.colour, x: one.y, y: other.y }] });
   });
   const maps = data.contact ? data.contact.faces.flatMap((face) => (face.plan ? [Footprint, ContactMap] : [ContactMap])
-    .map((kind) => new kind(clock, data.contact, face, data.maps.von_mises))) : [];
+    .map((kind) => new kind(clock, data.contact, face, data.maps["von Mises stress"]))) : [];
   const energies = data.energies.map((one) => new Chart(clock, columns(one, clock)));
   const all = [...charts, ...phases, ...maps, ...energies];
   const resize = () => { for (const one of all) one.resize(); };

@@ -1,0 +1,214 @@
+"""The page of a run of solids: what it holds is the run, contact faces have its pressures.
+
+Needs Chromium and Playwright; see ``browsing.py``.
+"""
+
+import numpy as np
+import pytest
+from browsing import SOFTWARE_WEBGL, Opened, launched, sync_api
+from matplotlib import colormaps
+from report_reading import Shown
+
+import fecontact as fc
+from fecontact.cli.templates import template
+from fecontact.io import report
+
+SCALE = 5.0
+PAIR = """
+[bodies.disc]
+geometry = { shape = "ring", outer_radius = 0.06, inner_radius = 0.02, thickness = 0.01 }
+body = { fixed = { contact = "xyz" } }
+basis = { modes = 3 }
+[bodies.pad]
+geometry = { shape = "solid-block", length = 0.02, width = 0.02, height = 0.01 }
+placement = { shift = [0.03, -0.01, 0.01] }
+basis = { modes = 8, C = "top" }
+[interfaces.lining]
+face = "pad.contact"
+other = "disc.top"
+nodes = [2, 2]
+normal = { law = "linear", stiffness = 2e7, damping = 200.0 }
+friction = { law = "constant", friction_coefficient = 0.4, smoothing_slope = 100.0 }
+sliding = { speed = 3.0, centre = [0.0, 0.0, 0.0] }
+[links.stay]
+kind = "spring"
+first = "pad.C"
+stiffness = 1e5
+direction = [0.0, 1.0, 0.0]
+[links.guide]
+kind = "spring"
+first = "pad.C"
+stiffness = 1e5
+direction = [1.0, 0.0, 0.0]
+[load]
+normal = 50.0
+[simulation]
+t_end = 2e-3
+outputs = 21
+"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as started:
+        opened = launched(started, *SOFTWARE_WEBGL)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def trajectory():
+    return fc.Study.from_toml(template("solid")).with_(**{
+        "simulation.t_end": 0.03, "simulation.outputs": 151}).run()
+
+
+@pytest.fixture(scope="module")
+def path(trajectory, tmp_path_factory):
+    return report(trajectory, tmp_path_factory.mktemp("solid") / "pad.html", points=["B"],
+                  scale=SCALE)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return fc.Study.from_toml(PAIR).run()
+
+
+def surface(run, shown):
+    """Mesh nodes of the points of a page, which lie on the surface of the bodies."""
+    field = run.system.basis.mode_shapes
+    points = shown.array("bodies", "points")
+    away = np.linalg.norm(field.nodes[None] - points[:, None], axis=2)
+    assert away.min(axis=1).max() < 1e-6
+    outline = np.unique(field.outline)
+    assert away[:, outline].min(axis=0).max() < 1e-6
+    return outline[away[:, outline].argmin(axis=1)]
+
+
+def test_what_is_stored_is_the_run(trajectory, path):
+    shown, run = Shown(path), trajectory
+    field, q = run.system.basis.mode_shapes, run.modal_coordinates
+    nodes = surface(run, shown)
+    motion = np.einsum("pcm,tm->tpc", field.shapes[nodes], q)
+    size = np.linalg.norm(motion, axis=2).max()
+    assert np.linalg.norm(shown.displacement - motion, axis=2).max() < 1e-4 * size
+    own = np.concatenate([-run.friction_forces, run.normal_force[..., None]], axis=2)
+    assert np.linalg.norm(shown.forces - own, axis=2).max() < 1e-4 * np.linalg.norm(
+        own, axis=2).max()
+    assert shown.header["contact"]["areas"] == pytest.approx(run.system.basis.tributary)
+    charts = {chart["title"]: chart for chart in shown.header["charts"]}
+    totals = run.friction_forces.sum(axis=1)
+    for title, expected in (
+            ("total friction force along -x", totals[:, 0]),
+            ("total friction force along -y", totals[:, 1]),
+            ("magnitude of the total friction force", np.hypot(*totals.T)),
+            ("displacement y", run.displacement("B")[:, 1]),
+            ("velocity z", run.velocity("B")[:, 2])):
+        k = list(charts).index(title)
+        found = shown.array("charts", k, "values")[:, 0] * charts[title]["factor"]
+        assert found == pytest.approx(expected, abs=2e-4 * np.abs(expected).max()), title
+    travel = shown.array("ground", "travel")
+    assert travel[:, 0] == pytest.approx(0.05 * run.time, abs=1e-8)
+    assert travel[:, 1] == pytest.approx(
+        0.05 / 300.0 * (1.0 - np.cos(300.0 * run.time)), abs=1e-8)
+    assert not travel[:, 2].any()
+
+
+def test_contact_faces_have_the_colours_of_pressure_and_state(browser, trajectory, path):
+    """From below, with the light of the page taken off."""
+    run, colours = trajectory, {1: (0x00, 0x72, 0xb2), 2: (0xe6, 0x9f, 0x00)}
+    places, pressure = run.system.basis.contact_places, run.pressure
+    limit = pressure.max()
+    with Opened(browser, path) as opened:
+        opened.page.wait_for_selector("html[data-whole]", state="attached")
+        # Constants of WebGL that the script has as numbers.
+        from fecontact.output.report.shorten import _OF_WEBGL
+        assert opened.page.evaluate(
+            "names => { const gl = document.createElement('canvas').getContext('webgl2');"
+            "return names.map(name => gl[name]); }", list(_OF_WEBGL)) == list(_OF_WEBGL.values())
+        opened.page.get_by_label("forces").uncheck()
+        opened.page.get_by_label("view").select_option("below")
+        turn = np.reshape(opened.of_player("player.turn"), (3, 3)).T
+        light = 0.5 + 0.5 * abs(turn @ [0.0, 0.0, -1.0] @ [0.2, 0.4, 0.9])
+        met, spread = set(), []
+        for index in (20, 61, 90, 149):
+            opened.of_player(f"player.clock.set(player.clock.times[{index}])")
+            moved = np.array([run.displacement(node)[index, :3] for node in range(len(places))])
+            # Beside the dot of the node.
+            seen = opened.of_player(f"{(places + SCALE * moved + [0.006, 0.006, 0]).tolist()}"
+                                    ".map(p => player.project(...p))")
+            for paint in ("contact pressure", "contact state"):
+                opened.page.get_by_label("colour", exact=True).select_option(paint)
+                picture = opened.picture()
+                for node, (x, y) in enumerate(seen):
+                    state = int(run.contact_state[index, node])
+                    expected = np.array(colours[state]) if paint == "contact state" else (
+                        255.0 * np.array(colormaps["viridis"](pressure[index, node] / limit)[:3]))
+                    found = picture[int(y), int(x)] / light
+                    assert np.abs(found - expected).max() < 16.0, (paint, index, node)
+                    met.add(state)
+            spread.append(np.ptp(pressure[index]) / limit)
+        assert met == {1, 2}
+        assert max(spread) > 0.1
+        # The other sides are plain.
+        opened.page.get_by_label("view").select_option("above")
+        middle = opened.picture()[200:260, 250:350].reshape(-1, 3)
+        assert np.ptp(middle, axis=0).max() < 10.0
+        assert not opened.complaints
+
+
+def test_faces_of_two_solids_are_painted_on_both_sides(browser, pair, tmp_path):
+    path = report(pair, tmp_path / "pair.html")
+    shown, run = Shown(path), pair
+    surface(run, shown)
+    owners = shown.array("bodies", "owners").astype(int)
+    points = shown.array("bodies", "points")
+    # At z = 0.01 lie the pad's bottom and what of the disc's top is below it.
+    touching = points[owners >= 0]
+    assert touching[:, 2] == pytest.approx(0.01, abs=1e-8)
+    assert set(owners) == {-1, 0, 1, 2, 3}
+    header = shown.header["contact"]
+    assert header["slides"] == ["disc ↺ 3 rad/s"]
+    (face,) = header["faces"]
+    assert face["title"] == "lining: disc and pad"
+    assert np.ptp(face["plan"], axis=1) == pytest.approx([0.01, 0.01], rel=1e-6)
+    titles = [chart["title"] for chart in shown.header["charts"]]
+    assert "total friction force along t2" in titles
+    with Opened(browser, path) as opened:
+        opened.page.wait_for_selector("html[data-whole]", state="attached")
+        opened.page.get_by_label("see-through").check()
+        opened.page.get_by_label("colour", exact=True).select_option("contact pressure")
+        opened.scrub(1.0)
+        values = np.array(opened.of_player("Array.from(player.values)"))
+        expected = np.where(owners >= 0, run.pressure[-1][owners], 0.0)
+        assert values == pytest.approx(expected, abs=2e-4 * run.pressure.max())
+        assert len(np.unique(opened.picture().reshape(-1, 3), axis=0)) > 100
+        assert not opened.complaints
+
+
+def test_ground_that_turns_and_waves_across(browser, tmp_path):
+    base = fc.Study.from_toml(template("solid")).with_(**{
+        "simulation.t_end": 0.01, "simulation.outputs": 21, "ground": {
+            "rotation_speed": 20.0, "centre": [0.05, 0.03]}})
+    wavy = base.with_(**{"ground": {"speed_y": 0.4, "amplitude": 5e-5, "wavelength": 0.02,
+                                    "wave_direction": [1.0, 2.0]}})
+    for study in (base, wavy):
+        run = study.run()
+        path = report(run, tmp_path / "ground.html", scale=20.0)
+        shown = Shown(path)
+        travel = shown.array("ground", "travel")
+        ground = study.ground
+        assert travel == pytest.approx(np.outer(
+            run.time, [0.0, ground.speed_y, ground.rotation_speed]), abs=1e-7)
+        assert shown.header["ground"]["wavy"] == (study is wavy)
+        if study is wavy:
+            rows = np.reshape(shown.header["ground"]["drift"], (2, -1))
+            mean = np.mean([run.displacement(node)[:, :2] for node in range(15)], axis=0)
+            assert run.modal_coordinates @ rows.T == pytest.approx(mean, abs=1e-15)
+        with Opened(browser, path) as opened:
+            opened.page.get_by_label("view").select_option("above")
+            pictures = []
+            for part in (0.0, 0.5, 1.0):
+                opened.scrub(part)
+                pictures.append(opened.picture())
+            assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 10).mean() > 0.003
+            assert not opened.complaints
