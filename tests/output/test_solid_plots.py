@@ -194,6 +194,18 @@ def test_every_other_plot_takes_solids(run, two, tmp_path):
     assert {"contact compliance in z", "in z"} <= set(labels)
 
 
+def test_shear_along_a_face_is_refused_for_solids(run):
+    from types import SimpleNamespace
+
+    from fecontact.plot import plot_shear
+    from fecontact.system.quasistatic.history import LoadHistory
+
+    history = object.__new__(LoadHistory)
+    object.__setattr__(history, "system", SimpleNamespace(basis=run.system.basis))
+    with pytest.raises(fc.InputError, match=r"plot_shear: .* these are solids;"):
+        plot_shear(history)
+
+
 def test_faces_around_an_axis_are_unrolled():
     """A bush of 16 facets: widths are arcs, the seam lies in the widest gap."""
     angle = np.linspace(0.0, 1.5 * np.pi, 16)

@@ -53,10 +53,14 @@ def plot_shear(
     Raises
     ------
     InputError
-        For a vertex that does not exist or was not reached, another suffix, or a file that cannot
-        be written.
+        For solids, a vertex that does not exist or was not reached, another suffix, or a file that
+        cannot be written.
     """
     require_kind("plot_shear", LoadHistory, history=history)
+    if history.system.basis.dimension == 3:
+        raise InputError("plot_shear: shear along a face is that of plane bodies, but these are "
+                         "solids; plot_contact_map shows pressure, friction and states over their "
+                         "faces in a run.")
     early = vertex == -1 and history.status != "finished"
     row = len(history) - 1 if early else history.row(vertex)
     basis = history.system.basis

@@ -23,7 +23,8 @@ class GroundScene:
     def __init__(self, plotter: Any, motion: SolidMotion, line: float) -> None:
         import pyvista
 
-        self._pyvista, self._plotter, self._motion = pyvista, plotter, motion
+        self._pyvista: Any = pyvista
+        self._plotter, self._motion = plotter, motion
         low, high = motion.bounds[:, :2]
         self._extent = float((high - low).max())
         self._low, self._high = low - _BESIDE * self._extent, high + _BESIDE * self._extent

@@ -115,7 +115,7 @@ class SolidScene:
             self._motion, self._fineness = motion, fineness
             self._run = motion if isinstance(motion, SolidMotion) else None
             self._below = self._run is not None and self._run.view == "below"
-            self._plotter: Any = pyvista.Plotter(
+            self._plotter: Any = self._pyvista.Plotter(
                 off_screen=True, window_size=[fineness * width, fineness * height])
             self._plotter.disable_anti_aliasing()
             self._plotter.set_background("white")

@@ -78,8 +78,9 @@ def contact_maps(
     height = _map_height(plans, len(which))
     whole = min(_CURVE + sum(height[id(row.plan)] for row in rows) + 0.5, 1.6 * _LARGEST)
     with new_figure(_WIDTH, whole, path) as figure:
-        upper, lower = figure.subfigures(
+        parts: Any = figure.subfigures(
             2, 1, height_ratios=(_CURVE, max(whole - _CURVE, 1.0)))
+        upper, lower = parts
         _shares(upper.subplots(), run, states, shades, run.time[which])
         _draw_rows(lower, rows, titles, states, max(float(np.linalg.norm(
             friction, axis=2).max()), 0.0))
@@ -229,7 +230,8 @@ def wear_maps(history: WearHistory, basis: ModalBasis, title: str, path: str | P
     height = _sheet_height(plans, 3)
     with new_figure(_WIDTH, height + 2.4, path) as figure:
         figure.suptitle(title)
-        upper, lower = figure.subfigures(2, 1, height_ratios=(height, 2.4))
+        parts: Any = figure.subfigures(2, 1, height_ratios=(height, 2.4))
+        upper, lower = parts
         _single_maps(upper, plans, [
             ("worn depth", depth[-1], "m", WEAR_MAP),
             ("mean pressure, first block", pressure[0], "Pa", PRESSURE_MAP),

@@ -151,8 +151,9 @@ def _plan(
         labels = "along the circumference", "along the axis"
     # Facets are counter-clockwise seen from outside the body, here one looks from inside.
     middles = flat.mean(axis=1)
-    places = np.stack([np.bincount(owner, middles[:, k], count) for k in (0, 1)], axis=1)
-    places /= np.bincount(owner, minlength=count)[:, None]
+    sums = np.zeros((count, 2))
+    np.add.at(sums, owner, middles)
+    places = sums / np.bincount(owner, minlength=count)[:, None]
     return FacePlan(face, flat[:, ::-1], owner, _edges(flat, owner, facets), places, axes, labels)
 
 

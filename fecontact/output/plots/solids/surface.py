@@ -84,5 +84,5 @@ def draw_triad(axes: "Axes", size: float, corner: Array) -> None:
                                               strict=True)):
         end = corner + size * plane[:, axis]
         axes.plot(*zip(corner, end, strict=True), color=colour, linewidth=1.4)
-        axes.text(*(corner + 1.35 * (end - corner)), name, ha="center", va="center", fontsize=8.5,
-                  color="#303030")
+        x, y = (corner + 1.35 * (end - corner)).tolist()
+        axes.text(x, y, name, ha="center", va="center", fontsize=8.5, color="#303030")
