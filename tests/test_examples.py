@@ -97,6 +97,11 @@ EXAMPLES = {
                                      (r"^dither across, V = 1 a: (\S+) ", 0.8346268, 2e-6),
                                      (r"^dither along, V = 0.5 a: (\S+) ", 1.0 / 3.0, 5e-5)],
                           {"out/dithered_friction.png"}),
+    # Hertz: 40 um, 1 mm; Cattaneo: (1/4)^(1/3); Mindlin: 0.75 mu P and 3.584 mJ.
+    "two_spheres": (("out",), [(r"^11 rings: approach (\S+) um", 40.0, 0.04),
+                               (r" a = (\S+) mm", 1.0, 5e-3), (r"c / a = (\S+) ", 0.63, 0.02),
+                               (r" Q = (\S+) mu P", 0.75, 2e-3),
+                               (r", loss (\S+) mJ", 3.584, 0.036)], {"out/two_spheres.png"}),
     "sweep_on_dask": ((), [(r"^(\d+) cases, 0 failed", 4.0, 0.0)], set()),
 }
 
