@@ -265,7 +265,7 @@ def figure(found: Cycle, path: Path | None = None) -> "Figure":
 
 def main(folder: Path = Path("."), quick: bool = False) -> None:
     """Print what is found beside the closed forms for two numbers of rings; draw the last."""
-    for rings in (11,) if quick else (11, 22, 44):
+    for rings in (11,) if quick else (11, 22):
         found = cycle(rings)
         exact = found.exact
         peak, width = found.peak_and_width

@@ -24,7 +24,7 @@ HEAD = """# Validation
 
 What the package computes, beside closed forms, published numbers and the figures of W. Sextro,
 *Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes everything here
-again, in about six minutes on two cores, and writes this page.
+again, in about eight minutes on two cores, and writes this page.
 
 """
 

@@ -108,7 +108,8 @@ that Q = 0.75 mu P needs, at 30 degrees to the x axis (`examples/two_spheres.py`
 they are half-spaces whose compliance between rings is a closed form, so that no mesh matters, and
 are of one material, so that normal and tangential contact are not coupled. Cattaneo and Mindlin,
 loss by Mindlin and Deresiewicz (1953): as the small difference of large works it feels errors of
-the forces up to thirty times.
+the forces up to thirty times. The same rings solved in increments without time lose as much to
+0.1 %, and with 44 rings what the closed form says to 0.15 % (`tests/system/test_two_spheres.py`).
 
 {comparisons(rows)}
 
