@@ -86,7 +86,7 @@ def test_loop_is_that_of_increments_without_time(found):
     assert found.force[first][1:] == pytest.approx(
         np.interp(found.travel[first][1:], travels, forces), abs=3e-4 * forces[-1])
     area = np.trapezoid([0.0, *forces], [0.0, *travels]) - 0.5 * forces[-1] * travels[-1]
-    assert found.loss == pytest.approx(8.0 * area, rel=2e-3)
+    assert found.loss == pytest.approx(8.0 * area, rel=1e-3)
     whole = found.run.time >= 0.25
     loop = np.trapezoid(found.force[whole], found.travel[whole])
     assert loop == pytest.approx(found.loss, rel=5e-3)
