@@ -81,6 +81,27 @@ EXAMPLES = {
     "sliding_beam": (("out",), [(r"off by (\S+)\.$", 0.0, 1e-8), (r"^   10 +(\S+)%", 4.0, 1.0)],
                      {f"out/{name}" for name in ("energies.png", "contact.png", "history.png",
                                                  "friction-work.png", "sliding-beam.mp4")}),
+    "sliding_box": (("out",), [(r"^transverse \(1, 1, 1\): (\S+) Hz", 18711.342, 1e-3),
+                               (r"^Q2, transverse \(1, 1, 0\): .* h\^(\S+)$", 4.0, 0.05),
+                               (r"^Q1, transverse \(1, 1, 0\): .* h\^(\S+)$", 2.0, 0.05),
+                               (r"Hz, at most (\S+) % off", 2.5, 2.5)], {"out/sliding_box.png"}),
+    # The smoothing lets the block stick 44 us too late, by 2 SPEED / (pi k_s mu g).
+    "thrown_block": (("out",), [(r"^closed form: sticks after (\S+) s", 0.3798960, 1e-7),
+                                (r"^mass: .* y = (\S+) m", 0.1899480, 3e-6),
+                                (r"^block: .* x = (\S+),", 0.0949740, 2e-5),
+                                (r"^block: .* y = (\S+) m", 0.1899480, 3e-5),
+                                (r"of the block (\S+) mm ahead", 3.0, 1e-3),
+                                (r"^arctan, .*: (\S+) m too far", 2.43014e-4, 1e-8)],
+                     {"out/thrown_block.png"}),
+    "dithered_friction": (("out",), [(r"^dither across, V = 0.1 a: (\S+) ", 0.2344157, 2e-6),
+                                     (r"^dither across, V = 1 a: (\S+) ", 0.8346268, 2e-6),
+                                     (r"^dither along, V = 0.5 a: (\S+) ", 1.0 / 3.0, 5e-5)],
+                          {"out/dithered_friction.png"}),
+    # Hertz: 40 um, 1 mm; Cattaneo: (1/4)^(1/3); Mindlin: 0.75 mu P and 3.584 mJ.
+    "two_spheres": (("out",), [(r"^11 rings: approach (\S+) um", 40.0, 0.04),
+                               (r" a = (\S+) mm", 1.0, 5e-3), (r"c / a = (\S+) ", 0.63, 0.02),
+                               (r" Q = (\S+) mu P", 0.75, 2e-3),
+                               (r", loss (\S+) mJ", 3.584, 0.036)], {"out/two_spheres.png"}),
     "sweep_on_dask": ((), [(r"^(\d+) cases, 0 failed", 4.0, 0.0)], set()),
 }
 

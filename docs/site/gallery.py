@@ -17,8 +17,9 @@ GROUPS = {
     "Impacts": ("impact_oscillator", "impact_figures", "impact_map", "impact_orbits",
                 "impact_calibration", "colliding_bars"),
     "Contact pressure and partial slip": (
-        "line_contact", "two_bodies", "stacked_blocks", "contact_convergence"),
+        "line_contact", "two_bodies", "two_spheres", "stacked_blocks", "contact_convergence"),
     "Joints and dampers": ("lap_joint", "clamped_layers", "friction_damper"),
+    "Solids": ("sliding_box", "thrown_block", "dithered_friction"),
     "Own laws, other programs, many computers": (
         "own_law", "from_other_programs", "sweep_on_dask"),
 }

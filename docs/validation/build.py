@@ -13,6 +13,7 @@ import friction_section
 import impact_section
 import line_contact_section
 import normal_contact
+import solids_section
 import two_bodies_section
 import two_mass_section
 
@@ -23,7 +24,7 @@ HEAD = """# Validation
 
 What the package computes, beside closed forms, published numbers and the figures of W. Sextro,
 *Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes everything here
-again, in about five minutes on two cores, and writes this page.
+again, in about eight minutes on two cores, and writes this page.
 
 """
 
@@ -38,6 +39,7 @@ def main() -> None:
                        ("friction of one mass", friction_cases.section),
                        ("line contact", lambda: line_contact_section.section(images)),
                        ("two bodies", lambda: two_bodies_section.section(images)),
+                       ("solids", lambda: solids_section.section(images)),
                        ("continuation", continuation_cases.section),
                        ("section 4.2", lambda: impact_section.section(images)),
                        ("section 4.3", lambda: friction_section.section(images)),

@@ -118,19 +118,20 @@ def test_motion_along_a_line_is_that_of_the_plane():
 
 
 def test_lateral_dither_reduces_friction():
-    # R_x = mu F v / sqrt(v^2 + a^2 cos^2): its mean is a complete elliptic integral.
+    # R_x = mu F v / sqrt(v^2 + a^2 cos^2): its mean is a complete elliptic integral. The mass is so
+    # heavy beside the force that presses it that it stays where it is.
     speed, amplitude, w = 0.02, 0.1, 2.0 * np.pi * 50.0
-    basis = point_masses({"a": 1e6}, components="z", contact="a")  # held along the ground
+    basis = point_masses({"a": 1e9}, components="xyz", contact="a")
     system = fc.ContactSystem(
-        basis, normal=LinearContact(stiffness=1e12), friction=ConstantFriction(MU, 1e6),
+        basis, normal=LinearContact(stiffness=1e6), friction=ConstantFriction(MU, 1e6),
         ground=fc.Ground(speed=-speed, motion_y=HarmonicSpeed(amplitude, w)),
-        load=fc.Load(gravity=(0.0, 0.0, -G)))
+        load=fc.Load(gravity=(0.0, 0.0, -1e-8)))
     run = fc.simulate(system, 0.1, initial="rest", outputs=5001, rtol=1e-8)
     whole = run.time >= 0.02
     mean = np.trapezoid(run.friction_force[whole, 0], run.time[whole]) / 0.08
     k2 = amplitude**2 / (speed**2 + amplitude**2)
-    expected = MU * 1e6 * G * 2.0 / np.pi * speed / np.hypot(speed, amplitude) * ellipk(k2)
-    assert expected < 0.4 * MU * 1e6 * G
+    expected = MU * 10.0 * 2.0 / np.pi * speed / np.hypot(speed, amplitude) * ellipk(k2)
+    assert expected < 0.4 * MU * 10.0
     assert mean == pytest.approx(expected, rel=1e-3)
 
 

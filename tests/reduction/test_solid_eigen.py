@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 from skfem import MeshHex, MeshTet
+from solid_blocks import block_mesh
 
 import fecontact.reduction.solvers.solid_solver as solid_solver
 from fecontact import ElasticBody, InputError, Material, Mesh, modal_basis
@@ -93,6 +94,25 @@ def test_aggregates(cube, monkeypatch):
     solver = FreeSystem.of(cube, "iterative").iterative
     assert len(solver.mesh_cycle.levels) > 1
     assert eigenmodes(cube, 14, "iterative")[0][6:] == pytest.approx(expected[6:], rel=1e-10)
+
+
+@pytest.mark.parametrize("coarsest", [50, 1])
+def test_aggregates_of_nodes_that_slide_along_walls(coarsest, monkeypatch):
+    """Along edges between walls an aggregate has less than six motions, on two levels or three."""
+    import fecontact.reduction.solvers.multigrid as multigrid
+
+    mesh = block_mesh((9, 8, 6), (1.0, 1.0, 0.7), tetrahedra=True)
+    body = ElasticBody(mesh, STEEL, degree=1, fixed={
+        "left": "x", "right": "x", "front": "y", "back": "y", "contact": "z", "top": "z"})
+    expected = eigenmodes(body, 12, "direct")[0]
+    monkeypatch.setattr(multigrid, "_FACTORISED", 100)
+    monkeypatch.setattr(multigrid, "_COARSEST", coarsest)
+    solver = FreeSystem.of(body, "iterative").iterative
+    assert len(solver.mesh_cycle.levels) == (1 if coarsest == 50 else 2)
+    found = solver.modes(12, np.zeros((len(body.nodes) * 3, 0)))
+    assert found.converged
+    assert found.steps <= 20
+    assert np.sqrt(found.squares) == pytest.approx(expected, rel=1e-10)
 
 
 def test_steps_do_not_grow_with_the_mesh():

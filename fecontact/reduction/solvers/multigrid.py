@@ -171,7 +171,10 @@ def _aggregated(matrix: Any, rigid: Array) -> tuple[list[Level], Any]:
                                   prolongation=P, restriction=R))
             continue
         A = sp.bsr_array(level.A).astype(np.float32)
-        inverse = np.linalg.inv(_diagonal_blocks(level.A)).astype(np.float32)
+        blocks = _diagonal_blocks(level.A)
+        for block in blocks:
+            _fill_missing(block)
+        inverse = np.linalg.inv(blocks).astype(np.float32)
 
         def product(x: Any, A: Any = A) -> Any:
             return A @ x
@@ -191,6 +194,7 @@ def _aggregated(matrix: Any, rigid: Array) -> tuple[list[Level], Any]:
         levels.append(Level(product, precondition, smooth,
                             _largest(product, precondition, A.shape[0]), P, R))
     last = hierarchy.levels[-1].A.toarray()
+    _fill_missing(last)
     factors = cho_factor(last)
     return levels, lambda right: cho_solve(factors, right.astype(np.float64)).astype(np.float32)
 
@@ -199,6 +203,16 @@ def _diagonal_blocks(matrix: Any) -> Array:
     """Diagonal blocks (N, d, d) of a BSR array."""
     rows = np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
     return np.asarray(matrix.data[rows == matrix.indices], dtype=float)
+
+
+def _fill_missing(matrix: Array) -> None:
+    """Ones on the diagonal where all else is zero.
+
+    Where nodes slide along walls, an aggregate of few of them has less than six motions; those it
+    lacks are rows of zeros, on which no force ever acts.
+    """
+    diagonal = np.einsum("ii->i", matrix)
+    diagonal[diagonal == 0.0] = 1.0
 
 
 def _largest(product: Any, precondition: Any, size: int) -> float:
