@@ -56,6 +56,13 @@ EXAMPLES = {
                              (r"^struck, 0.10 mm: (\S+) Hz", 79.206, 0.01),
                              (r"^struck, 2.01 mm: (\S+) Hz", 78.631, 0.02)],
                   {"out/lap_joint_loop.png", "out/lap_joint_frequency.png"}),
+    # The resultant moves by the coefficient of friction times the height of 30 mm, on any belt.
+    "tipping_pad": (("out",), [(r"^friction 0.25.* resultant (\S+) mm", 7.5, 1e-5),
+                               (r"^friction 0.45, belt at 0 .* resultant (\S+) mm", 13.5, 1e-5),
+                               (r"^friction 0.45, belt at 35 .* resultant (\S+) mm", 13.5, 1e-5),
+                               (r"at 0 degrees: .* ahead, (2\d)% lifted", 20.0, 0.0),
+                               (r"^a run from rest ends (\S+) of", 0.0, 1e-3)],
+                    {"out/tipping_pad.png"}),
     "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
                                      (r"fold at B = (\S+)", 0.890687, 1e-4),
                                      (r"doubling at B = (\S+)", 8.092192, 1e-4)],
