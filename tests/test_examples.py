@@ -56,6 +56,11 @@ EXAMPLES = {
                              (r"^struck, 0.10 mm: (\S+) Hz", 79.206, 0.01),
                              (r"^struck, 2.01 mm: (\S+) Hz", 78.631, 0.02)],
                   {"out/lap_joint_loop.png", "out/lap_joint_frequency.png"}),
+    "disc_brake": (("out",), [(r"^friction 0.3: a mode of (\S+) Hz", 8277.82, 0.01),
+                              (r"grows by (\S+) 1/s;", 148.487, 0.01),
+                              (r"; a run by (\S+) 1/s", 148.487, 0.01),
+                              (r"^it squeals at (\S+) Hz", 8000.0, 80.0)],
+                   {"out/disc_brake.png"}),
     # The resultant moves by the coefficient of friction times the height of 30 mm, on any belt.
     "tipping_pad": (("out",), [(r"^friction 0.25.* resultant (\S+) mm", 7.5, 1e-5),
                                (r"^friction 0.45, belt at 0 .* resultant (\S+) mm", 13.5, 1e-5),
