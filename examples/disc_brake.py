@@ -107,7 +107,7 @@ def squeal(system: fc.ContactSystem, end: float) -> tuple[fc.Trajectory, float]:
 
 
 def plot(system: fc.ContactSystem, run: fc.Trajectory, frictions: np.ndarray, path: Path) -> None:
-    """Growth rates over friction, the motion of a pad, and how many nodes touch in a cycle."""
+    """Growth rates over friction, the motion of a pad, and the forces on both at the end."""
     modes = complex_modes(system, "sliding")
     mode = flutter_mode(modes)
     rate, period = modes.eigenvalues[mode].real, 1.0 / modes.frequencies_hz[mode]
@@ -115,15 +115,14 @@ def plot(system: fc.ContactSystem, run: fc.Trajectory, frictions: np.ndarray, pa
         map_, whole, late = figure.subplots(1, 3)
         for friction in frictions:
             found = complex_modes(brake(friction), "sliding")
-            low = found.frequencies_hz < 14e3
+            near = np.abs(found.frequencies_hz - modes.frequencies_hz[mode]) < 1e3
             for grows, colour in enumerate(COLOURS[:2]):
-                chosen = low & (found.grows == grows)
-                map_.plot(found.frequencies_hz[chosen] / 1e3, np.full(chosen.sum(), friction), ".",
-                          color=colour, ms=5.0, zorder=2.0 + grows,
+                rates = found.eigenvalues.real[near & (found.grows == grows)]
+                map_.plot(np.full(len(rates), friction), rates, ".", color=colour, ms=5.0,
                           label="grows" if grows else "decays")
         entries = dict(zip(*reversed(map_.get_legend_handles_labels()), strict=True))
         map_.legend(entries.values(), entries, loc="upper left")
-        map_.set(xlabel="frequency [kHz]", ylabel="friction coefficient", xlim=(0.0, 14.0))
+        map_.set(xlabel="friction coefficient", ylabel="growth of modes near 8 kHz [1/s]")
         steady = initial_state(system, "sliding", 0.0)[: system.basis.modes]
         along = system.basis.T[system.basis.point_index("pad1.back"), 1]
         y = 1e6 * (run.modal_coordinates - steady) @ along
@@ -132,15 +131,15 @@ def plot(system: fc.ContactSystem, run: fc.Trajectory, frictions: np.ndarray, pa
         shown = envelope < 1.15 * np.abs(y).max()
         whole.plot(1e3 * run.time[shown], envelope[shown], color=COLOURS[1], label="linear growth")
         whole.set(xlabel="time [ms]", ylabel="pad along the disc [µm]")
-        whole.legend(loc="lower right")
+        whole.legend(loc="upper left")
         part = run.between(run.time[-1] - 3.0 * period)
         for name, colour, (nodes, _, _) in zip(PADS, COLOURS, system.law_groups("normal"),
                                                strict=False):
             pressing = 1e-3 * part.normal_force[:, nodes].sum(axis=1)
             late.plot(1e3 * (part.time - part.time[0]), pressing, color=colour, label=name)
         late.set(xlabel="time at the end [ms]", ylabel="normal force [kN]")
-        late.set_ylim(bottom=0.0)
-        late.legend(loc="lower right")
+        late.set_ylim(0.0, 5.0)
+        late.legend(loc="upper right")
 
 
 def main(folder: Path = Path(), quick: bool = False) -> None:
