@@ -209,10 +209,10 @@ def plot(mode: StuckMode, estimated: np.ndarray, runs: list[np.ndarray], path: P
     one = loop(mode, mode.angular_frequency**2 * 2e-3 / abs(mode.end))
     with new_figure(10.0, 3.4, path) as figure:
         cycle, frequency, damping = figure.subplots(1, 3)
-        x = scale * (one.deflection - one.deflection.mean())
+        x = one.deflection - 0.5 * (one.deflection.max() + one.deflection.min())
         # What a spring of the same tips would need is taken off, or the loop would be a line.
-        spring = one.force.max() / one.amplitude * (one.deflection - one.deflection.mean())
-        cycle.plot(x, (one.force - spring) / one.force.max(), color=COLOURS[0])
+        spring = one.force.max() / one.amplitude * x
+        cycle.plot(scale * x, (one.force - spring) / one.force.max(), color=COLOURS[0])
         cycle.set(xlabel="free end [mm]", ylabel="(force - secant) / largest force")
         for axes, column, label, factor in ((frequency, 1, "frequency [Hz]", 1.0),
                                             (damping, 2, "damping ratio [%]", 100.0)):
@@ -221,7 +221,8 @@ def plot(mode: StuckMode, estimated: np.ndarray, runs: list[np.ndarray], path: P
             found = np.concatenate(runs)
             axes.plot(scale * found[:, 0], factor * found[:, column], "o", color=COLOURS[1],
                       ms=4.0, label="ring-downs")
-            axes.set(xlabel="amplitude of the free end [mm]", ylabel=label, xscale="log")
+            axes.set(xlabel="amplitude of the free end [mm]", ylabel=label)
+            axes.set_xlim(left=0.0)
             axes.legend()
 
 

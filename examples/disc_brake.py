@@ -131,7 +131,7 @@ def plot(system: fc.ContactSystem, run: fc.Trajectory, frictions: np.ndarray, pa
         shown = envelope < 1.15 * np.abs(y).max()
         whole.plot(1e3 * run.time[shown], envelope[shown], color=COLOURS[1], label="linear growth")
         whole.set(xlabel="time [ms]", ylabel="pad along the disc [µm]")
-        whole.legend(loc="upper left")
+        whole.legend(loc="lower right")
         part = run.between(run.time[-1] - 3.0 * period)
         for name, colour, (nodes, _, _) in zip(PADS, COLOURS, system.law_groups("normal"),
                                                strict=False):

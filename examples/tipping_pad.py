@@ -110,7 +110,7 @@ def plot(frictions: tuple[float, ...], angle: float, path: Path) -> None:
         right.grid(visible=False)
         figure.colorbar(image, label="pressure [kPa]")
         middle = 1e3 * np.array([0.5 * LENGTH, 0.5 * WIDTH])
-        start = 1e3 * np.array([0.8 * LENGTH, 0.5 * WIDTH])
+        start = 1e3 * np.array([0.8 * LENGTH, 0.6 * WIDTH])
         way = 8.0 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
         right.annotate("", start + way, start, arrowprops={"arrowstyle": "->", "lw": 1.5})
         right.text(*start, "belt ", ha="right", va="center")

@@ -40,9 +40,9 @@ A run from rest on a belt at 35 degrees ends {settled:.0e} of the largest force 
 ![Pressure below a pad that tips](images/validation/tipping-pad.png)
 
 An annular disc between two pads that squeals (`examples/disc_brake.py`). A disturbance of 1 nm
-grows in time as the complex mode about steady sliding does: the rate to six digits and the
-frequency to nine, as far as the tolerance of the run, 1e-9, and the mode's own size let it. The
-disc turns as a prescribed motion, without gyroscopic terms.
+grows in time as the complex mode about steady sliding does, the rate to at least seven digits and
+the frequency to nine: what the run's tolerance of 1e-9 leaves, as the contact is linear until a pad
+lifts off. The disc turns as a prescribed motion, without gyroscopic terms.
 
 {comparisons(brake)}
 
@@ -52,8 +52,9 @@ the motion varies slowly.
 ![Growth of a squeal, and forces on both pads](images/validation/disc-brake.png)
 
 A plate with a bolted lap (`examples/bolted_plate.py`): ring-downs in time beside a slow loop under
-the inertia force of the mode, from the equations alone. The loop leaves out the inertia of other
-modes. Its area is the work of friction.
+the inertia force of the mode, from the equations alone, in its second cycle: in the first one
+friction still finds its way and loses up to half as much again. The loop leaves out the inertia of
+other modes, so that damping differs by up to five percent. Its area is the work of friction.
 
 {comparisons(loops)}
 
