@@ -10,7 +10,7 @@ grows and falls slowly, the second time. With the tip of the loop X = phi . M q 
     omega^2 = alpha / X,        zeta = zeta_0 + D / (2 pi alpha X)
 
 where zeta_0 is the damping of the stuck plate. That leaves out what other modes do as the lap
-slips: the shift of the frequency agrees to a percent or two, the damping to five. The loop is
+slips: the frequency agrees to 2e-4, its shift to a tenth, the damping to 6 %. The loop is
 computed by Newton's method with return of the friction forces to their discs, written here from the
 equations alone. Its area is the work of friction in the slip.
 

@@ -60,6 +60,7 @@ def test_ring_down_follows_the_loops(mode):
     assert estimated[0, 0] < cycles[:, 0].min() < cycles[:, 0].max() < estimated[-1, 0]
     frequency, ratio = (np.interp(cycles[:, 0], estimated[:, 0], estimated[:, k]) for k in (1, 2))
     # The loop leaves out the inertia of other modes than the one that rings.
-    assert stuck - cycles[:, 1] == pytest.approx(stuck - frequency, rel=0.02)
-    assert cycles[:, 2] == pytest.approx(ratio, rel=0.05)
+    assert cycles[:, 1] == pytest.approx(frequency, rel=2e-4)
+    assert stuck - cycles[:, 1] == pytest.approx(stuck - frequency, rel=0.08)
+    assert cycles[:, 2] == pytest.approx(ratio, rel=0.06)
     assert (cycles[:, 2] > 10.0 * mode.damping_ratio).all()
