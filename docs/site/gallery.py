@@ -12,14 +12,14 @@ EXAMPLES = ROOT / "examples"
 DOCS = ROOT / "docs"
 GROUPS = {
     "Squeal and stick-slip": (
-        "squeal", "disc_and_pads", "beam_stick_slip", "friction_oscillator", "two_mass_friction",
-        "sliding_beam"),
+        "squeal", "disc_and_pads", "disc_brake", "beam_stick_slip", "friction_oscillator",
+        "two_mass_friction", "sliding_beam"),
     "Impacts": ("impact_oscillator", "impact_figures", "impact_map", "impact_orbits",
                 "impact_calibration", "colliding_bars"),
     "Contact pressure and partial slip": (
         "line_contact", "two_bodies", "two_spheres", "stacked_blocks", "contact_convergence"),
-    "Joints and dampers": ("lap_joint", "clamped_layers", "friction_damper"),
-    "Solids": ("sliding_box", "thrown_block", "dithered_friction"),
+    "Joints and dampers": ("lap_joint", "bolted_plate", "clamped_layers", "friction_damper"),
+    "Solids": ("sliding_box", "thrown_block", "dithered_friction", "tipping_pad"),
     "Own laws, other programs, many computers": (
         "own_law", "from_other_programs", "sweep_on_dask"),
 }

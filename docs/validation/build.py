@@ -13,6 +13,7 @@ import friction_section
 import impact_section
 import line_contact_section
 import normal_contact
+import sliding_solids_section
 import solids_section
 import two_bodies_section
 import two_mass_section
@@ -40,6 +41,7 @@ def main() -> None:
                        ("line contact", lambda: line_contact_section.section(images)),
                        ("two bodies", lambda: two_bodies_section.section(images)),
                        ("solids", lambda: solids_section.section(images)),
+                       ("sliding solids", lambda: sliding_solids_section.section(images)),
                        ("continuation", continuation_cases.section),
                        ("section 4.2", lambda: impact_section.section(images)),
                        ("section 4.3", lambda: friction_section.section(images)),
