@@ -23,6 +23,7 @@ from .equilibria.stability_map import StabilityMap, stability_map
 from .fields.contact_field import ContactField, contact_field
 from .fields.function_field import vector_field
 from .fields.vector_field import VectorField
+from .harmonic.method import HarmonicBalance
 from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
@@ -44,6 +45,7 @@ __all__ = [
     "DoubleHopfPoint",
     "Equilibrium",
     "FoldPoint",
+    "HarmonicBalance",
     "HopfPoint",
     "LyapunovExponents",
     "NeimarkSackerPoint",
