@@ -158,7 +158,7 @@ class BranchPoint:
         period = float(self.values["period"])
         mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
         if self.by_harmonics:
-            found = balanced(self.u, self.branch.attributes, period, samples)
+            found = balanced(self.u, self.values, self.branch.attributes, samples)
         elif not self.by_shooting:
             found = collocated(self.u, mesh, len(self.values["minimum"]), period, samples)
         elif field is None:

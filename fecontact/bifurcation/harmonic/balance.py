@@ -9,7 +9,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.harmonic.memory import differences, solve_around
+from fecontact.bifurcation.harmonic.memory import differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import (
     Series,
     basis_at,
@@ -17,6 +17,7 @@ from fecontact.bifurcation.harmonic.series import (
     fill_blocks,
     series,
 )
+from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 
 # Relative step of differences in a parameter that changes the period.
@@ -35,7 +36,7 @@ class Layout:
         Number m of displacements q, which come first and whose rates are the states behind them;
         only q is unknown.
     memory : int
-        Number of internal variables z, the last states, which are unknown at the samples.
+        Number c of internal variables z, the last states, which follow from q.
     nodes : int
         Number of contact nodes to which these belong.
     """
@@ -72,6 +73,26 @@ def layout_of(field: VectorField) -> Layout:
     return Layout(field.dimension, modes, memory, nodes if memory else 0)
 
 
+def turn_of(field: VectorField, values: Array, free: int) -> float | None:
+    """Product of the period of the forcing and a parameter, where it is the same for all values.
+
+    Then the parameter is a frequency, and the period need not be asked for, which takes long with
+    contact systems. Checked at values beside the given one.
+    """
+    found = []
+    for factor in (1.0, 0.97, 1.01, 1.043):
+        beside = values.copy()
+        beside[free] *= factor
+        try:
+            period = field.forcing_period(beside)
+        except FecontactError:
+            return None
+        if period is None or beside[free] == 0.0:
+            return None
+        found.append(period * float(beside[free]))
+    return found[0] if np.ptp(found) <= 1e-13 * abs(found[0]) else None
+
+
 @dataclass(frozen=True, eq=False)
 class Balance:
     """Equations of a periodic orbit of x' = f(t, x, p) with truncated Fourier series.
@@ -79,11 +100,11 @@ class Balance:
     With tau = t / T, displacements q and other states y are Fourier series with H harmonics,
     velocities follow from q. The residuals q'' - f_v and y' - f_y, at N samples a period, have no
     part in the harmonics 0..H (alternating frequency and time). Internal variables z of friction
-    are unknown at the samples; see :mod:`fecontact.bifurcation.harmonic.memory`. If f does not
+    are marched around the period; see :mod:`fecontact.bifurcation.harmonic.memory`. If f does not
     depend on t, T is an unknown and the phase is fixed by int <x, y'> = 0 with the orbit y before;
     else T is ``periods`` times the period of the forcing.
 
-    The unknowns are ``u = [coefficients (2 H + 1) b, z (N c), T if it is unknown, parameter]``.
+    The unknowns are ``u = [coefficients (2 H + 1) b, T if it is unknown, parameter]``.
 
     Attributes
     ----------
@@ -102,6 +123,9 @@ class Balance:
         How states become unknowns.
     periods : int
         Number of forcing periods in one period of the orbit.
+    turn : float, optional
+        Product of the period of the forcing and the parameter, where this is a frequency; see
+        :func:`turn_of`.
     """
 
     field: VectorField
@@ -113,6 +137,7 @@ class Balance:
     scales: Array
     layout: Layout
     periods: int = 1
+    turn: float | None = None
 
     @cached_property
     def autonomous(self) -> bool:
@@ -138,14 +163,12 @@ class Balance:
         """Coefficients (2 H + 1, b) of q and y."""
         return u[: self.size].reshape(self.reference.shape)
 
-    def memory(self, u: Array) -> Array:
-        """Internal variables (N, c) at the samples."""
-        return u[self.size : len(u) - self.common].reshape(self.samples, self.layout.memory)
-
     def period(self, u: Array) -> float:
         """Period T [s] of the orbit."""
         if self.autonomous:
             return float(u[-2])
+        if self.turn is not None:
+            return self.periods * self.turn / float(u[-1])
         given = self.field.forcing_period(self.parameters(u))
         assert given is not None
         return self.periods * given
@@ -161,13 +184,10 @@ class Balance:
         sizes = self.scales[self.layout.columns] ** -2.0
         over = np.full((2 * self.harmonics + 1, 1), 0.5)
         over[0] = 1.0
-        memory = self.scales[: self.layout.states][self.layout.states - self.layout.memory :]
-        return np.concatenate([
-            (over * sizes).reshape(-1), np.tile(memory**-2.0 / self.samples, self.samples),
-            self.scales[-self.common :] ** -2.0])
+        return np.concatenate([(over * sizes).reshape(-1), self.scales[-self.common :] ** -2.0])
 
     def weights(self) -> Array:
-        """Weights of the inner product: mean over the orbit of scaled q, y, z; T; parameter."""
+        """Weights of the inner product: mean over the orbit of scaled q and y; T; parameter."""
         return self._weights
 
     @cached_property
@@ -176,12 +196,37 @@ class Balance:
         row = differentiated(self.reference) * self.scales[self.layout.columns] ** -2.0
         return np.asarray((row / (np.abs(row).max() or 1.0)).reshape(-1))
 
-    def states(self, u: Array, period: float, times: Array | None = None) -> Array:
-        """States (N, d) at the samples, or (k, d) at times tau (k,)."""
+    def states(self, u: Array, period: float, z: Array, times: Array | None = None) -> Array:
+        """States (N, d) with z (N, c) at the samples, or (k, d) at times tau (k,)."""
         if times is None:
-            return filled(self.layout, self.coefficients(u), self.memory(u), period,
-                          self.series.values)
-        return series_states(self.layout, self.coefficients(u), self.memory(u), period, times)
+            return filled(self.layout, self.coefficients(u), z, period, self.series.values)
+        return series_states(self.layout, self.coefficients(u), z, period, times)
+
+    def times(self, period: float) -> Array:
+        """Times (N,) [s] of the samples; zero for autonomous systems."""
+        return np.zeros(self.samples) if self.autonomous else self.series.times * period
+
+    def marched(self, u: Array, period: float) -> Array:
+        """States (N, d) at the samples with differences as velocities, under which z repeats.
+
+        Raises
+        ------
+        AnalysisError
+            If internal variables do not come to repeat.
+        """
+        layout = self.layout
+        m, first = layout.displacements, layout.states - layout.memory
+        x = self.states(u, period, np.zeros((self.samples, layout.memory)))
+        if not layout.memory:
+            return x
+        assert isinstance(self.field, ContactField)
+        x[:, m : 2 * m] = differences(x[:, :m]) / period
+        z = np.empty((self.samples, layout.memory))
+        if not march(self.times(period), x, self.field.arrays(self.parameters(u)), period, z):
+            raise AnalysisError("The internal variables of friction do not come to repeat; take "
+                                "more samples a period.")
+        x[:, first:] = z
+        return x
 
 
 def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> Array:
@@ -212,8 +257,8 @@ def around(samples: Array, times: Array) -> Array:
 class Linearised:
     """Residual at u, and solutions of systems with the derivative there.
 
-    The residual holds the balance of the harmonics (n), the rates of z at the samples, and the
-    phase condition where the period is unknown.
+    The residual holds the balance of the harmonics (n), and the phase condition where the period
+    is unknown.
     """
 
     def __init__(self, problem: Balance, u: Array) -> None:
@@ -224,14 +269,25 @@ class Linearised:
     @cached_property
     def times(self) -> Array:
         """Times (N,) [s] of the samples; zero for autonomous systems."""
-        problem = self.problem
-        return (np.zeros(problem.samples) if problem.autonomous
-                else problem.series.times * self.period)
+        return self.problem.times(self.period)
+
+    @cached_property
+    def marched(self) -> Array:
+        """States (N, d) in which internal variables are marched."""
+        return self.problem.marched(self.u, self.period)
+
+    @cached_property
+    def memory(self) -> Array:
+        """Internal variables (N, c) at the samples."""
+        layout = self.problem.layout
+        if not layout.memory:
+            return np.zeros((self.problem.samples, 0))
+        return np.ascontiguousarray(self.marched[:, layout.states - layout.memory :])
 
     @cached_property
     def states(self) -> Array:
         """States (N, d) at the samples."""
-        return self.problem.states(self.u, self.period)
+        return self.problem.states(self.u, self.period, self.memory)
 
     @cached_property
     def rates(self) -> Array:
@@ -249,7 +305,7 @@ class Linearised:
 
     @cached_property
     def residual(self) -> Array:
-        """Residual (n + N c + 1,), without the last entry for forced systems."""
+        """Residual (n + 1,), without the last entry for forced systems."""
         problem = self.problem
         found = self._balance(self.u, self.period, self.rates)
         if not problem.autonomous:
@@ -263,48 +319,51 @@ class Linearised:
         if m:
             turned[:, :m] = differentiated(turned[:, :m]) / period
         turned -= problem.series.projection @ rates[:, m : layout.states - layout.memory]
-        if not layout.memory:
-            return turned.reshape(-1)
-        first = layout.states - layout.memory
-        z = differences(problem.memory(u)) / period - rates[:, first:]
-        return np.concatenate([turned.reshape(-1), z.reshape(-1)])
+        return turned.reshape(-1)
 
     @cached_property
     def _common(self) -> Array:
-        """Derivatives (n + N c, e) of the balance to T, if it is unknown, and the parameter."""
-        problem, layout, u, T = self.problem, self.problem.layout, self.u, self.period
-        m, first = layout.displacements, layout.states - layout.memory
+        """Derivatives (n, e) of the balance to T, if it is unknown, and the parameter; z held."""
+        problem, u, T = self.problem, self.u, self.period
+        m = problem.layout.displacements
         _, J, P = self.derivatives
         if problem.autonomous:
-            # Velocities are q' / T.
-            slowed = np.zeros_like(self.states)
-            if m:
-                slowed = -np.matmul(J[:, :, m : 2 * m],
-                                    self.states[:, m : 2 * m, None])[:, :, 0] / T
             turned = differentiated(problem.coefficients(u)) / T**2
             turned[:, :m] = 2.0 * differentiated(turned[:, :m]) / T
-            by_period = -turned.reshape(-1)
-            if layout.memory:
-                by_period = np.append(by_period, -differences(problem.memory(u)) / T**2)
-            by_period += self._by_rates(slowed)
+            by_period = -turned.reshape(-1) + self._by_rates(self._slowed(J, self.states))
             return np.stack([by_period, self._by_rates(P[:, :, 0])], axis=1)
-        h = _DIFFERENCE * max(abs(float(u[-1])), 1e-3)
-        ends = [u.copy(), u.copy()]
-        ends[0][-1], ends[1][-1] = u[-1] + h, u[-1] - h
-        periods = [problem.period(end) for end in ends]
-        if periods[0] == T == periods[1]:
+        ends = self._beside()
+        if ends is None:
             return self._by_rates(P[:, :, 0])[:, None]
         sides = [self._balance(end, period, problem.field.rates(
-            problem.series.times * period, problem.states(end, period), problem.parameters(end)))
-            for end, period in zip(ends, periods, strict=True)]
-        return ((sides[0] - sides[1]) / (2.0 * h))[:, None]
+            problem.times(period), problem.states(end, period, self.memory),
+            problem.parameters(end))) for end, period, _ in ends]
+        return ((sides[0] - sides[1]) / (2.0 * ends[0][2]))[:, None]
+
+    def _slowed(self, J: Array, x: Array) -> Array:
+        """Derivatives (N, rows) of rates to T, through velocities q' / T, from J (N, rows, d)."""
+        m = self.problem.layout.displacements
+        if not m:
+            return np.zeros(J.shape[:2])
+        return np.asarray(-np.matmul(J[:, :, m : 2 * m], x[:, m : 2 * m, None])[:, :, 0]
+                          / self.period)
+
+    def _beside(self) -> list[tuple[Array, float, float]] | None:
+        """Unknowns, period and distance beside the parameter; None if the period stays."""
+        u, h = self.u, _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
+        found = []
+        for sign in (1.0, -1.0):
+            end = u.copy()
+            end[-1] += sign * h
+            found.append((end, self.problem.period(end), h))
+        return None if found[0][1] == self.period == found[1][1] else found
 
     def _by_rates(self, change: Array) -> Array:
-        """Change (n + N c,) of the balance with a change (N, d) of the rates."""
-        problem, layout = self.problem, self.problem.layout
+        """Change (n,) of the balance with a change (N, d) of the rates."""
+        layout = self.problem.layout
         first = layout.states - layout.memory
-        found = problem.series.projection @ change[:, layout.displacements : first]
-        return -np.concatenate([found.reshape(-1), change[:, first:].reshape(-1)])
+        found = self.problem.series.projection @ change[:, layout.displacements : first]
+        return -found.reshape(-1)
 
     @cached_property
     def matrix(self) -> Array:
@@ -324,29 +383,36 @@ class Linearised:
         return out.reshape(problem.size, problem.size)
 
     @cached_property
-    def _memory_slopes(self) -> Array:
-        """Derivatives (N, n, s, s) of the rates of z to z, node by node."""
-        layout, J = self.problem.layout, self.derivatives[1]
-        first, s = layout.states - layout.memory, layout.memory // layout.nodes
-        whole = J[:, first:, first:].reshape(len(J), layout.nodes, s, layout.nodes, s)
-        nodes = np.arange(layout.nodes)
-        return np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1))
-
-    @cached_property
     def _followed(self) -> Array:
-        """Derivatives (N, c, n + e) of z to coefficients and common unknowns, negative."""
-        problem, layout, J = self.problem, self.problem.layout, self.derivatives[1]
+        """Derivatives (N, c, n + e) of z to coefficients and common unknowns."""
+        problem, layout, x, T = self.problem, self.problem.layout, self.marched, self.period
         m, first = layout.displacements, layout.states - layout.memory
-        H, b, c = problem.harmonics, layout.harmonic, layout.memory
+        H, b, c, N = problem.harmonics, layout.harmonic, layout.memory, problem.samples
+        _, J, P = problem.field.derivatives(self.times, x, problem.parameters(self.u),
+                                            (problem.free,))
+        J = J[:, first:]
         values = problem.series.values
-        turned = differentiated(np.eye(2 * H + 1))
-        speeds = values @ turned / self.period
-        found = np.empty((problem.samples, c, 2 * H + 1, b))
-        np.multiply(values[:, None, :, None], -J[:, first:, None, layout.columns], out=found)
-        found[..., :m] -= speeds[:, None, :, None] * J[:, first:, None, m : 2 * m]
-        common = self._common[problem.size :].reshape(problem.samples, c, -1)
-        right = np.concatenate([found.reshape(problem.samples, c, -1), common], axis=2)
-        solve_around(self._memory_slopes, self.period, right)
+        speeds = differences(values) / T
+        found = np.empty((N, c, 2 * H + 1, b))
+        np.multiply(values[:, None, :, None], J[:, :, None, layout.columns], out=found)
+        found[..., :m] += speeds[:, None, :, None] * J[:, :, None, m : 2 * m]
+        common = np.empty((N, c, problem.common))
+        common[:, :, -1] = P[:, first:, 0]
+        if problem.autonomous:
+            common[:, :, 0] = self._slowed(J, x) + differences(x[:, first:]) / T**2
+        elif (ends := self._beside()) is not None:
+            sides = []
+            for end, period, _ in ends:
+                moved = problem.states(end, period, x[:, first:])
+                moved[:, m : 2 * m] = differences(moved[:, :m]) / period
+                rates = problem.field.rates(problem.times(period), moved, problem.parameters(end))
+                sides.append(rates[:, first:] - differences(moved[:, first:]) / period)
+            common[:, :, -1] = (sides[0] - sides[1]) / (2.0 * ends[0][2])
+        right = np.concatenate([found.reshape(N, c, -1), common], axis=2)
+        # Variables of other nodes have no influence.
+        s, nodes = c // layout.nodes, np.arange(layout.nodes)
+        whole = J[:, :, first:].reshape(N, layout.nodes, s, layout.nodes, s)
+        solve_around(np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1)), T, right)
         return right
 
     def _coupled(self, z: Array) -> Array:
@@ -360,51 +426,19 @@ class Linearised:
 
     @cached_property
     def condensed(self) -> Array:
-        """The equations without z: rows of the harmonics, and of the phase, over (n + e)."""
+        """Derivatives (n + 1, n + e) of the residual, without the last row for forced systems."""
         problem = self.problem
         n = problem.size
         found = np.empty((n + problem.autonomous, n + problem.common))
-        found[:n, :n], found[:n, n:] = self.matrix, self._common[:n]
+        found[:n, :n], found[:n, n:] = self.matrix, self._common
         if problem.layout.memory:
-            found[:n] -= self._coupled(self._followed)
+            found[:n] += self._coupled(self._followed)
         if problem.autonomous:
             found[n, :n], found[n, n:] = problem.phase_row, 0.0
         return found
 
-    def condensed_row(self, row: Array) -> Array:
-        """A row (n + N c + e,) without z (n + e,)."""
-        problem = self.problem
-        n, tail = problem.size, len(row) - problem.common
-        short = np.append(row[:n], row[tail:])
-        if problem.layout.memory:
-            short -= np.tensordot(row[n:tail].reshape(problem.samples, -1), self._followed, axes=2)
-        return short
-
-    def expanded(self, short: Array) -> Array:
-        """Unknowns (n + N c + e,) of a solution (n + e,) of the homogeneous equations."""
-        problem = self.problem
-        n = problem.size
-        if not problem.layout.memory:
-            return short
-        return np.concatenate([short[:n], -(self._followed @ short).reshape(-1), short[n:]])
-
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
-        problem = self.problem
-        n, middle = problem.size, len(row) - problem.common
-        own = self.condensed_row(row)
-        if not problem.layout.memory:
-            return self._solved(own, rhs)
-        z = rhs[n:middle].reshape(problem.samples, problem.layout.memory, 1).copy()
-        solve_around(self._memory_slopes, self.period, z)
-        short = np.concatenate([rhs[:n] - self._coupled(z)[:, 0], rhs[middle:]])
-        short[-1] -= row[n:middle] @ z.reshape(-1)
-        found = self._solved(own, short)
-        whole = self.expanded(found)
-        whole[n:middle] += z.reshape(-1)
-        return whole
-
-    def _solved(self, row: Array, rhs: Array) -> Array:
         if self._factors is None:
             square = np.empty((len(row), len(row)))
             square[:-1], square[-1] = self.condensed, row

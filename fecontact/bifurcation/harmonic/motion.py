@@ -16,20 +16,15 @@ def layout_from(attributes: Mapping[str, Any]) -> Layout:
                   int(attributes["memory"]), int(attributes["memory_nodes"]))
 
 
-def parts(u: Array, attributes: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Coefficients (2 H + 1, b) and internal variables (N, c) of the unknowns of a branch."""
-    layout = layout_from(attributes)
-    size = (2 * int(attributes["harmonics"]) + 1) * layout.harmonic
-    count = int(attributes["samples"]) * layout.memory
-    return (u[:size].reshape(-1, layout.harmonic),
-            u[size : size + count].reshape(int(attributes["samples"]), layout.memory))
-
-
 def balanced(
-    u: Array, attributes: Mapping[str, Any], period: float, samples: int
+    u: Array, values: Mapping[str, Any], attributes: Mapping[str, Any], samples: int
 ) -> PeriodicMotion:
-    """Sample an orbit by harmonic balance over one period, both ends included."""
+    """Sample an orbit by harmonic balance over one period, both ends included.
+
+    ``values`` are those stored of the point, ``attributes`` those of its branch.
+    """
+    layout, period = layout_from(attributes), float(values["period"])
     phases = np.linspace(0.0, 1.0, samples)
-    X, z = parts(u, attributes)
-    states = series_states(layout_from(attributes), X, z, period, phases)
-    return PeriodicMotion(phases * period, states, period)
+    X = u[: (2 * int(attributes["harmonics"]) + 1) * layout.harmonic].reshape(-1, layout.harmonic)
+    z = np.asarray(values.get("memory", np.zeros((1, 0))))
+    return PeriodicMotion(phases * period, series_states(layout, X, z, period, phases), period)

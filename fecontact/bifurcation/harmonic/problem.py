@@ -34,7 +34,7 @@ class HarmonicLinearisation(Linearised):
     def floquet(self) -> Floquet:
         """Multipliers and stability."""
         if self.problem.stability == "transitions":
-            return by_transitions(self.problem, self.u)
+            return by_transitions(self.problem, self.u, self.memory)
         return by_hill(self.problem, self.u, self.derivatives[1])
 
     @cached_property
@@ -124,9 +124,6 @@ class HarmonicProblem(Balance, Problem):
         layout, found = self.layout, self.scales.copy()
         X = self.coefficients(u)[1:]
         found[layout.columns] = np.sqrt(np.einsum("ki,ki->i", X, X))
-        if layout.memory:
-            found[layout.states - layout.memory : layout.states] = np.ptp(
-                self.memory(u), axis=0) / 2.0
         found = np.clip(found, self.scales, np.append(self.limits, self.scales[-2:]))
         return found if (found > 1.5 * self.scales).any() else self.scales
 
@@ -143,20 +140,20 @@ class HarmonicProblem(Balance, Problem):
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
         stability = linearisation.floquet
-        low, high = self.extremes(u)
+        low, high = self.extremes(u, linearisation.memory)
         error, residual = linearisation.neglected
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "truncation_error": error,
-                "residual": residual, "minimum": low, "maximum": high}
+                "residual": residual, "minimum": low, "maximum": high,
+                **({"memory": linearisation.memory} if self.layout.memory else {})}
 
-    def extremes(self, u: Array) -> tuple[Array, Array]:
+    def extremes(self, u: Array, z: Array) -> tuple[Array, Array]:
         """Smallest and largest value (d,) of each state over the orbit."""
         fine = max(_LEAST_FINE, _FINE * self.harmonics)
-        x = self.states(u, self.period(u), np.arange(fine) / fine)
+        x = self.states(u, self.period(u), z, np.arange(fine) / fine)
         low, high = peaks(x)
         if self.layout.memory:
-            z = self.memory(u)
             first = self.layout.states - self.layout.memory
             low[first:], high[first:] = z.min(axis=0), z.max(axis=0)
         return low, high
@@ -208,9 +205,7 @@ class HarmonicProblem(Balance, Problem):
         weights = self.weights()
 
         def moved(shift: float) -> Array:
-            z = np.roll(self.memory(u), -round(shift * self.samples), axis=0)
-            return np.concatenate([shifted(self.coefficients(u), shift).reshape(-1), z.reshape(-1),
-                                   u[-self.common :]])
+            return np.append(shifted(self.coefficients(u), shift).reshape(-1), u[-self.common :])
 
         def apart(shift: float) -> float:
             return weighted_norm(weights, moved(shift) - like)

@@ -12,10 +12,10 @@ from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.harmonic.balance import layout_of
+from fecontact.bifurcation.harmonic.balance import layout_of, turn_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
-from fecontact.bifurcation.harmonic.series import differentiated, with_harmonics
+from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.orbits import starts as orbit_starts
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
@@ -35,15 +35,14 @@ def problem_for(
     layout = layout_of(field)
     return HarmonicProblem(field, values.copy(), free, method.harmonics, method.count,
                            np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout,
-                           periods, method.stability)
+                           periods, turn_of(field, values, free), method.stability)
 
 
 def unknowns(problem: HarmonicProblem, states: Array, period: float) -> Array:
     """Unknowns u of states (N, d) at the samples of a period [s]."""
     layout = problem.layout
     X = problem.series.projection @ states[:, layout.columns]
-    z = states[:, layout.states - layout.memory :]
-    return np.concatenate([X.reshape(-1), z.reshape(-1), [period] if problem.autonomous else [],
+    return np.concatenate([X.reshape(-1), [period] if problem.autonomous else [],
                            [problem.values[problem.free]]])
 
 
@@ -99,7 +98,7 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
                              stability=str(known["stability"]))
     problem = problem_for(field, values, free, method, np.asarray(known["scales"], dtype=float),
                           int(known["periods"]))
-    if len(point.u) != problem.size + problem.samples * problem.layout.memory + problem.common:
+    if len(point.u) != problem.size + problem.common:
         raise InputError(f"{point.place} has {len(point.u)} unknowns, which are not those of this "
                          f"field.")
     return (replace(problem, reference=problem.coefficients(point.u).copy(),
@@ -107,7 +106,7 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
 
 
 def corrected(
-    problem: HarmonicProblem, u: Array, tolerance: float = 1e-10
+    problem: HarmonicProblem, u: Array, tolerance: float = 1e-8
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit near u at fixed parameter.
 
@@ -177,16 +176,14 @@ def doubled(problem: HarmonicProblem, u: Array) -> Start:
         periods *= 2
     result = replace(problem, harmonics=2 * problem.harmonics, samples=2 * problem.samples,
                      reference=twice, periods=periods, scales=scales, before=(), bend=None)
-    z = problem.memory(u)
-    start = np.concatenate([twice.reshape(-1), z.reshape(-1), z.reshape(-1), common])
+    start = np.append(twice.reshape(-1), common)
     odd = np.zeros(twice.shape, dtype=bool)
     odd[1::4] = odd[2::4] = True
     places = np.flatnonzero(odd.reshape(-1))
-    linearised = result.linearise(start)
-    _, _, vectors = np.linalg.svd(linearised.condensed[np.ix_(places, places)])
-    short = np.zeros(result.size + result.common)
-    short[places] = vectors[-1]
-    return result, start, linearised.expanded(short)
+    _, _, vectors = np.linalg.svd(result.linearise(start).condensed[np.ix_(places, places)])
+    leaving = np.zeros_like(start)
+    leaving[places] = vectors[-1]
+    return result, start, leaving
 
 
 def crossing(problem: HarmonicProblem, u: Array, incoming: Array) -> Start:
@@ -195,10 +192,9 @@ def crossing(problem: HarmonicProblem, u: Array, incoming: Array) -> Start:
     ``incoming`` is the direction of the first branch nearby.
     """
     row = problem.weights() * incoming
-    linearised = problem.linearise(u)
-    equations = np.vstack([linearised.condensed])
+    equations = problem.linearise(u).condensed
     _, _, vectors = np.linalg.svd(equations / np.abs(equations).max(axis=1)[:, None])
-    first, second = (linearised.expanded(vector) for vector in vectors[-2:])
+    first, second = vectors[-2:]
     return problem, u, (row @ second) * first - (row @ first) * second
 
 
@@ -209,13 +205,4 @@ def with_more(problem: HarmonicProblem, u: Array, method: HarmonicBalance) -> tu
     X = with_harmonics(problem.coefficients(u), method.harmonics)
     result = replace(problem, harmonics=method.harmonics, samples=method.count, reference=X,
                      stability=method.stability, before=(), bend=None)
-    z = np.zeros((method.count, 0))
-    if problem.layout.memory:
-        from fecontact.bifurcation.harmonic.balance import around
-        z = around(problem.memory(u), result.series.times)
-    return result, np.concatenate([X.reshape(-1), z.reshape(-1), u[-problem.common :]])
-
-
-def at_rest(problem: HarmonicProblem, u: Array) -> bool:
-    """Whether an orbit does not move."""
-    return not differentiated(problem.coefficients(u)).any()
+    return result, np.append(X.reshape(-1), u[-problem.common :])
