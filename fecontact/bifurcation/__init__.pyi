@@ -24,6 +24,7 @@ from .fields.contact_field import ContactField, contact_field
 from .fields.function_field import vector_field
 from .fields.vector_field import VectorField
 from .harmonic.method import HarmonicBalance
+from .harmonic.response import FrequencyResponse, frequency_response
 from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
@@ -45,6 +46,7 @@ __all__ = [
     "DoubleHopfPoint",
     "Equilibrium",
     "FoldPoint",
+    "FrequencyResponse",
     "HarmonicBalance",
     "HopfPoint",
     "LyapunovExponents",
@@ -63,6 +65,7 @@ __all__ = [
     "contact_field",
     "equilibrium_branch",
     "find_equilibrium",
+    "frequency_response",
     "lyapunov_exponents",
     "observe",
     "orbit_branch",

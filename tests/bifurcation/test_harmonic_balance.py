@@ -110,22 +110,19 @@ def test_duffing_response_has_its_published_amplitudes_and_folds():
 
 def test_error_falls_exponentially_with_the_harmonics_and_is_estimated():
     field = duffing()
-    exact, _ = orbit(field, {1: (2.0, 0.0)}, 31, W=1.0, P=2.0)
-    _, reference = orbit(field, {1: (3.0, 0.0)}, 31, W=1.0, P=2.0)
+    exact, reference = orbit(field, {1: (3.0, 0.0)}, 31, W=1.0, P=2.0)
     whole = exact.coefficients(reference)
     errors, estimates = [], []
     for H in (1, 3, 5, 7, 9, 11):
         problem, u = orbit(field, {1: (3.0, 0.0)}, H, 128, W=1.0, P=2.0)
         X = np.zeros_like(whole)
         X[: 2 * H + 1] = problem.coefficients(u)
-        errors.append(np.linalg.norm((X - whole)[:, 0]) / np.linalg.norm(whole[1:, 0]))
+        errors.append(np.linalg.norm(X - whole) / np.linalg.norm(whole[1:]))
         estimates.append(problem.linearise(u).neglected[0])
     ratios = np.array(errors[1:]) / errors[:-1]
     assert (ratios < 0.15).all()
     assert errors[-1] < 1e-8
-    # The estimate is that of states, x and v, with equal scales.
-    assert np.array(estimates) == pytest.approx(np.array(errors), rel=4.0)
-    assert (np.array(estimates) > 0.25 * np.array(errors)).all()
+    assert np.log(estimates) == pytest.approx(np.log(errors), abs=0.7)
 
 
 def test_tolerance_takes_as_many_harmonics_as_it_needs():
@@ -142,11 +139,12 @@ def test_tolerance_takes_as_many_harmonics_as_it_needs():
 
 
 def test_third_harmonic_of_the_duffing_oscillator():
-    """Perturbation: A_3 = -.1 A^3 / (4 (1 - 9 W^2)) without force on it, to leading order."""
+    """To leading order it is that of the linear oscillator under -.1 A^3 / 4 cos 3 W t."""
     problem, u = orbit(duffing(), {1: (0.0, 0.0)}, 9, W=0.6, P=0.01)
     X = problem.coefficients(u)[:, 0]
     A1, A3 = np.hypot(X[1], X[2]), np.hypot(X[5], X[6])
-    assert A3 == pytest.approx(0.1 * A1**3 / 4.0 / abs(1.0 - 9.0 * 0.36 + 0.15j * 0.6), rel=1e-3)
+    leading = 0.1 * A1**3 / 4.0 / abs(1.0 - 9.0 * 0.36 + 0.15j * 0.6)
+    assert pytest.approx(leading, rel=1e-3) == A3
 
 
 def test_conservative_period_is_that_of_the_elliptic_integral():
@@ -157,15 +155,17 @@ def test_conservative_period_is_that_of_the_elliptic_integral():
         out[0] = x[1]
         out[1] = -x[0] - 0.1 * x[0] ** 3 - p[0] * x[1]
 
-    field = vector_field(free, {"c": 0.0}, 2)
-    w = duffing_frequency(1.0)
-    found = orbit_branch(field, sine_motion(field, 1.0, w), "c", method=HarmonicBalance(15),
-                         bounds=(-0.1, 0.1), options=ContinuationOptions(points=8))
+    field = vector_field(free, {"c": 0.05}, 2)
+    hopf = equilibrium_branch(field, parameter="c", bounds=(-0.1, 0.1),
+                              direction=-1.0).of_kind("Hopf")[0]
+    found = orbit_branch(field, hopf, method=HarmonicBalance(15), bounds=(-0.1, 0.1),
+                         options=ContinuationOptions(points=30, largest_step=0.2,
+                                                         tolerance=1e-10))
     for point in found.points:
         assert abs(point.parameter) < 1e-10
         assert TURN / point.values["period"] == pytest.approx(
             duffing_frequency(point.values["maximum"][0]), rel=1e-8)
-    assert np.ptp(found.column("maximum")[:, 0]) > 0.05
+    assert found.points[-1].values["maximum"][0] > 1.0
 
 
 def test_van_der_pol():
@@ -197,8 +197,9 @@ def test_jenkins_element_agrees_with_a_run_in_time_and_its_multipliers():
     field = jenkins(1.2, relaxation=1e-3)
     problem, u = orbit(field, {}, 25, 2000)
     system, T = field.system(), TURN / 1.2
-    settled = simulate(system, 60.0 * T, rtol=1e-10, outputs=np.linspace(59.0 * T, 60.0 * T, 2001))
-    x = settled.states[-2001:, 0]
+    settled = simulate(system, 60.0 * T, rtol=1e-10, outputs=np.array([0.0, 60.0 * T]))
+    settled = simulate(system, T, initial=settled.states[-1], rtol=1e-10, outputs=2001)
+    x = settled.states[:, 0]
     low, high = problem.extremes(u, problem.linearise(u).memory)
     assert [low[0], high[0]] == pytest.approx([x.min(), x.max()], rel=1e-4)
     start, columns = settled.states[-1], []
@@ -217,7 +218,7 @@ def test_element_that_never_slides_is_a_spring():
     X = problem.coefficients(u)[:, 0]
     assert np.hypot(X[1], X[2]) == pytest.approx(1.0 / abs(1.5 - 0.25 + 0.01j), rel=1e-6)
     z = problem.linearise(u).memory[:, 0]
-    assert abs(z.mean()) < 1e-9
+    assert abs(z.mean()) < 1e-7
     assert problem.linearise(u).floquet.stable
 
 
@@ -232,7 +233,8 @@ def test_separation_agrees_with_collocation_and_shooting():
                           options=ContinuationOptions(points=2)).points[0]
              for method in (HarmonicBalance(60, 1024), Collocation(200), Shooting(2))]
     mine, collocated, shot = (point.values for point in found)
-    assert 0.2 < mine["maximum"][0] < 5.0 and mine["minimum"][0] < -0.2
+    assert 0.2 < mine["maximum"][0] < 5.0
+    assert mine["minimum"][0] < -0.2
     assert mine["minimum"][0] == pytest.approx(collocated["minimum"][0], rel=1e-5)
     assert mine["maximum"][0] == pytest.approx(collocated["maximum"][0], rel=1e-5)
     assert collocated["maximum"][0] == pytest.approx(shot["maximum"][0], rel=1e-3)

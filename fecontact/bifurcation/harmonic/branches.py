@@ -40,7 +40,8 @@ def from_motion(
     problem, u = starts.corrected(*starts.from_samples(
         field, values, free, motion.times, motion.states, motion.period, method, motion.periods,
         widths))
-    return follow(replace(problem, limits=limits), u, None, method, options, direction=direction, both=both)
+    return follow(replace(problem, limits=limits), u, None, method, options,
+                  direction=direction, both=both)
 
 
 def born(
@@ -124,7 +125,8 @@ def _rescaled(
 def _attributes(problem: HarmonicProblem) -> dict[str, Any]:
     field, layout = problem.field, problem.layout
     found = {} if problem.limits is None else {"limits": problem.limits}
-    return {**found, "state_names": list(field.state_names), "parameter_names": list(field.parameters),
+    return {**found, "state_names": list(field.state_names),
+            "parameter_names": list(field.parameters),
             "parameter_values": problem.values, "scales": problem.scales,
             "harmonics": problem.harmonics, "samples": problem.samples,
             "stability": problem.stability, "periods": problem.periods,

@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.harmonic.balance import Balance, Linearised
-from fecontact.bifurcation.harmonic.series import differentiated, shifted
+from fecontact.bifurcation.harmonic.series import basis_at, differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
 from fecontact.bifurcation.orbits.floquet import Floquet, unresolved
 from fecontact.bifurcation.orbits.same_orbit import HALVING, same_heading
@@ -151,12 +151,20 @@ class HarmonicProblem(Balance, Problem):
     def extremes(self, u: Array, z: Array) -> tuple[Array, Array]:
         """Smallest and largest value (d,) of each state over the orbit."""
         fine = max(_LEAST_FINE, _FINE * self.harmonics)
-        x = self.states(u, self.period(u), z, np.arange(fine) / fine)
-        low, high = peaks(x)
-        if self.layout.memory:
-            first = self.layout.states - self.layout.memory
-            low[first:], high[first:] = z.min(axis=0), z.max(axis=0)
-        return low, high
+        layout, X, T = self.layout, self.coefficients(u), self.period(u)
+        m, end = layout.displacements, layout.states - layout.memory
+        x = self.states(u, T, z, np.arange(fine) / fine)
+        whole = np.concatenate([X[:, :m], differentiated(X[:, :m]) / T, X[:, m:]], axis=1)
+        found = []
+        for sign in (-1.0, 1.0):
+            best, place = _peaks(sign * x)
+            # The series where the parabola has its peak: exact but for the square of its error.
+            there = np.einsum("ik,ki->i", basis_at(place[:end] / fine, self.harmonics), whole)
+            best[:end] = np.maximum(best[:end], sign * there)
+            if layout.memory:
+                best[end:] = (sign * z).max(axis=0)
+            found.append(sign * best)
+        return found[0], found[1]
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -226,13 +234,16 @@ class HarmonicProblem(Balance, Problem):
 
 def peaks(x: Array) -> tuple[Array, Array]:
     """Extremes (d,) of samples (N, d) around a period, on parabolas through three of them."""
-    found = []
-    for sign in (-1.0, 1.0):
-        y = sign * x
-        place, columns = y.argmax(axis=0), np.arange(x.shape[1])
-        here = y[place, columns]
-        left, right = y[place - 1, columns], y[(place + 1) % len(x), columns]
-        bend = left - 2.0 * here + right
-        safe = np.where(bend < 0.0, bend, -1.0)
-        found.append(sign * np.where(bend < 0.0, here - (right - left) ** 2 / (8.0 * safe), here))
-    return found[0], found[1]
+    return -_peaks(-x)[0], _peaks(x)[0]
+
+
+def _peaks(x: Array) -> tuple[Array, Array]:
+    """Largest values (d,), and their places (d,) counted in samples."""
+    place, columns = x.argmax(axis=0), np.arange(x.shape[1])
+    here = x[place, columns]
+    left, right = x[place - 1, columns], x[(place + 1) % len(x), columns]
+    bend = left - 2.0 * here + right
+    curved = bend < 0.0
+    safe = np.where(curved, bend, -1.0)
+    return (np.where(curved, here - (right - left) ** 2 / (8.0 * safe), here),
+            np.where(curved, place - (right - left) / (2.0 * safe), place))

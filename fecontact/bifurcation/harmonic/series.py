@@ -91,7 +91,7 @@ def with_harmonics(X: Array, harmonics: int) -> Array:
 
 @kernel(types.void(matrix, matrix, matrix, matrix, f8, i8, i8, _blocks))
 def fill_blocks(Cx, Sx, Cv, Sv, T, displacements, rows, out):
-    """Fill out (2 H + 1, b, 2 H + 1, b) with the matrix of harmonic balance over one harmonic block.
+    """Fill out (2 H + 1, b, 2 H + 1, b) with the derivatives of the balance to coefficients.
 
     Cx, Sx (2 H + 1, b^2) are the cosine and sine coefficients k = 0..2 H, with the factor 2 / N for
     k = 0 too, of the derivatives J of the rates to the unknown functions; Cv, Sv (2 H + 1, b m)

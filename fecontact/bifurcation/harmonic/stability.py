@@ -13,8 +13,9 @@ from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
 
-# Collocation of the linearised equations: degree, and intervals per harmonic and at least.
-_DEGREE, _INTERVALS, _LEAST = 4, 3, 20
+# Collocation of the linearised equations: degree, intervals per harmonic, at least, and samples for
+# each: who takes more samples, for kinks, gets more intervals too.
+_DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE = 4, 3, 20, 4
 
 
 @cache
@@ -33,8 +34,8 @@ def _radau(degree: int) -> tuple[Array, Array, Array]:
 def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
     """Multipliers from the linearised equations about the orbit, x' = J(t) x.
 
-    They are solved by Gauss collocation of degree 4 on 3 H intervals, at least 20; the multipliers
-    are as accurate as the orbit, so that one that should be one shows its error. With friction that
+    They are solved by Gauss collocation of degree 4 on 3 H or N / 4 intervals; the multipliers are
+    as accurate as the orbit, so that one that should be one shows its error. With friction that
     has memory, by Radau's of degree 2, which damps what is stiff, from sample to sample, with
     internal variables z (N, c) linear between these: kinks leave errors of the order of 1 / N. An
     element that never slides has the multiplier exp(-1e-6) of the leak that z is marched with.
@@ -42,7 +43,7 @@ def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
     T, values = problem.period(u), problem.parameters(u)
     chosen = rule(_DEGREE)
     points, basis, slopes = chosen.points, chosen.values, chosen.slopes
-    N = max(_LEAST, _INTERVALS * problem.harmonics)
+    N = max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE)
     if problem.layout.memory:
         N = problem.samples
         points, basis, slopes = _radau(2)
