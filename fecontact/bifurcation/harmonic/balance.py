@@ -196,11 +196,13 @@ class Balance:
         row = differentiated(self.reference) * self.scales[self.layout.columns] ** -2.0
         return np.asarray((row / (np.abs(row).max() or 1.0)).reshape(-1))
 
-    def states(self, u: Array, period: float, z: Array, times: Array | None = None) -> Array:
-        """States (N, d) with z (N, c) at the samples, or (k, d) at times tau (k,)."""
-        if times is None:
-            return filled(self.layout, self.coefficients(u), z, period, self.series.values)
-        return series_states(self.layout, self.coefficients(u), z, period, times)
+    def states(self, u: Array, period: float, z: Array) -> Array:
+        """States (N, d) with z (N, c) at the samples."""
+        return filled(self.layout, self.coefficients(u), z, period, self.series.values)
+
+    def whole(self, u: Array, period: float) -> Array:
+        """Coefficients (2 H + 1, d - c) of all states but z."""
+        return all_coefficients(self.layout, self.coefficients(u), period)
 
     def times(self, period: float) -> Array:
         """Times (N,) [s] of the samples; zero for autonomous systems."""
@@ -239,6 +241,13 @@ def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> 
     x[:, :m], x[:, 2 * m : end], x[:, end:] = moved[:, :m], moved[:, m:], z
     x[:, m : 2 * m] = values @ (differentiated(X[:, :m]) / period)
     return x
+
+
+def all_coefficients(layout: Layout, X: Array, period: float) -> Array:
+    """Coefficients (2 H + 1, d - c) of q, q' and y from those of q and y."""
+    m = layout.displacements
+    return (np.concatenate([X[:, :m], differentiated(X[:, :m]) / period, X[:, m:]], axis=1) if m
+            else X)
 
 
 def series_states(layout: Layout, X: Array, z: Array, period: float, times: Array) -> Array:

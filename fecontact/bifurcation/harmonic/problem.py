@@ -9,7 +9,12 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.harmonic.balance import Balance, Linearised
-from fecontact.bifurcation.harmonic.series import basis_at, differentiated, shifted
+from fecontact.bifurcation.harmonic.series import (
+    basis_at,
+    differentiated,
+    shifted,
+    uniform_basis,
+)
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
 from fecontact.bifurcation.orbits.floquet import Floquet, unresolved
 from fecontact.bifurcation.orbits.same_orbit import HALVING, same_heading
@@ -151,19 +156,15 @@ class HarmonicProblem(Balance, Problem):
     def extremes(self, u: Array, z: Array) -> tuple[Array, Array]:
         """Smallest and largest value (d,) of each state over the orbit."""
         fine = max(_LEAST_FINE, _FINE * self.harmonics)
-        layout, X, T = self.layout, self.coefficients(u), self.period(u)
-        m, end = layout.displacements, layout.states - layout.memory
-        x = self.states(u, T, z, np.arange(fine) / fine)
-        whole = np.concatenate([X[:, :m], differentiated(X[:, :m]) / T, X[:, m:]], axis=1)
+        whole = self.whole(u, self.period(u))
+        x = uniform_basis(fine, self.harmonics) @ whole
         found = []
         for sign in (-1.0, 1.0):
             best, place = _peaks(sign * x)
             # The series where the parabola has its peak: exact but for the square of its error.
-            there = np.einsum("ik,ki->i", basis_at(place[:end] / fine, self.harmonics), whole)
-            best[:end] = np.maximum(best[:end], sign * there)
-            if layout.memory:
-                best[end:] = (sign * z).max(axis=0)
-            found.append(sign * best)
+            there = np.einsum("ik,ki->i", basis_at(place / fine, self.harmonics), whole)
+            best = np.maximum(best, sign * there)
+            found.append(sign * np.append(best, (sign * z).max(axis=0)))
         return found[0], found[1]
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:

@@ -18,8 +18,11 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import branches, starts
+from fecontact.bifurcation.harmonic.balance import all_coefficients
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.motion import layout_from
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem, peaks
+from fecontact.bifurcation.harmonic.series import uniform_basis
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
@@ -331,14 +334,22 @@ def _with_observed(
 ) -> Branch:
     """The branch with what is observed at its points, and its level as attributes."""
     points = []
+    layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
+    if row[layout.states - layout.memory :].any():
+        raise InputError("Internal variables of friction cannot be observed; choose a displacement "
+                         "or a velocity.")
+    basis = uniform_basis(_SAMPLES, H)
     for point in branch.points:
-        moved = (point.orbit(samples=_SAMPLES + 1).states @ row)[:-1]
-        low, high = (float(one[0]) for one in peaks(moved[:, None]))
-        harmonics = 2.0 * np.fft.rfft(moved)[: _HARMONICS + 1] / _SAMPLES
-        harmonics[0] /= 2.0
+        X = point.u[: (2 * H + 1) * layout.harmonic].reshape(-1, layout.harmonic)
+        whole = all_coefficients(layout, X, float(point.values["period"]))
+        observes = whole @ row[: whole.shape[1]]
+        low, high = (float(one[0]) for one in peaks((basis @ observes)[:, None]))
+        harmonics = np.zeros(max(H, _HARMONICS) + 1, dtype=complex)
+        harmonics[0] = observes[0]
+        harmonics[1 : H + 1] = observes[1::2] - 1j * observes[2::2]
         points.append(replace(point, values={
             **point.values, "observed_minimum": low, "observed_maximum": high,
-            "observed_amplitude": (high - low) / 2.0, "observed_harmonics": harmonics}))
+            "observed_amplitude": (high - low) / 2.0, "observed_harmonics": harmonics[: _HARMONICS + 1]}))
     attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
                                   "level_name": level_name or ""}
     return replace(branch, points=tuple(points), attributes=attributes)

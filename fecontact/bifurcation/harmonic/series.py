@@ -62,6 +62,12 @@ def basis_at(times: Array, harmonics: int) -> Array:
     return values
 
 
+@cache
+def uniform_basis(count: int, harmonics: int) -> Array:
+    """From coefficients to values (k, 2 H + 1) at equidistant times."""
+    return basis_at(np.arange(count) / count, harmonics)
+
+
 def differentiated(X: Array) -> Array:
     """Coefficients (2 H + 1, b) of dx/dtau."""
     out = np.zeros_like(X)

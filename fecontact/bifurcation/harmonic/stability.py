@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from fecontact.bifurcation.harmonic.balance import Balance
+from fecontact.bifurcation.harmonic.balance import Balance, around
 from fecontact.bifurcation.harmonic.memory import LEAK
+from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
 from fecontact.bifurcation.orbits.mesh import rule
@@ -19,8 +20,19 @@ _DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE = 4, 3, 20, 4
 
 
 @cache
-def _radau(degree: int) -> tuple[Array, Array, Array]:
-    """Radau points in (0, 1], and values and slopes there of polynomials through equal nodes."""
+def _grid(intervals: int, radau: bool, harmonics: int) -> tuple[Array, Array]:
+    """Times tau of the collocation points, and the series there."""
+    tau = ((np.arange(intervals)[:, None] + _collocation(radau)[0]) / intervals).reshape(-1)
+    return tau, basis_at(tau, harmonics)
+
+
+@cache
+def _collocation(radau: bool) -> tuple[Array, Array, Array]:
+    """Points in (0, 1], and values and slopes there of polynomials through equal nodes."""
+    if not radau:
+        chosen = rule(_DEGREE)
+        return chosen.points, chosen.values, chosen.slopes
+    degree = 2
     legendre = np.polynomial.legendre.Legendre
     roots = (legendre.basis(degree) - legendre.basis(degree - 1)).roots()
     points = np.sort((1.0 + np.real(roots)) / 2.0)
@@ -41,15 +53,13 @@ def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
     element that never slides has the multiplier exp(-1e-6) of the leak that z is marched with.
     """
     T, values = problem.period(u), problem.parameters(u)
-    chosen = rule(_DEGREE)
-    points, basis, slopes = chosen.points, chosen.values, chosen.slopes
-    N = max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE)
+    N, radau = max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE), False
     if problem.layout.memory:
-        N = problem.samples
-        points, basis, slopes = _radau(2)
+        N, radau = problem.samples, True
+    points, basis, slopes = _collocation(radau)
     widths = np.full(N, 1.0 / N)
-    tau = ((np.arange(N)[:, None] + points) / N).reshape(-1)
-    x = problem.states(u, T, z, tau)
+    tau, series = _grid(N, radau, problem.harmonics)
+    x = np.concatenate([series @ problem.whole(u, T), around(z, tau)], axis=1)
     t = np.zeros(len(tau)) if problem.autonomous else tau * T
     f, J, _ = problem.field.derivatives(t, x, values)
     for k in range(problem.layout.states - problem.layout.memory, problem.layout.states):
