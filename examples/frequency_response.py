@@ -32,7 +32,7 @@ def damped_mass() -> fc.ContactSystem:
 
 
 def hardening(t: float, x: np.ndarray, p: np.ndarray, out: np.ndarray) -> None:
-    """x'' + .05 x' + x + .1 x^3 = P cos W t."""
+    """A spring that hardens: x'' + .05 x' + x + .1 x^3 = P cos W t."""
     out[0] = x[1]
     out[1] = p[1] * np.cos(p[0] * t) - 0.05 * x[1] - x[0] - 0.1 * x[0] ** 3
 
@@ -50,6 +50,7 @@ def responses(quick: bool) -> tuple[FrequencyResponse, FrequencyResponse]:
 
 
 def main() -> None:
+    """Print the peaks and draw both responses."""
     quick = "--quick" in sys.argv
     given = [word for word in sys.argv[1:] if not word.startswith("--")]
     folder = Path(given[0] if given else ".")

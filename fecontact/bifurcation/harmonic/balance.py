@@ -18,7 +18,7 @@ from fecontact.bifurcation.harmonic.series import (
     series,
 )
 from fecontact.core.errors import AnalysisError, FecontactError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 
 # Relative step of differences in a parameter that changes the period.
 _DIFFERENCE = 1e-5
@@ -52,13 +52,13 @@ class Layout:
         return self.states - self.displacements - self.memory
 
     @cached_property
-    def columns(self) -> Array:
+    def columns(self) -> Integers:
         """Indices (b,) of q and y among the states."""
         m = self.displacements
-        return np.append(np.arange(m), np.arange(2 * m, self.states - self.memory))
+        return np.concatenate([np.arange(m), np.arange(2 * m, self.states - self.memory)])
 
     @cached_property
-    def rows(self) -> Array:
+    def rows(self) -> Integers:
         """Indices (b,) of the equations of q and y among the rates."""
         m = self.displacements
         return np.arange(m, self.states - self.memory)

@@ -33,8 +33,8 @@ from fecontact.system.statics import equilibrium
 
 # Samples a period of what is observed, and harmonics of it that are stored.
 _SAMPLES, _HARMONICS = 512, 15
-# Points of a branch at most, unless options say so.
-_POINTS = 2000
+# Points of a branch at most, and largest step, unless options say so.
+_POINTS, _LARGEST = 2000, 0.03
 _FREQUENCY = "drive.angular_frequency"
 
 
@@ -132,13 +132,13 @@ def frequency_response(
         Dotted name, by default 'drive.angular_frequency'; the only parameter of a vector field. Any
         other gives responses over it, such as the amplitude of a force.
     levels : mapping of one name, optional
-        Another parameter and its values, a branch for each: ``{"drive.amplitude_x": [1e-3, 2e-3]}``.
+        Another parameter and its values, a branch for each: ``{"drive.amplitude_x": [1.0, 2.0]}``.
     observe : (point, component) or (d,) sequence
         Displacement that is observed; a row of the states of a vector field, by default its first.
     method : HarmonicBalance, optional
         Harmonics, samples, tolerance.
     options : ContinuationOptions, optional
-        Steps, tolerances; 2000 points at most by default.
+        Steps, tolerances; by default up to 2000 points, largest_step 0.03.
     start : float, optional
         Where branches start, by default the lower end; inside, they are followed both ways.
 
@@ -150,7 +150,8 @@ def frequency_response(
     """
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
     require_kind("frequency_response", (HarmonicBalance, type(None)), method=method)
-    chosen = options_of(options or ContinuationOptions(points=_POINTS), bounds)
+    chosen = options_of(
+        options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
     level_name, values = _levels(levels)
     if isinstance(system, ContactSystem):
         name = parameter or _FREQUENCY
@@ -195,8 +196,8 @@ def _observed(
                 and isinstance(observe[1], str)):
             raise InputError(f"observe = {observe!r} must be a point and a component, such as "
                              f"('B', 'x').")
-        point, component = observe
-        return field.displacement_row(point, component), f"{point} {component}"  # type: ignore[arg-type]
+        point, component = observe[0], observe[1]
+        return field.displacement_row(point, component), f"{point} {component}"
     if isinstance(observe, tuple) and observe == ("B", "x"):
         return np.eye(field.dimension)[0], field.state_names[0]
     row = as_floats(observe, "observe")
@@ -349,7 +350,8 @@ def _with_observed(
         harmonics[1 : H + 1] = observes[1::2] - 1j * observes[2::2]
         points.append(replace(point, values={
             **point.values, "observed_minimum": low, "observed_maximum": high,
-            "observed_amplitude": (high - low) / 2.0, "observed_harmonics": harmonics[: _HARMONICS + 1]}))
+            "observed_amplitude": (high - low) / 2.0,
+            "observed_harmonics": harmonics[: _HARMONICS + 1]}))
     attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
                                   "level_name": level_name or ""}
     return replace(branch, points=tuple(points), attributes=attributes)

@@ -105,7 +105,8 @@ def koopman_hill(J: Array, period: float, order: int) -> NDArray[np.float64]:
 
 def by_hill(problem: Balance, u: Array, J: Array) -> Floquet:
     """Multipliers by the Koopman-Hill projection with K = 2 H; J (N, d, d) at the samples."""
-    found = np.linalg.eigvals(koopman_hill(J, problem.period(u), 2 * problem.harmonics))
-    found = found[np.argsort(-np.abs(found))].astype(complex)
+    monodromy = koopman_hill(J, problem.period(u), 2 * problem.harmonics)
+    found = np.asarray(np.linalg.eigvals(monodromy), dtype=np.complex128)
+    found = found[np.argsort(-np.abs(found))]
     trivial = int(np.argmin(np.abs(found - 1.0))) if problem.autonomous else None
     return Floquet(found, trivial)

@@ -9,10 +9,10 @@ from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
-from fecontact.output.plots.bifurcation_diagram import DASHES, SPECIAL, runs_of, stable_pieces
+from fecontact.output.plots.bifurcation_diagram import SPECIAL, runs_of, stable_pieces
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis, parameter_label
-from fecontact.output.plots.style import distinct_colours
+from fecontact.output.plots.style import DASHES, distinct_colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
