@@ -147,7 +147,7 @@ class BranchPoint:
         InputError
             If the point is no orbit, or was found by shooting and there is no field.
         """
-        from fecontact.bifurcation.harmonic.motion import balanced
+        from fecontact.bifurcation.harmonic.layout import balanced
         from fecontact.bifurcation.orbits.motions import collocated, run_again
 
         if not (isinstance(samples, int | np.integer) and samples >= 2):

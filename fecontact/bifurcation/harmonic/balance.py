@@ -9,68 +9,14 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import differences, march, solve_around
-from fecontact.bifurcation.harmonic.series import (
-    Series,
-    basis_at,
-    differentiated,
-    fill_blocks,
-    series,
-)
+from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
 from fecontact.core.errors import AnalysisError, FecontactError
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 
 # Relative step of differences in a parameter that changes the period.
 _DIFFERENCE = 1e-5
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How states x = [q, q', y, z] become unknowns.
-
-    Attributes
-    ----------
-    states : int
-        Their number d.
-    displacements : int
-        Number m of displacements q, which come first and whose rates are the states behind them;
-        only q is unknown.
-    memory : int
-        Number c of internal variables z, the last states, which follow from q.
-    nodes : int
-        Number of contact nodes to which these belong.
-    """
-
-    states: int
-    displacements: int = 0
-    memory: int = 0
-    nodes: int = 0
-
-    @property
-    def harmonic(self) -> int:
-        """Number b of functions that are Fourier series: q and y."""
-        return self.states - self.displacements - self.memory
-
-    @cached_property
-    def columns(self) -> Integers:
-        """Indices (b,) of q and y among the states."""
-        m = self.displacements
-        return np.concatenate([np.arange(m), np.arange(2 * m, self.states - self.memory)])
-
-    @cached_property
-    def rows(self) -> Integers:
-        """Indices (b,) of the equations of q and y among the rates."""
-        m = self.displacements
-        return np.arange(m, self.states - self.memory)
-
-
-def layout_of(field: VectorField) -> Layout:
-    """Layout of the states of a field: displacements and memory of contact systems alone."""
-    if not isinstance(field, ContactField):
-        return Layout(field.dimension)
-    modes, nodes = field.system().basis.modes, field.system().basis.contact_nodes
-    memory = field.dimension - 2 * modes
-    return Layout(field.dimension, modes, memory, nodes if memory else 0)
 
 
 def turn_of(field: VectorField, values: Array, free: int) -> float | None:
@@ -229,38 +175,6 @@ class Balance:
                                 "more samples a period.")
         x[:, first:] = z
         return x
-
-
-def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> Array:
-    """States (N, d) from coefficients, internal variables (N, c) and the basis (N, 2 H + 1)."""
-    m, end = layout.displacements, layout.states - layout.memory
-    moved = np.asarray(values @ X)
-    if end == layout.harmonic == layout.states:
-        return moved
-    x = np.empty((len(values), layout.states))
-    x[:, :m], x[:, 2 * m : end], x[:, end:] = moved[:, :m], moved[:, m:], z
-    x[:, m : 2 * m] = values @ (differentiated(X[:, :m]) / period)
-    return x
-
-
-def all_coefficients(layout: Layout, X: Array, period: float) -> Array:
-    """Coefficients (2 H + 1, d - c) of q, q' and y from those of q and y."""
-    m = layout.displacements
-    return (np.concatenate([X[:, :m], differentiated(X[:, :m]) / period, X[:, m:]], axis=1) if m
-            else X)
-
-
-def series_states(layout: Layout, X: Array, z: Array, period: float, times: Array) -> Array:
-    """States (k, d) at times tau (k,); internal variables linear between their samples."""
-    return filled(layout, X, around(z, times), period, basis_at(times, len(X) // 2))
-
-
-def around(samples: Array, times: Array) -> Array:
-    """Values (k, c) at times tau of a periodic function, linear between its samples (N, c)."""
-    place = np.mod(times, 1.0) * len(samples)
-    first = place.astype(int) % len(samples)
-    part = (place - np.floor(place))[:, None]
-    return np.asarray((1.0 - part) * samples[first] + part * samples[(first + 1) % len(samples)])
 
 
 class Linearised:

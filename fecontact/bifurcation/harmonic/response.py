@@ -18,9 +18,8 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import branches, starts
-from fecontact.bifurcation.harmonic.balance import all_coefficients
+from fecontact.bifurcation.harmonic.layout import all_coefficients, layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.motion import layout_from
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem, peaks
 from fecontact.bifurcation.harmonic.series import uniform_basis
 from fecontact.bifurcation.orbits.from_run import periodic_motion

@@ -12,7 +12,8 @@ from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.harmonic.balance import layout_of, turn_of
+from fecontact.bifurcation.harmonic.balance import turn_of
+from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import with_harmonics

@@ -120,9 +120,8 @@ def orbit_branch(
 ) -> Branch:
     """Follow periodic orbits over a parameter.
 
-    Each point stores 'period' [s], 'multipliers' (d,), 'unstable' (number outside the unit circle),
-    'stable', 'trivial_error', 'mesh' (N + 1,), by harmonic balance its errors instead, 'minimum'
-    and 'maximum' (d,). Special points are
+    Points store 'period' [s], 'multipliers' (d,), 'unstable' (number outside the unit circle),
+    'stable', 'trivial_error', 'mesh' (N + 1,), 'minimum' and 'maximum' (d,). Special points are
     'fold', 'period doubling', 'Neimark-Sacker', 'branch point', 'period halving' and 'unresolved';
     see docs/orbits.md.
 
@@ -138,10 +137,8 @@ def orbit_branch(
     method : Collocation, Shooting or HarmonicBalance, optional
         By default that of the point's branch, else collocation. Twice the intervals, segments or
         harmonics are used beyond a period doubling.
-    options : ContinuationOptions, optional
-        Step lengths, tolerances and stopping conditions.
-    bounds : (float, float), optional
-        Range of the parameter, in place of that of the options.
+    options, bounds : ContinuationOptions and (float, float), optional
+        Step lengths, tolerances, stopping conditions; range of the parameter in place of theirs.
     scales : (d,) sequence, optional
         Amplitudes of the states that count as one in the arclength; by default those of the point's
         branch or the motion, at a Hopf point those of the field.
