@@ -56,6 +56,10 @@ EXAMPLES = {
                              (r"^struck, 0.10 mm: (\S+) Hz", 79.206, 0.01),
                              (r"^struck, 2.01 mm: (\S+) Hz", 78.631, 0.02)],
                   {"out/lap_joint_loop.png", "out/lap_joint_frequency.png"}),
+    # Folds as published for this oscillator.
+    "frequency_response": (("out",), [(r"^  1\.00 +\S+ +(\S+)$", 6.23, 0.03),
+                                      (r"^  0\.18 .* (\S+)$", 1.115700, 1e-5)],
+                           {"out/friction_damper_response.png", "out/hardening_response.png"}),
     "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
                                      (r"fold at B = (\S+)", 0.890687, 1e-4),
                                      (r"doubling at B = (\S+)", 8.092192, 1e-4)],
