@@ -1,4 +1,11 @@
-from .output.files.branches import read_branch, read_branches, write_branch, write_branches
+from .output.files.branches import (
+    read_branch,
+    read_branches,
+    read_response,
+    write_branch,
+    write_branches,
+    write_response,
+)
 from .output.files.case import Case
 from .output.files.dataset import to_pandas, to_xarray
 from .output.files.export import export_csv, export_fields, export_mat, export_netcdf
@@ -27,6 +34,7 @@ __all__ = [
     "read_branch",
     "read_branches",
     "read_matrix",
+    "read_response",
     "read_table",
     "read_uff",
     "read_wear",
@@ -40,5 +48,6 @@ __all__ = [
     "write_basis",
     "write_branch",
     "write_branches",
+    "write_response",
     "write_wear",
 ]

@@ -13,6 +13,7 @@ from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.preload import plot_loop, plot_shear
+from .output.plots.response import plot_response
 from .output.plots.run import plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
@@ -43,6 +44,7 @@ __all__ = [
     "plot_phase",
     "plot_poincare",
     "plot_receptance",
+    "plot_response",
     "plot_shear",
     "plot_sobol",
     "plot_spectrogram",

@@ -74,6 +74,10 @@ EXAMPLES = {
                                (r"at 0 degrees: .* ahead, (2\d)% lifted", 20.0, 0.0),
                                (r"^a run from rest ends (\S+) of", 0.0, 1e-3)],
                     {"out/tipping_pad.png"}),
+    # Folds as published for this oscillator.
+    "frequency_response": (("out",), [(r"^  1\.00 +\S+ +(\S+)$", 6.23, 0.03),
+                                      (r"^  0\.18 .* (\S+)$", 1.115700, 1e-5)],
+                           {"out/friction_damper_response.png", "out/hardening_response.png"}),
     "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
                                      (r"fold at B = (\S+)", 0.890687, 1e-4),
                                      (r"doubling at B = (\S+)", 8.092192, 1e-4)],

@@ -124,10 +124,18 @@ def two_masses(folder: Path) -> dict[str, Path]:
     return {"two_masses_over_B": folder / "two_masses_over_B.png"}
 
 
+def responses(folder: Path) -> dict[str, Path]:
+    """Frequency responses of a friction damper and of a hardening spring."""
+    example(folder, "frequency_response", ".")
+    return {name: folder / f"{name}.png" for name in ("friction_damper_response",
+                                                      "hardening_response")}
+
+
 MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     beam: ("beam_on_wavy_ground", "contact_map", "report"), squeal: ("flutter_modes",),
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
-    orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",)}
+    orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
+    responses: ("friction_damper_response", "hardening_response")}
 
 
 def main(names: set[str]) -> None:

@@ -23,6 +23,8 @@ from .equilibria.stability_map import StabilityMap, stability_map
 from .fields.contact_field import ContactField, contact_field
 from .fields.function_field import vector_field
 from .fields.vector_field import VectorField
+from .harmonic.method import HarmonicBalance
+from .harmonic.response import FrequencyResponse, frequency_response
 from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
@@ -44,6 +46,8 @@ __all__ = [
     "DoubleHopfPoint",
     "Equilibrium",
     "FoldPoint",
+    "FrequencyResponse",
+    "HarmonicBalance",
     "HopfPoint",
     "LyapunovExponents",
     "NeimarkSackerPoint",
@@ -61,6 +65,7 @@ __all__ = [
     "contact_field",
     "equilibrium_branch",
     "find_equilibrium",
+    "frequency_response",
     "lyapunov_exponents",
     "observe",
     "orbit_branch",

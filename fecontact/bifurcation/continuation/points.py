@@ -80,12 +80,17 @@ class BranchPoint:
     @property
     def is_orbit(self) -> bool:
         """Whether the point is a periodic orbit."""
-        return "period" in self.values and "mesh" in self.values
+        return "period" in self.values and ("mesh" in self.values or self.by_harmonics)
 
     @property
     def by_shooting(self) -> bool:
         """Whether the point is an orbit found by shooting."""
         return self.header is not None and "segments" in self.header.attributes
+
+    @property
+    def by_harmonics(self) -> bool:
+        """Whether the point is an orbit found by harmonic balance."""
+        return self.header is not None and "harmonics" in self.header.attributes
 
     @property
     def branch(self) -> BranchHeader:
@@ -142,6 +147,7 @@ class BranchPoint:
         InputError
             If the point is no orbit, or was found by shooting and there is no field.
         """
+        from fecontact.bifurcation.harmonic.layout import balanced
         from fecontact.bifurcation.orbits.motions import collocated, run_again
 
         if not (isinstance(samples, int | np.integer) and samples >= 2):
@@ -149,8 +155,11 @@ class BranchPoint:
         if not self.is_orbit:
             raise InputError(f"{self.place} is no periodic orbit.")
         values = None if field is None else self.parameter_values(field)
-        mesh, period = np.asarray(self.values["mesh"], dtype=float), float(self.values["period"])
-        if not self.by_shooting:
+        period = float(self.values["period"])
+        mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
+        if self.by_harmonics:
+            found = balanced(self.u, self.values, self.branch.attributes, samples)
+        elif not self.by_shooting:
             found = collocated(self.u, mesh, len(self.values["minimum"]), period, samples)
         elif field is None:
             raise InputError(f"{self.place} was found by shooting, whose orbits are run again; "

@@ -14,6 +14,7 @@ from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import common_period
+from fecontact.system.nodes import SystemArrays
 
 # Relative step of differences in a parameter.
 _STEP = 2e-4
@@ -60,6 +61,10 @@ class ContactField(VectorField):
             If a value is out of its parameter's range.
         """
         return self._family.system(self.values if values is None else values)
+
+    def arrays(self, values: Array) -> SystemArrays:
+        """Arrays of the system for kernels, for parameter values (k,)."""
+        return self._family.arrays(values)
 
     def rates(self, t: Array, x: Array, values: Array) -> Array:
         """Rates (N, d); see :meth:`VectorField.rates`."""

@@ -1,8 +1,8 @@
-"""Branches of periodic orbits from any start, by collocation or shooting."""
+"""Branches of periodic orbits from any start, by any of the three methods."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, sharpened
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.bifurcation.harmonic import branches as harmonic_branches
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbits import shooting_branches, starts
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
@@ -105,17 +107,20 @@ class Shooting:
             require_positive("Shooting", derivative_rtol=self.derivative_rtol)
 
 
+Method: TypeAlias = Collocation | Shooting | HarmonicBalance
+
+
 def orbit_branch(
     field: VectorField,
     start: BranchPoint | PeriodicMotion | Trajectory | tuple[ArrayLike, ArrayLike],
-    parameter: str | None = None, *, method: Collocation | Shooting | None = None,
+    parameter: str | None = None, *, method: Method | None = None,
     options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
     scales: ArrayLike | None = None, width: float | None = None, direction: float = 1.0,
     both: bool = False,
 ) -> Branch:
     """Follow periodic orbits over a parameter.
 
-    Each point stores 'period' [s], 'multipliers' (d,), 'unstable' (number outside the unit circle),
+    Points store 'period' [s], 'multipliers' (d,), 'unstable' (number outside the unit circle),
     'stable', 'trivial_error', 'mesh' (N + 1,), 'minimum' and 'maximum' (d,). Special points are
     'fold', 'period doubling', 'Neimark-Sacker', 'branch point', 'period halving' and 'unresolved';
     see docs/orbits.md.
@@ -129,13 +134,11 @@ def orbit_branch(
         branch of orbits, to continue it; or a settled motion over at least one period.
     parameter : str, optional
         The parameter to vary; by default that of the point, or the only one of the field.
-    method : Collocation or Shooting, optional
-        By default that of the point's branch, else collocation. Twice the intervals or segments are
-        used beyond a period doubling.
-    options : ContinuationOptions, optional
-        Step lengths, tolerances and stopping conditions.
-    bounds : (float, float), optional
-        Range of the parameter, in place of that of the options.
+    method : Collocation, Shooting or HarmonicBalance, optional
+        By default that of the point's branch, else collocation. Twice the intervals, segments or
+        harmonics are used beyond a period doubling.
+    options, bounds : ContinuationOptions and (float, float), optional
+        Step lengths, tolerances, stopping conditions; range of the parameter in place of theirs.
     scales : (d,) sequence, optional
         Amplitudes of the states that count as one in the arclength; by default those of the point's
         branch or the motion, at a Hopf point those of the field.
@@ -155,7 +158,8 @@ def orbit_branch(
     """
     require_field(field)
     require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, tuple), start=start)
-    require_kind("orbit_branch", (Collocation, Shooting, type(None)), method=method)
+    require_kind("orbit_branch", (Collocation, Shooting, HarmonicBalance, type(None)),
+                 method=method)
     require_finite("orbit_branch", direction=direction)
     chosen = options_of(options, bounds)
     if not isinstance(start, BranchPoint):
@@ -204,8 +208,10 @@ def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
                          f"{parameter!r}; follow the equilibrium over that one first.")
 
 
-def _method_of(point: BranchPoint) -> Collocation | Shooting:
+def _method_of(point: BranchPoint) -> Method:
     """Method by which an orbit was computed."""
+    if point.by_harmonics:
+        return harmonic_branches.method_of(point)
     known = point.branch.attributes
     if point.by_shooting:
         return Shooting(int(known["segments"]), float(known.get("rtol", 1e-9)),
@@ -213,9 +219,11 @@ def _method_of(point: BranchPoint) -> Collocation | Shooting:
     return Collocation(len(point.values["mesh"]) - 1, int(known["degree"]))
 
 
-def _keeps(point: BranchPoint, method: Collocation | Shooting | None) -> bool:
+def _keeps(point: BranchPoint, method: Method | None) -> bool:
     """Whether the unknowns of a point suit the method, apart from the number of intervals."""
     found = _method_of(point)
+    if isinstance(found, HarmonicBalance):
+        return method is None or isinstance(method, HarmonicBalance)
     if isinstance(found, Collocation):
         return method is None or (isinstance(method, Collocation)
                                   and method.degree == found.degree)
@@ -234,9 +242,11 @@ def _first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch
 
 
 def _from_hopf(
-    field: VectorField, point: HopfPoint, method: Collocation | Shooting,
+    field: VectorField, point: HopfPoint, method: Method,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None,
 ) -> Branch:
+    if isinstance(method, HarmonicBalance):
+        return harmonic_branches.born(field, point, method, options, scales, width)
     if isinstance(method, Shooting):
         return _first_that_goes(
             starts.at_hopf(field, point, 50, 4, options, scales, width),
@@ -248,7 +258,7 @@ def _from_hopf(
 
 
 def _from_motion(
-    field: VectorField, motion: PeriodicMotion, parameter: str, method: Collocation | Shooting,
+    field: VectorField, motion: PeriodicMotion, parameter: str, method: Method,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
     both: bool,
 ) -> Branch:
@@ -260,6 +270,9 @@ def _from_motion(
     given[free] = inside(float(given[free]), options)
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
     widths = np.append(sizes, width_of(width, options, given[free]))
+    if isinstance(method, HarmonicBalance):
+        return harmonic_branches.from_motion(field, given, free, motion, method, options, widths,
+                                             limits, direction, both)
     if isinstance(method, Shooting):
         return shooting_branches.from_motion(
             field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
@@ -271,12 +284,17 @@ def _from_motion(
 
 
 def _beyond(
-    field: VectorField, point: BranchPoint, method: Collocation | Shooting | None,
+    field: VectorField, point: BranchPoint, method: Method | None,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
 ) -> Branch:
     """The other orbits at a special point of a branch of orbits."""
+    if point.by_harmonics:
+        if not (method is None or isinstance(method, HarmonicBalance)):
+            raise InputError(f"{point.place} was found by harmonic balance, and so are the orbits "
+                             f"beyond it; leave the method out.")
+        return harmonic_branches.beyond(field, point, method, options, scales, width, direction)
     if point.by_shooting:
-        if isinstance(method, Collocation):
+        if not (method is None or isinstance(method, Shooting)):
             raise InputError(f"{point.place} was found by shooting, and so are the orbits beyond "
                              f"it; leave the method out.")
         return shooting_branches.doubled(
@@ -306,12 +324,15 @@ def _beyond(
 
 
 def _goes_on(
-    field: VectorField, point: BranchPoint, method: Collocation | Shooting | None,
+    field: VectorField, point: BranchPoint, method: Method | None,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
     both: bool,
 ) -> Branch:
     """Continue a branch of orbits from one of its points."""
     sign = float(np.copysign(1.0, direction))
+    if point.by_harmonics:
+        assert method is None or isinstance(method, HarmonicBalance)
+        return harmonic_branches.goes_on(field, point, method, options, scales, width, sign, both)
     if point.by_shooting:
         return shooting_branches.goes_on(
             field, point, method.rtol if isinstance(method, Shooting) else None, options, scales,

@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.problem import peaks
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate
 from fecontact.bifurcation.orbits.motions import nodes_on_mesh
 from fecontact.core.checks import as_floats, require_kind
@@ -31,6 +32,8 @@ def quantity_range(point: BranchPoint, row: ArrayLike) -> tuple[float, float]:
     weights = as_floats(row, "row")
     if weights.ndim != 1:
         raise InputError(f"row must hold one number for each state, not shape {weights.shape}.")
+    if point.is_orbit and point.by_harmonics:
+        return _peaks(point.orbit(samples=_FINE).states @ weights)
     if "mesh" not in point.values:
         value = float(weights @ np.asarray(point.values["state"]))
         return value, value
@@ -53,8 +56,16 @@ def amplitudes(branch: Branch, row: ArrayLike) -> Array:
     return np.array([amplitude(row)(point) for point in branch.points])
 
 
+def _peaks(moved: Array) -> tuple[float, float]:
+    """Extremes of samples over a period, the last of which is the first again."""
+    low, high = peaks(moved[:-1, None])
+    return float(low[0]), float(high[0])
+
+
 # Samples per period; the error of an extreme is of the order of their spacing squared.
 _SAMPLES = 4000
+# The same where extremes are those of parabolas through the samples.
+_FINE = 501
 
 
 def observe(
@@ -99,11 +110,11 @@ def _range(
     values = np.array(branch.attributes["parameter_values"], dtype=float)
     excited = field.forcing_period(values) is not None
     phases = np.arange(int(branch.attributes["periods"])) / int(branch.attributes["periods"])
-    if not point.by_shooting:
+    if not (point.by_shooting or point.by_harmonics):
         nodes, _ = _nodes(point, field.dimension)
         section = interpolate(np.asarray(point.values["mesh"], dtype=float), nodes, phases) @ row
         return *quantity_range(point, row), {"observed_section": section} if excited else {}
-    motion = point.orbit(field, _SAMPLES)
+    motion = point.orbit(field, _SAMPLES + 1)
     moved = motion.states @ row
     section = np.interp(phases, motion.times / motion.times[-1], moved)
     return (float(moved.min()), float(moved.max()),

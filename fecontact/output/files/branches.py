@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.points import details_of, special_point
+from fecontact.bifurcation.harmonic.response import FrequencyResponse, response_of
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.stored import (
@@ -84,6 +85,32 @@ def read_branches(path: str | Path) -> dict[str, Branch]:
         groups = member(file, "branches")
         return {text(groups[key], "name"): _stored(groups[key], path)
                 for key in sorted(groups, key=int)}
+
+
+def write_response(path: str | Path, response: FrequencyResponse) -> Path:
+    """Write a frequency response into one HDF5 file, whole or not at all.
+
+    Its branches are stored as by :func:`write_branches`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    require_kind("write_response", FrequencyResponse, response=response)
+    return write_branches(path, {f"level {number}": branch
+                                 for number, branch in enumerate(response.branches)})
+
+
+def read_response(path: str | Path) -> FrequencyResponse:
+    """Read a frequency response written by :func:`write_response`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is damaged, or it holds no response.
+    """
+    return response_of(read_branches(path))
 
 
 def _store(group: Any, branch: Branch) -> None:

@@ -35,14 +35,14 @@ if TYPE_CHECKING:
 Quantity = str | int | Callable[["BranchPoint"], float]
 
 # Letters and markers of special points.
-_SPECIAL = {
+SPECIAL = {
     "Hopf": ("H", "o"), "fold": ("F", "s"), "branch point": ("BP", "D"),
     "period doubling": ("PD", "^"), "Neimark-Sacker": ("NS", "v"), "cusp": ("CP", "P"),
     "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
     "double Hopf": ("HH", ">"), "unresolved": ("?", "x"),
 }
 # Letters alone, for diagrams of other kinds.
-LETTERS = {kind: letters for kind, (letters, _) in _SPECIAL.items()}
+LETTERS = {kind: letters for kind, (letters, _) in SPECIAL.items()}
 
 def plot_branches(
     branches: "Branch | Sequence[Branch]", y: Quantity = 0, *,
@@ -111,7 +111,7 @@ def plot_branches(
             dashed |= not stable.all()
             colour = colours[group]
             heights = curves if curves.ndim == 1 else curves[:, 0]
-            for first, last in _runs(stable):
+            for first, last in runs_of(stable):
                 axis.plot(places[first : last + 1], curves[first : last + 1], color=colour,
                           linewidth=1.8 if stable[first] else 1.2,
                           linestyle="-" if stable[first] else DASHES)
@@ -175,7 +175,7 @@ def stable_pieces(branch: "Branch") -> NDArray[np.bool_]:
     return np.array(pieces or [True], dtype=bool)
 
 
-def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs_of(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last point of each run of equal pieces."""
     edges = [0, *(np.flatnonzero(np.diff(stable)) + 1).tolist(), len(stable)]
     return list(pairwise(edges))
@@ -185,7 +185,7 @@ def _mark(axis: "Axes", known: dict[str, list[tuple[float, float]]]) -> list[Lab
     """Draw markers of special points; returns their letters and places."""
     labels: list[Label] = []
     for kind, places in known.items():
-        letters, marker = _SPECIAL.get(kind, ("", "."))
+        letters, marker = SPECIAL.get(kind, ("", "."))
         # A point that two branches share is marked once.
         distinct: list[tuple[float, float]] = []
         for place in places:
@@ -212,7 +212,7 @@ def _legend(
         handles.append(Line2D([], [], color="#303030", linewidth=1.2, linestyle=DASHES,
                               label="unstable"))
     for kind in known:
-        letters, marker = _SPECIAL.get(kind, ("", "."))
+        letters, marker = SPECIAL.get(kind, ("", "."))
         handles.append(Line2D([], [], color="#303030", marker=marker, markerfacecolor="white",
                               linestyle="none", markersize=7.0,
                               label=f"{kind} ({letters})" if letters else kind))

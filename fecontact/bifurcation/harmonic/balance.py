@@ -1,0 +1,378 @@
+"""Harmonic balance: unknowns, equations of a periodic orbit and their linearisation."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
+
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
+from fecontact.bifurcation.harmonic.memory import differences, march, solve_around
+from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
+from fecontact.core.errors import AnalysisError, FecontactError
+from fecontact.core.types import Array
+
+# Relative step of differences in a parameter that changes the period.
+_DIFFERENCE = 1e-5
+
+
+def turn_of(field: VectorField, values: Array, free: int) -> float | None:
+    """Product of the period of the forcing and a parameter, where it is the same for all values.
+
+    Then the parameter is a frequency, and the period need not be asked for, which takes long with
+    contact systems. Checked at values beside the given one.
+    """
+    found = []
+    for factor in (1.0, 0.97, 1.01, 1.043):
+        beside = values.copy()
+        beside[free] *= factor
+        try:
+            period = field.forcing_period(beside)
+        except FecontactError:
+            return None
+        if period is None or beside[free] == 0.0:
+            return None
+        found.append(period * float(beside[free]))
+    return found[0] if np.ptp(found) <= 1e-13 * abs(found[0]) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Equations of a periodic orbit of x' = f(t, x, p) with truncated Fourier series.
+
+    With tau = t / T, displacements q and other states y are Fourier series with H harmonics,
+    velocities follow from q. The residuals q'' - f_v and y' - f_y, at N samples a period, have no
+    part in the harmonics 0..H (alternating frequency and time). Internal variables z of friction
+    are marched around the period; see :mod:`fecontact.bifurcation.harmonic.memory`. If f does not
+    depend on t, T is an unknown and the phase is fixed by int <x, y'> = 0 with the orbit y before;
+    else T is ``periods`` times the period of the forcing.
+
+    The unknowns are ``u = [coefficients (2 H + 1) b, T if it is unknown, parameter]``.
+
+    Attributes
+    ----------
+    field : VectorField
+    values : (k,) array
+        Parameters; the free one is taken from u.
+    free : int
+        Index of the free parameter.
+    harmonics, samples : int
+        H and N.
+    reference : (2 H + 1, b) array
+        Coefficients of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        Scales in the step length: of each state, of the period and of the parameter.
+    layout : Layout
+        How states become unknowns.
+    periods : int
+        Number of forcing periods in one period of the orbit.
+    turn : float, optional
+        Product of the period of the forcing and the parameter, where this is a frequency; see
+        :func:`turn_of`.
+    """
+
+    field: VectorField
+    values: Array
+    free: int
+    harmonics: int
+    samples: int
+    reference: Array
+    scales: Array
+    layout: Layout
+    periods: int = 1
+    turn: float | None = None
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether the period is an unknown."""
+        return self.field.forcing_period(self.values) is None
+
+    @cached_property
+    def series(self) -> Series:
+        """Transforms between samples and coefficients."""
+        return series(self.harmonics, self.samples)
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        return self.reference.size
+
+    @cached_property
+    def common(self) -> int:
+        """Number of unknowns beside functions of time."""
+        return 1 + self.autonomous
+
+    def coefficients(self, u: Array) -> Array:
+        """Coefficients (2 H + 1, b) of q and y."""
+        return u[: self.size].reshape(self.reference.shape)
+
+    def period(self, u: Array) -> float:
+        """Period T [s] of the orbit."""
+        if self.autonomous:
+            return float(u[-2])
+        if self.turn is not None:
+            return self.periods * self.turn / float(u[-1])
+        given = self.field.forcing_period(self.parameters(u))
+        assert given is not None
+        return self.periods * given
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[self.free] = u[-1]
+        return values
+
+    @cached_property
+    def _weights(self) -> Array:
+        sizes = self.scales[self.layout.columns] ** -2.0
+        over = np.full((2 * self.harmonics + 1, 1), 0.5)
+        over[0] = 1.0
+        return np.concatenate([(over * sizes).reshape(-1), self.scales[-self.common :] ** -2.0])
+
+    def weights(self) -> Array:
+        """Weights of the inner product: mean over the orbit of scaled q and y; T; parameter."""
+        return self._weights
+
+    @cached_property
+    def phase_row(self) -> Array:
+        """Row (n,) of the phase condition over the coefficients."""
+        row = differentiated(self.reference) * self.scales[self.layout.columns] ** -2.0
+        return np.asarray((row / (np.abs(row).max() or 1.0)).reshape(-1))
+
+    def states(self, u: Array, period: float, z: Array) -> Array:
+        """States (N, d) with z (N, c) at the samples."""
+        return filled(self.layout, self.coefficients(u), z, period, self.series.values)
+
+    def whole(self, u: Array, period: float) -> Array:
+        """Coefficients (2 H + 1, d - c) of all states but z."""
+        return all_coefficients(self.layout, self.coefficients(u), period)
+
+    def times(self, period: float) -> Array:
+        """Times (N,) [s] of the samples; zero for autonomous systems."""
+        return np.zeros(self.samples) if self.autonomous else self.series.times * period
+
+    def marched(self, u: Array, period: float) -> Array:
+        """States (N, d) at the samples with differences as velocities, under which z repeats.
+
+        Raises
+        ------
+        AnalysisError
+            If internal variables do not come to repeat.
+        """
+        layout = self.layout
+        m, first = layout.displacements, layout.states - layout.memory
+        x = self.states(u, period, np.zeros((self.samples, layout.memory)))
+        if not layout.memory:
+            return x
+        assert isinstance(self.field, ContactField)
+        x[:, m : 2 * m] = differences(x[:, :m]) / period
+        z = np.empty((self.samples, layout.memory))
+        if not march(self.times(period), x, self.field.arrays(self.parameters(u)), period, z):
+            raise AnalysisError("The internal variables of friction do not come to repeat; take "
+                                "more samples a period.")
+        x[:, first:] = z
+        return x
+
+
+class Linearised:
+    """Residual at u, and solutions of systems with the derivative there.
+
+    The residual holds the balance of the harmonics (n), and the phase condition where the period
+    is unknown.
+    """
+
+    def __init__(self, problem: Balance, u: Array) -> None:
+        self.problem, self.u = problem, u
+        self.period = problem.period(u)
+        self._factors: tuple[Any, Array] | None = None
+
+    @cached_property
+    def times(self) -> Array:
+        """Times (N,) [s] of the samples; zero for autonomous systems."""
+        return self.problem.times(self.period)
+
+    @cached_property
+    def marched(self) -> Array:
+        """States (N, d) in which internal variables are marched."""
+        return self.problem.marched(self.u, self.period)
+
+    @cached_property
+    def memory(self) -> Array:
+        """Internal variables (N, c) at the samples."""
+        layout = self.problem.layout
+        if not layout.memory:
+            return np.zeros((self.problem.samples, 0))
+        return np.ascontiguousarray(self.marched[:, layout.states - layout.memory :])
+
+    @cached_property
+    def states(self) -> Array:
+        """States (N, d) at the samples."""
+        return self.problem.states(self.u, self.period, self.memory)
+
+    @cached_property
+    def rates(self) -> Array:
+        """Rates f (N, d) at the samples."""
+        if "derivatives" in self.__dict__:
+            return self.derivatives[0]
+        return self.problem.field.rates(self.times, self.states, self.problem.parameters(self.u))
+
+    @cached_property
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        """Rates and their derivatives to states and parameter at the samples."""
+        problem = self.problem
+        return problem.field.derivatives(self.times, self.states, problem.parameters(self.u),
+                                         (problem.free,))
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual (n + 1,), without the last entry for forced systems."""
+        problem = self.problem
+        found = self._balance(self.u, self.period, self.rates)
+        if not problem.autonomous:
+            return found
+        return np.append(found, problem.phase_row @ self.u[: problem.size])
+
+    def _balance(self, u: Array, period: float, rates: Array) -> Array:
+        problem, layout = self.problem, self.problem.layout
+        m = layout.displacements
+        turned = differentiated(problem.coefficients(u)) / period
+        if m:
+            turned[:, :m] = differentiated(turned[:, :m]) / period
+        turned -= problem.series.projection @ rates[:, m : layout.states - layout.memory]
+        return turned.reshape(-1)
+
+    @cached_property
+    def _common(self) -> Array:
+        """Derivatives (n, e) of the balance to T, if it is unknown, and the parameter; z held."""
+        problem, u, T = self.problem, self.u, self.period
+        m = problem.layout.displacements
+        _, J, P = self.derivatives
+        if problem.autonomous:
+            turned = differentiated(problem.coefficients(u)) / T**2
+            turned[:, :m] = 2.0 * differentiated(turned[:, :m]) / T
+            by_period = -turned.reshape(-1) + self._by_rates(self._slowed(J, self.states))
+            return np.stack([by_period, self._by_rates(P[:, :, 0])], axis=1)
+        ends = self._beside()
+        if ends is None:
+            return self._by_rates(P[:, :, 0])[:, None]
+        sides = [self._balance(end, period, problem.field.rates(
+            problem.times(period), problem.states(end, period, self.memory),
+            problem.parameters(end))) for end, period, _ in ends]
+        return ((sides[0] - sides[1]) / (2.0 * ends[0][2]))[:, None]
+
+    def _slowed(self, J: Array, x: Array) -> Array:
+        """Derivatives (N, rows) of rates to T, through velocities q' / T, from J (N, rows, d)."""
+        m = self.problem.layout.displacements
+        if not m:
+            return np.zeros(J.shape[:2])
+        return np.asarray(-np.matmul(J[:, :, m : 2 * m], x[:, m : 2 * m, None])[:, :, 0]
+                          / self.period)
+
+    def _beside(self) -> list[tuple[Array, float, float]] | None:
+        """Unknowns, period and distance beside the parameter; None if the period stays."""
+        u, h = self.u, _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
+        found = []
+        for sign in (1.0, -1.0):
+            end = u.copy()
+            end[-1] += sign * h
+            found.append((end, self.problem.period(end), h))
+        return None if found[0][1] == self.period == found[1][1] else found
+
+    def _by_rates(self, change: Array) -> Array:
+        """Change (n,) of the balance with a change (N, d) of the rates."""
+        layout = self.problem.layout
+        first = layout.states - layout.memory
+        found = self.problem.series.projection @ change[:, layout.displacements : first]
+        return -found.reshape(-1)
+
+    @cached_property
+    def matrix(self) -> Array:
+        """Derivatives (n, n) of the balance of harmonics to the coefficients, z held."""
+        problem, layout = self.problem, self.problem.layout
+        J, transforms = self.derivatives[1], problem.series
+        m, N = layout.displacements, problem.samples
+        if m or layout.memory:
+            by_state = J[:, layout.rows[:, None], layout.columns].reshape(N, -1)
+            by_speed = J[:, layout.rows[0] : layout.rows[-1] + 1, m : 2 * m].reshape(N, -1)
+        else:
+            by_state, by_speed = J.reshape(N, -1), np.zeros((N, 0))
+        out = np.empty((len(problem.reference), layout.harmonic) * 2)
+        fill_blocks(transforms.cosines @ by_state, transforms.sines @ by_state,
+                    transforms.cosines @ by_speed, transforms.sines @ by_speed, self.period, m,
+                    layout.harmonic, out)
+        return out.reshape(problem.size, problem.size)
+
+    @cached_property
+    def _followed(self) -> Array:
+        """Derivatives (N, c, n + e) of z to coefficients and common unknowns."""
+        problem, layout, x, T = self.problem, self.problem.layout, self.marched, self.period
+        m, first = layout.displacements, layout.states - layout.memory
+        H, b, c, N = problem.harmonics, layout.harmonic, layout.memory, problem.samples
+        _, J, P = problem.field.derivatives(self.times, x, problem.parameters(self.u),
+                                            (problem.free,))
+        J = J[:, first:]
+        values = problem.series.values
+        speeds = differences(values) / T
+        found = np.empty((N, c, 2 * H + 1, b))
+        np.multiply(values[:, None, :, None], J[:, :, None, layout.columns], out=found)
+        found[..., :m] += speeds[:, None, :, None] * J[:, :, None, m : 2 * m]
+        common = np.empty((N, c, problem.common))
+        common[:, :, -1] = P[:, first:, 0]
+        if problem.autonomous:
+            common[:, :, 0] = self._slowed(J, x) + differences(x[:, first:]) / T**2
+        elif (ends := self._beside()) is not None:
+            sides = []
+            for end, period, _ in ends:
+                moved = problem.states(end, period, x[:, first:])
+                moved[:, m : 2 * m] = differences(moved[:, :m]) / period
+                rates = problem.field.rates(problem.times(period), moved, problem.parameters(end))
+                sides.append(rates[:, first:] - differences(moved[:, first:]) / period)
+            common[:, :, -1] = (sides[0] - sides[1]) / (2.0 * ends[0][2])
+        right = np.concatenate([found.reshape(N, c, -1), common], axis=2)
+        # Variables of other nodes have no influence.
+        s, nodes = c // layout.nodes, np.arange(layout.nodes)
+        whole = J[:, :, first:].reshape(N, layout.nodes, s, layout.nodes, s)
+        solve_around(np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1)), T, right)
+        return right
+
+    def _coupled(self, z: Array) -> Array:
+        """Change (n, columns) of the balance with a change (N, c, columns) of z."""
+        layout, transforms = self.problem.layout, self.problem.series
+        by_memory = self.derivatives[1][:, layout.displacements : layout.states - layout.memory,
+                                        layout.states - layout.memory :]
+        forces = np.matmul(by_memory, z)
+        found = np.tensordot(transforms.projection, forces, axes=(1, 0))
+        return -np.asarray(found.reshape(self.problem.size, -1))
+
+    @cached_property
+    def condensed(self) -> Array:
+        """Derivatives (n + 1, n + e) of the residual, without the last row for forced systems."""
+        problem = self.problem
+        n = problem.size
+        found = np.empty((n + problem.autonomous, n + problem.common))
+        found[:n, :n], found[:n, n:] = self.matrix, self._common
+        if problem.layout.memory:
+            found[:n] += self._coupled(self._followed)
+        if problem.autonomous:
+            found[n, :n], found[n, n:] = problem.phase_row, 0.0
+        return found
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        if self._factors is None:
+            square = np.empty((len(row), len(row)))
+            square[:-1], square[-1] = self.condensed, row
+            factors, pivots, failed = dgetrf(square.T, overwrite_a=1)
+            if failed:
+                return np.full(len(row), np.nan)
+            self._factors = (factors, pivots), row
+        (factors, pivots), first = self._factors
+        found = dgetrs(factors, pivots, rhs, trans=1)[0]
+        if first is row or np.array_equal(first, row):
+            return np.asarray(found)
+        # Another last row: add what solves the homogeneous equations.
+        along = dgetrs(factors, pivots, np.append(np.zeros(len(row) - 1), 1.0), trans=1)[0]
+        return np.asarray(found + (rhs[-1] - row @ found) / (row @ along) * along)

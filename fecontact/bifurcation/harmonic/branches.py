@@ -1,0 +1,172 @@
+"""Branches of orbits by harmonic balance, from motions, Hopf points and points of branches."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    sizes_of,
+)
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic import starts
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_positive
+from fecontact.core.types import Array, ArrayLike
+
+# Factors of the first step, tried in this order to leave a special point.
+_FIRST_STEPS = (1.0, 0.2, 0.04)
+# Factor by which harmonics grow until the tolerance is met.
+_MORE = 1.5
+
+
+def from_motion(
+    field: VectorField, values: Array, free: int, motion: PeriodicMotion, method: HarmonicBalance,
+    options: ContinuationOptions, widths: Array, limits: Array | None, direction: float,
+    both: bool,
+) -> Branch:
+    """Branch through the orbit to which a motion has settled.
+
+    ``widths`` (d + 1,) are scales of states and parameter, ``limits`` (d,) those of their growth.
+    """
+    problem, u = starts.corrected(*starts.from_samples(
+        field, values, free, motion.times, motion.states, motion.period, method, motion.periods,
+        widths))
+    return follow(replace(problem, limits=limits), u, None, method, options,
+                  direction=direction, both=both)
+
+
+def born(
+    field: VectorField, point: HopfPoint, method: HarmonicBalance, options: ContinuationOptions,
+    scales: ArrayLike | None, width: float | None,
+) -> Branch:
+    """Branch of the orbits that are born at a Hopf point."""
+    failed: FecontactError = InputError("There is nothing to start from.")
+    for problem, u, leaving in starts.at_hopf(field, point, method, options, scales, width):
+        try:
+            return follow(problem, u, leaving, method, options)
+        except FecontactError as error:
+            failed = error
+    raise failed
+
+
+def beyond(
+    field: VectorField, point: BranchPoint, method: HarmonicBalance | None,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
+) -> Branch:
+    """The other orbits at a period doubling or branch point; doubled ones have 2 H harmonics."""
+    problem, u, tangent = starts.restored(field, point)
+    problem = _rescaled(problem, scales, width)
+    problem, u, tangent = (starts.doubled(problem, u) if point.kind == "period doubling"
+                           else starts.crossing(problem, u, tangent))
+    own = _method_of(problem)
+    if method is not None:
+        _, tangent = starts.with_more(problem, tangent, method)
+        problem, u = starts.with_more(problem, u, method)
+        own = method
+    tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
+    failed: FecontactError = InputError("There is nothing to start from.")
+    for part in _FIRST_STEPS:
+        step = max(part * options.step, options.smallest_step)
+        try:
+            return follow(problem, u + step * tangent, tangent, own, replace(options, step=step))
+        except FecontactError as error:
+            failed = error
+    raise failed
+
+
+def goes_on(
+    field: VectorField, point: BranchPoint, method: HarmonicBalance | None,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, sign: float,
+    both: bool,
+) -> Branch:
+    """Continue a branch from one of its points, or backwards if ``sign`` is -1."""
+    problem, u, tangent = starts.restored(field, point)
+    problem = _rescaled(problem, scales, width)
+    if method is None:
+        return follow(problem, u, sign * tangent, _method_of(problem), options, both=both)
+    _, tangent = starts.with_more(problem, tangent, method)
+    problem, u = starts.with_more(problem, u, method)
+    return follow(problem, u, sign * tangent, method, options, both=both)
+
+
+def method_of(point: BranchPoint) -> HarmonicBalance:
+    """Harmonic balance as the branch of a point has it."""
+    known = point.branch.attributes
+    return HarmonicBalance(int(known["harmonics"]), int(known["samples"]),
+                           stability=str(known["stability"]))
+
+
+def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
+    return HarmonicBalance(problem.harmonics, problem.samples, stability=problem.stability)
+
+
+def _rescaled(
+    problem: HarmonicProblem, scales: ArrayLike | None, width: float | None
+) -> HarmonicProblem:
+    """The problem with other scales of the states and another width of the diagram, if given."""
+    changed, d, limits = problem.scales.copy(), problem.field.dimension, problem.limits
+    if scales is not None:
+        changed[:d], limits = sizes_of(scales, changed[:d])[0], None
+    if width is not None:
+        require_positive("A branch", width=width)
+        changed[-1] = width
+    return replace(problem, scales=changed, limits=limits)
+
+
+def _attributes(problem: HarmonicProblem) -> dict[str, Any]:
+    field, layout = problem.field, problem.layout
+    found = {} if problem.limits is None else {"limits": problem.limits}
+    return {**found, "state_names": list(field.state_names),
+            "parameter_names": list(field.parameters),
+            "parameter_values": problem.values, "scales": problem.scales,
+            "harmonics": problem.harmonics, "samples": problem.samples,
+            "stability": problem.stability, "periods": problem.periods,
+            "displacements": layout.displacements, "memory": layout.memory,
+            "memory_nodes": layout.nodes}
+
+
+def follow(
+    problem: HarmonicProblem, u: Array, tangent: Array | None, method: HarmonicBalance,
+    options: ContinuationOptions, **how: Any,
+) -> Branch:
+    """Follow a branch, with more harmonics until its truncation errors meet the tolerance.
+
+    Raises
+    ------
+    AnalysisError
+        If they do not with as many harmonics as the method allows.
+    """
+    name = list(problem.field.parameters)[problem.free]
+    stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
+    ended = replace(options, stop_at=[*stops, HALVING])
+    while True:
+        branch = continue_branch(problem, u, ended, name=name, tangent=tangent,
+                                 attributes=_attributes(problem), **how)
+        if branch.points[-1].kind == HALVING and HALVING not in stops:
+            branch = replace(branch, status=BranchStatus.CLOSED)
+        if method.tolerance is None or branch.status is BranchStatus.INTERRUPTED:
+            return branch
+        worst = float(np.max(branch.column("truncation_error")))
+        if worst <= method.tolerance:
+            return branch
+        harmonics = int(np.ceil(_MORE * method.harmonics))
+        if harmonics > method.most_harmonics:
+            raise AnalysisError(f"The truncation error of the branch is {worst:.2g} with "
+                                f"{method.harmonics} harmonics, above tolerance = "
+                                f"{method.tolerance:g}; raise most_harmonics = "
+                                f"{method.most_harmonics} or the tolerance.")
+        samples = None if method.samples is None else int(
+            np.ceil(method.samples * harmonics / method.harmonics))
+        method = replace(method, harmonics=harmonics, samples=samples)
+        if tangent is not None:
+            _, tangent = starts.with_more(problem, tangent, method)
+        problem, u = starts.with_more(problem, u, method)

@@ -1,0 +1,171 @@
+"""Internal variables of friction with memory, marched around a period until they repeat.
+
+Their rates g have kinks, of which a few harmonics know nothing. They are found at the N samples
+instead, by backward differences of second order, which damp what is stiff,
+
+    (3 z_n - 4 z_(n-1) + z_(n-2)) N / (2 T) = g(q_n, q'_n, z_n) - e z_n / T,
+
+with velocities q' that are the same differences of the displacements: a spring that sticks follows
+its displacement exactly. The leak e = 1e-6 makes the mean deflection of an element that never
+slides zero, which nothing else determines. What is found repeats, so that its derivatives are those
+of these equations, cyclic and node by node.
+"""
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import block, borrowed, f8, i8, kernel, matrix, vector
+from fecontact.core.dense_lu import factorise, solve, solve_rows
+from fecontact.core.types import Array
+from fecontact.system.kernels import node_forces
+from fecontact.system.nodes import SYSTEM, force_room, ground_motion, in_space, node_motion
+
+_nodes = types.Array(f8, 4, "C")
+
+LEAK = 1e-6
+# Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
+_ROUNDS, _STEPS = 40, 40
+_REPEATS, _SOLVED = 1e-12, 1e-14
+
+
+def differences(z: Array) -> Array:
+    """Derivatives (N, c) with respect to tau of samples (N, c) of a periodic function."""
+    N = len(z)
+    found: Array = N * (1.5 * z - 2.0 * np.roll(z, 1, axis=0) + 0.5 * np.roll(z, 2, axis=0))
+    return found
+
+
+@kernel(types.void(_nodes, f8, block))
+def solve_around(slopes, T, x):
+    """Replace right sides x (N, n s, columns) by the solutions z of D z / T - g_z z = x.
+
+    ``slopes`` (N, n, s, s) holds the derivatives g_z of each of n nodes with s variables. The last
+    two samples are guessed as zero first; what this leaves around the period is the solution of
+    2 s equations, since solutions of the homogeneous equations combine.
+    """
+    slopes, x = borrowed(slopes), borrowed(x)
+    N, n, s, _ = slopes.shape
+    columns = x.shape[2]
+    rate = N / T
+    wide = columns + 2 * s
+    a, pivots = np.empty((s, s)), np.empty(s, dtype=np.int64)
+    z = np.empty((N, s, wide))
+    ring, ring_pivots = np.empty((2 * s, 2 * s)), np.empty(2 * s, dtype=np.int64)
+    given = np.empty((2 * s, columns))
+    for node in range(n):
+        for place in range(N):
+            for i in range(s):
+                for k in range(s):
+                    a[i, k] = -slopes[place, node, i, k]
+                a[i, i] += 1.5 * rate + LEAK / T
+                for c in range(wide):
+                    value = x[place, node * s + i, c] if c < columns else 0.0
+                    # Columns beyond the right sides: unit values of the last two samples.
+                    one = z[place - 1, i, c] if place > 0 else (
+                        1.0 if c == columns + i else 0.0)
+                    two = z[place - 2, i, c] if place > 1 else (
+                        (1.0 if c == columns + i else 0.0) if place == 1 else (
+                            1.0 if c == columns + s + i else 0.0))
+                    z[place, i, c] = value + rate * (2.0 * one - 0.5 * two)
+            factorise(a, s, pivots)
+            solve_rows(a, pivots, z[place])
+        for last in range(2):
+            for i in range(s):
+                for k in range(2 * s):
+                    ring[last * s + i, k] = -z[N - 1 - last, i, columns + k]
+                ring[last * s + i, last * s + i] += 1.0
+                for c in range(columns):
+                    given[last * s + i, c] = z[N - 1 - last, i, c]
+        factorise(ring, 2 * s, ring_pivots)
+        solve_rows(ring, ring_pivots, given)
+        for place in range(N):
+            for i in range(s):
+                for c in range(columns):
+                    value = z[place, i, c]
+                    for k in range(2 * s):
+                        value += z[place, i, columns + k] * given[k, c]
+                    x[place, node * s + i, c] = value
+
+
+@kernel(i8(vector, matrix, SYSTEM, f8, matrix))
+def march(t, y, s, T, z):
+    """Fill z (N, c) with the internal variables that repeat; c = n nodes times their number.
+
+    t (N,) are the times of the samples and y (N, d) the states, with the differences of the
+    displacements as velocities. Rounds begin without deflection; after two of them, Newton's method
+    finds the start that repeats. Returns 1 if every node has come to that, 0 if one has not.
+    """
+    t, y, s, z = borrowed(t), borrowed(y), borrowed(s), borrowed(z)
+    N, n = len(t), len(s.Tx)
+    states = s.memory.max()
+    length, width = force_room(states, in_space(s))
+    force, rates = np.empty(length), np.empty((states, width))
+    rate, leak = N / T, LEAK / T
+    path, turned = np.empty((N, states)), np.empty((N, states, 2 * states))
+    z[:, :] = 0.0
+    done = 1
+    for j in range(n):
+        k = s.memory[j]
+        if k == 0:
+            continue
+        a, pivots = np.empty((k, k)), np.empty(k, dtype=np.int64)
+        ring, ring_pivots = np.empty((2 * k, 2 * k)), np.empty(2 * k, dtype=np.int64)
+        start, off, step = np.zeros(2 * k), np.empty(2 * k), np.empty(k)
+        repeats = False
+        for turn in range(_ROUNDS):
+            largest = 0.0
+            for place in range(N):
+                motion, moved = node_motion(j, y[place], s), ground_motion(t[place], s)
+                here = path[place, :k]
+                for i in range(k):
+                    here[i] = path[place - 1, i] if place > 0 else start[i]
+                for _ in range(_STEPS):
+                    node_forces(j, motion, moved, here, s, force, rates)
+                    for i in range(k):
+                        one = path[place - 1, i] if place > 0 else start[i]
+                        two = (path[place - 2, i] if place > 1 else
+                               start[i] if place == 1 else start[k + i])
+                        step[i] = (rates[i, 0] - leak * here[i]
+                                   - rate * (1.5 * here[i] - 2.0 * one + 0.5 * two))
+                        for c in range(k):
+                            a[i, c] = -rates[i, 3 + c]
+                        a[i, i] += 1.5 * rate + leak
+                    factorise(a, k, pivots)
+                    solve(a, pivots, step)
+                    change, size = 0.0, 0.0
+                    for i in range(k):
+                        here[i] += step[i]
+                        change, size = max(change, abs(step[i])), max(size, abs(here[i]))
+                    largest = max(largest, size)
+                    if not change > _SOLVED * largest:
+                        break
+                for i in range(k):
+                    for c in range(2 * k):
+                        one = turned[place - 1, i, c] if place > 0 else (1.0 if c == i else 0.0)
+                        two = turned[place - 2, i, c] if place > 1 else (
+                            (1.0 if c == i else 0.0) if place == 1 else
+                            (1.0 if c == k + i else 0.0))
+                        turned[place, i, c] = rate * (2.0 * one - 0.5 * two)
+                solve_rows(a, pivots, turned[place, :k, : 2 * k])
+            gap = 0.0
+            for i in range(k):
+                for last in range(2):
+                    row = last * k + i
+                    off[row] = path[N - 1 - last, i] - start[row]
+                    gap = max(gap, abs(off[row]))
+                    for c in range(2 * k):
+                        ring[row, c] = (1.0 if c == row else 0.0) - turned[N - 1 - last, i, c]
+            repeats = gap <= _REPEATS * largest
+            if repeats:
+                break
+            if turn > 0:
+                factorise(ring, 2 * k, ring_pivots)
+                solve(ring, ring_pivots, off)
+            for i in range(2 * k):
+                start[i] += off[i]
+        if not repeats:
+            done = 0
+        for place in range(N):
+            for i in range(k):
+                z[place, j * states + i] = path[place, i]
+    return done

@@ -1,0 +1,74 @@
+"""Options of harmonic balance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecontact.core.errors import InputError, require_positive
+
+_STABILITY = ("transitions", "Koopman-Hill")
+# Samples per harmonic, and at least.
+_PER_HARMONIC, _LEAST = 8, 32
+# Largest number of harmonics or samples.
+_MOST = 100_000
+
+
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """Truncated Fourier series, their forces by alternating frequency and time, for any field.
+
+    Suited to smooth vibration with few harmonics, and to systems with many modes: of contact
+    systems only displacements are unknown, 2 H + 1 numbers a mode, and internal variables of
+    friction at the samples, which are eliminated node by node. Points store 'truncation_error'
+    (harmonics that are neglected, relative to the orbit) and 'residual' (of the equations in time,
+    relative to the rates).
+
+    Parameters
+    ----------
+    harmonics : int
+        H, at least 1: harmonics of the period of the orbit.
+    samples : int, optional
+        N, at least 2 H + 2, samples a period; by default 8 H, at least 32. Kinks of laws need more;
+        products of three harmonics are exact above 4 H.
+    tolerance : float, optional
+        Largest truncation error allowed on a branch: it is followed again with more harmonics, by
+        half each time, until it is met, up to ``most_harmonics``.
+    most_harmonics : int
+        Limit for that.
+    stability : 'transitions' or 'Koopman-Hill'
+        How Floquet multipliers are found: from the linearised equations along the orbit, or by the
+        projection of Bayer and Leine with 2 H harmonics, which suits smooth systems of few states.
+
+    Raises
+    ------
+    InputError
+        If these cannot be used.
+    """
+
+    harmonics: int = 9
+    samples: int | None = None
+    tolerance: float | None = None
+    most_harmonics: int = 100
+    stability: str = "transitions"
+
+    def __post_init__(self) -> None:
+        for name in ("harmonics", "most_harmonics"):
+            value = getattr(self, name)
+            if not (isinstance(value, int | np.integer) and 1 <= value <= _MOST):
+                raise InputError(f"HarmonicBalance: {name} = {value!r} must be a whole number from "
+                                 f"1 to {_MOST}.")
+        least = 2 * self.harmonics + 2
+        if self.samples is not None and not (isinstance(self.samples, int | np.integer)
+                                             and least <= self.samples <= _MOST):
+            raise InputError(f"HarmonicBalance: samples = {self.samples!r} must be a whole number "
+                             f"from {least}, twice the harmonics and two, to {_MOST}.")
+        if self.tolerance is not None:
+            require_positive("HarmonicBalance", tolerance=self.tolerance)
+        if self.stability not in _STABILITY:
+            raise InputError(f"HarmonicBalance: stability = {self.stability!r} must be "
+                             f"'transitions' or 'Koopman-Hill'.")
+
+    @property
+    def count(self) -> int:
+        """Number N of samples."""
+        return int(self.samples or max(_LEAST, _PER_HARMONIC * self.harmonics))

@@ -1,0 +1,375 @@
+"""Nonlinear frequency responses: branches of forced orbits at several levels."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    options_of,
+    width_of,
+)
+from fecontact.bifurcation.continuation.pseudo_arclength import inside
+from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic import branches, starts
+from fecontact.bifurcation.harmonic.layout import all_coefficients, layout_from
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem, peaks
+from fecontact.bifurcation.harmonic.series import uniform_basis
+from fecontact.bifurcation.orbits.from_run import periodic_motion
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.types import Array, ArrayLike, ComplexArray
+from fecontact.core.units import Summarised, listed, span
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.statics import equilibrium
+
+# Samples a period of what is observed, and harmonics of it that are stored.
+_SAMPLES, _HARMONICS = 512, 15
+# Points of a branch at most, and largest step, unless options say so.
+_POINTS, _LARGEST = 2000, 0.03
+_FREQUENCY = "drive.angular_frequency"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrequencyResponse(Summarised):
+    """Responses over a frequency, or another parameter, one branch for each level.
+
+    Points of the branches store 'observed_amplitude', 'observed_minimum', 'observed_maximum' and
+    'observed_harmonics' (16,) of the observed quantity, in its unit: complex X_k, k = 0..15, with
+    x(t) = sum_k Re(X_k exp(i k w t)), w = 2 pi / period.
+
+    Attributes
+    ----------
+    branches : tuple of Branch
+        One for each level.
+    level_name : str or None
+        Name of the parameter that differs between them.
+    levels : (k,) array
+        Its values; one that is not a number without such a parameter.
+    observed : str
+        What is observed, such as 'B x'.
+    """
+
+    branches: tuple[Branch, ...]
+    level_name: str | None
+    levels: Array
+    observed: str
+
+    def __post_init__(self) -> None:
+        if len(self.branches) != len(self.levels) or not self.branches:
+            raise InputError(f"FrequencyResponse: {len(self.branches)} branches do not go with "
+                             f"{len(self.levels)} levels; each level has one.")
+
+    @property
+    def parameter_name(self) -> str:
+        """Name of the parameter over which the branches run."""
+        return self.branches[0].parameter_name
+
+    def amplitude(self, level: int = 0) -> Array:
+        """Half the range (N,) of the observed quantity at the points of a branch."""
+        return np.asarray(self.branches[level].column("observed_amplitude"))
+
+    def harmonic(self, k: int = 1, level: int = 0) -> ComplexArray:
+        """Complex amplitude (N,) of harmonic k of the excitation, x_k = Re(X_k exp(i k w t))."""
+        branch = self.branches[level]
+        return np.asarray(branch.column("observed_harmonics")[
+            :, k * int(branch.attributes["periods"])])
+
+    def phase(self, level: int = 0) -> Array:
+        """Phase (N,) [rad], x_1 = |X_1| sin(w t + phase), continuous along the branch.
+
+        It begins within -pi to pi: a drive or load A sin w t leads below resonance to about zero,
+        far above to -pi.
+        """
+        return np.unwrap(np.angle(1j * self.harmonic(1, level)))
+
+    def peak(self, level: int = 0) -> BranchPoint:
+        """The regular or special point of largest amplitude of a branch."""
+        return self.branches[level].points[int(np.argmax(self.amplitude(level)))]
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Parameter, levels, special points of each branch, and how branches ended."""
+        special = [f"{point.kind} at {point.parameter:.5g}" for branch in self.branches
+                   for point in branch.special]
+        ends = dict.fromkeys(branch.status.name.lower() for branch in self.branches)
+        ranges = np.concatenate([branch.parameter for branch in self.branches])
+        return [("parameter", self.parameter_name), ("range", span(ranges)),
+                *([(self.level_name, listed([f"{level:.5g}" for level in self.levels], 6))]
+                  if self.level_name else []),
+                ("observed", self.observed),
+                ("points", listed([str(len(branch)) for branch in self.branches], 6)),
+                ("special", listed(special, 5)), ("ends", ", ".join(ends))]
+
+
+def frequency_response(
+    system: ContactSystem | VectorField, bounds: tuple[float, float],
+    parameter: str | None = None, *, levels: Mapping[str, ArrayLike] | None = None,
+    observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
+    method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
+    start: float | None = None,
+) -> FrequencyResponse:
+    """Nonlinear frequency responses by harmonic balance, with stability and special points.
+
+    A branch starts at one end from rest: the first step of Newton's method is the linear response.
+    Where that does not converge, the level is raised to its value along a branch, the other end is
+    tried, and last the motion to which a run settles. Folds are followed around.
+
+    Parameters
+    ----------
+    system : ContactSystem or VectorField
+        Excited with a common period.
+    bounds : (float, float)
+        Range of the parameter [rad/s for a frequency].
+    parameter : str, optional
+        Dotted name, by default 'drive.angular_frequency'; the only parameter of a vector field. Any
+        other gives responses over it, such as the amplitude of a force.
+    levels : mapping of one name, optional
+        Another parameter and its values, a branch for each: ``{"drive.amplitude_x": [1.0, 2.0]}``.
+    observe : (point, component) or (d,) sequence
+        Displacement that is observed; a row of the states of a vector field, by default its first.
+    method : HarmonicBalance, optional
+        Harmonics, samples, tolerance.
+    options : ContinuationOptions, optional
+        Steps, tolerances; by default up to 2000 points, largest_step 0.03.
+    start : float, optional
+        Where branches start, by default the lower end; inside, they are followed both ways.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        For a parameter or point that does not exist, no excitation with a period, or a level at
+        which no orbit is found to start from.
+    """
+    require_kind("frequency_response", (ContactSystem, VectorField), system=system)
+    require_kind("frequency_response", (HarmonicBalance, type(None)), method=method)
+    chosen = options_of(
+        options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
+    level_name, values = _levels(levels)
+    if isinstance(system, ContactSystem):
+        name = parameter or _FREQUENCY
+        names = dict.fromkeys([name] + ([level_name] if level_name else []))
+        field: VectorField = contact_field(system, names)
+    else:
+        field, name = system, system.parameter_or_only(parameter)
+    row, observed = _observed(field, observe)
+    low, high = chosen.bounds
+    first = inside(low if start is None else float(start), chosen)
+    found = []
+    for value in values:
+        given = field.values if level_name is None else field.values_with(**{level_name: value})
+        branch = _branch(field, given, field.index(name), level_name, first,
+                         method or HarmonicBalance(), chosen, both=low < first < high)
+        found.append(_with_observed(branch, row, observed, level_name, float(value)))
+        if branch.status is BranchStatus.INTERRUPTED:
+            break
+    return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
+
+
+def _levels(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array]:
+    if levels is None:
+        return None, np.array([np.nan])
+    require_kind("frequency_response", Mapping, levels=levels)
+    if len(levels) != 1:
+        raise InputError(f"levels has {len(levels)} names; give one parameter with its values, "
+                         f"such as {{'drive.amplitude_x': [1e-3, 2e-3]}}.")
+    (name, given), = levels.items()
+    values = np.atleast_1d(as_floats(given, f"levels: {name}"))
+    if values.ndim != 1 or not len(values):
+        raise InputError(f"levels: {name} must be one or several numbers.")
+    return name, values
+
+
+def _observed(
+    field: VectorField, observe: tuple[str | int, str] | ArrayLike
+) -> tuple[Array, str]:
+    """Row (d,) of the observed quantity, and its name."""
+    if isinstance(field, ContactField):
+        if not (isinstance(observe, Sequence) and len(observe) == 2
+                and isinstance(observe[1], str)):
+            raise InputError(f"observe = {observe!r} must be a point and a component, such as "
+                             f"('B', 'x').")
+        point, component = observe[0], observe[1]
+        return field.displacement_row(point, component), f"{point} {component}"
+    if isinstance(observe, tuple) and observe == ("B", "x"):
+        return np.eye(field.dimension)[0], field.state_names[0]
+    row = as_floats(observe, "observe")
+    if row.shape != (field.dimension,):
+        raise InputError(f"observe must hold {field.dimension} numbers, one for each state.")
+    states = np.flatnonzero(row)
+    return row, field.state_names[states[0]] if len(states) == 1 else "observed"
+
+
+def _branch(
+    field: VectorField, values: Array, free: int, level_name: str | None, first: float,
+    method: HarmonicBalance, options: ContinuationOptions, both: bool,
+) -> Branch:
+    """The branch at one level."""
+    ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
+    told: FecontactError = AnalysisError("No orbit was found to start from.")
+    for begin in ends:
+        values = values.copy()
+        values[free] = begin
+        attempts: list[Callable[[], tuple[HarmonicProblem, Array]]] = [
+            lambda values=values: _from_rest(field, values, free, method, options)]  # type: ignore[misc]
+        if level_name is not None:
+            attempts.append(lambda values=values: _raised(  # type: ignore[misc]
+                field, values, free, field.index(level_name), method, options))
+        if isinstance(field, ContactField):
+            attempts.append(lambda values=values: _settled(  # type: ignore[misc]
+                field, values, free, method, options))
+        for attempt in attempts:
+            try:
+                problem, u = attempt()
+            except FecontactError as error:
+                told = error
+                continue
+            direction = 1.0 if begin < options.bounds[1] else -1.0
+            return branches.follow(problem, u, None, method, options, direction=direction,
+                                   both=both)
+    raise told
+
+
+def _problem(
+    field: VectorField, values: Array, free: int, method: HarmonicBalance,
+    options: ContinuationOptions, sizes: Array,
+) -> HarmonicProblem:
+    """The problem with scales (d,) of the states that grow with the response."""
+    period = field.forcing_period(values)
+    if period is None:
+        raise InputError("Nothing excites the system with a period; a frequency response needs a "
+                         "harmonic drive or load.")
+    name = list(field.parameters)[free]
+    width = width_of(None, options, float(values[free]))
+    problem = starts.problem_for(field, values, free, method,
+                                 np.concatenate([sizes, [period, width]]))
+    if not np.isfinite(period):
+        raise InputError(f"At {name} = {values[free]:g} the excitation has no period.")
+    return replace(problem, limits=1e4 * sizes)
+
+
+def _from_rest(
+    field: VectorField, values: Array, free: int, method: HarmonicBalance,
+    options: ContinuationOptions, initial: Array | None = None,
+) -> tuple[HarmonicProblem, Array]:
+    """The orbit that Newton's method finds from rest, and scales of its size."""
+    state = np.zeros(field.dimension) if initial is None else initial
+    if isinstance(field, ContactField) and initial is None:
+        state = _rest(field, values)
+    problem = _problem(field, values, free, method, options, np.ones(field.dimension))
+    u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
+    return _scaled(*starts.corrected(problem, u))
+
+
+def _rest(field: ContactField, values: Array) -> Array:
+    """State (d,) of rest under the loads' means, of the normal problem alone."""
+    state = np.zeros(field.dimension)
+    try:
+        q = equilibrium(field.system(values), False, 0.0, standing=True)
+    except FecontactError:
+        return state
+    state[: len(q)] = q
+    return state
+
+
+def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
+    """The problem with scales of the size of an orbit."""
+    low, high = problem.extremes(u, problem.linearise(u).memory)
+    sizes = (high - low) / 2.0
+    largest = float(sizes.max()) or 1.0
+    sizes = np.maximum(sizes, 1e-3 * largest)
+    scales = np.concatenate([sizes, problem.scales[-2:]])
+    return replace(problem, scales=scales, limits=1e4 * sizes), u
+
+
+def _raised(
+    field: VectorField, values: Array, free: int, level: int, method: HarmonicBalance,
+    options: ContinuationOptions,
+) -> tuple[HarmonicProblem, Array]:
+    """The orbit at a level, along a branch from a thousandth of it."""
+    wanted = float(values[level])
+    low = values.copy()
+    low[level] = 1e-3 * wanted
+    bounds = (min(low[level], wanted), max(low[level], wanted))
+    plain = replace(method, tolerance=None)
+    problem, u = _from_rest(field, low, level, plain, replace(options, bounds=bounds))
+    branch = branches.follow(problem, u, None, plain, replace(
+        options, bounds=bounds, locate=False, progress=None), direction=np.sign(wanted))
+    last = branch.points[-1]
+    if last.parameter != wanted:
+        raise AnalysisError(f"No orbit was found at the level {wanted:g}: raised from a thousandth "
+                            f"of it, the branch ends at {last.parameter:.4g}.")
+    return _taken(field, values, free, method, options, last.orbit(samples=501).states)
+
+
+def _settled(
+    field: ContactField, values: Array, free: int, method: HarmonicBalance,
+    options: ContinuationOptions,
+) -> tuple[HarmonicProblem, Array]:
+    """The orbit to which a run settles."""
+    motion = periodic_motion(field.system(values), longest_period=field.forcing_period(values))
+    return _taken(field, values, free, method, options, motion.states)
+
+
+def _taken(
+    field: VectorField, values: Array, free: int, method: HarmonicBalance,
+    options: ContinuationOptions, states: Array,
+) -> tuple[HarmonicProblem, Array]:
+    """The orbit near states (k, d) over a period, both ends included."""
+    problem = _problem(field, values, free, method, options, np.ones(field.dimension))
+    phases = np.linspace(0.0, 1.0, len(states))
+    sampled = np.stack([np.interp(problem.series.times, phases, column) for column in states.T],
+                       axis=1)
+    return _scaled(*starts.corrected(problem, starts.unknowns(problem, sampled, 0.0)))
+
+
+def _with_observed(
+    branch: Branch, row: Array, observed: str, level_name: str | None, level: float
+) -> Branch:
+    """The branch with what is observed at its points, and its level as attributes."""
+    points = []
+    layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
+    if row[layout.states - layout.memory :].any():
+        raise InputError("Internal variables of friction cannot be observed; choose a displacement "
+                         "or a velocity.")
+    basis = uniform_basis(_SAMPLES, H)
+    for point in branch.points:
+        X = point.u[: (2 * H + 1) * layout.harmonic].reshape(-1, layout.harmonic)
+        whole = all_coefficients(layout, X, float(point.values["period"]))
+        observes = whole @ row[: whole.shape[1]]
+        low, high = (float(one[0]) for one in peaks((basis @ observes)[:, None]))
+        harmonics = np.zeros(max(H, _HARMONICS) + 1, dtype=complex)
+        harmonics[0] = observes[0]
+        harmonics[1 : H + 1] = observes[1::2] - 1j * observes[2::2]
+        points.append(replace(point, values={
+            **point.values, "observed_minimum": low, "observed_maximum": high,
+            "observed_amplitude": (high - low) / 2.0,
+            "observed_harmonics": harmonics[: _HARMONICS + 1]}))
+    attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
+                                  "level_name": level_name or ""}
+    return replace(branch, points=tuple(points), attributes=attributes)
+
+
+def response_of(branches_by_name: Mapping[str, Branch]) -> FrequencyResponse:
+    """A response from its branches, such as those of a file.
+
+    Raises
+    ------
+    InputError
+        If they are not those of a response.
+    """
+    found = list(branches_by_name.values())
+    if not found or not all("observed" in branch.attributes and "level" in branch.attributes
+                            for branch in found):
+        raise InputError("The branches are not those of a frequency response; make one with "
+                         "frequency_response.")
+    known = found[0].attributes
+    return FrequencyResponse(tuple(found), str(known["level_name"]) or None,
+                             np.array([float(branch.attributes["level"]) for branch in found]),
+                             str(known["observed"]))

@@ -1,0 +1,148 @@
+"""Truncated Fourier series on equidistant samples, and operators in their coefficients.
+
+A periodic function of tau in [0, 1] is x = X_0 + sum_k (A_k cos 2 pi k tau + B_k sin 2 pi k tau),
+k = 1..H. Its coefficients stand in the order X_0, A_1, B_1, A_2, B_2, ...
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import borrowed, f8, i8, kernel, matrix
+from fecontact.core.types import Array
+
+_blocks = types.Array(f8, 4, "C")
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Transforms between samples and coefficients.
+
+    Attributes
+    ----------
+    harmonics : int
+        H.
+    times : (N,) array
+        Equidistant samples of tau.
+    values : (N, 2 H + 1) array
+        From coefficients to samples.
+    projection : (2 H + 1, N) array
+        From samples to coefficients.
+    cosines, sines : (2 H + 1, N) arrays
+        2 / N cos 2 pi k tau and 2 / N sin 2 pi k tau, k = 0..2 H.
+    """
+
+    harmonics: int
+    times: Array
+    values: Array
+    projection: Array
+    cosines: Array
+    sines: Array
+
+
+@cache
+def series(harmonics: int, samples: int) -> Series:
+    """Transforms for H harmonics and N samples."""
+    times = np.arange(samples) / samples
+    values = basis_at(times, harmonics)
+    projection = 2.0 / samples * values.T
+    projection[0] *= 0.5
+    angles = 2.0 * np.pi * np.outer(np.arange(2 * harmonics + 1), times)
+    return Series(harmonics, times, values, np.ascontiguousarray(projection),
+                  2.0 / samples * np.cos(angles), 2.0 / samples * np.sin(angles))
+
+
+def basis_at(times: Array, harmonics: int) -> Array:
+    """From coefficients to values (k, 2 H + 1) at times tau (k,)."""
+    angles = 2.0 * np.pi * np.outer(times, np.arange(1, harmonics + 1))
+    values = np.ones((len(times), 2 * harmonics + 1))
+    values[:, 1::2], values[:, 2::2] = np.cos(angles), np.sin(angles)
+    return values
+
+
+@cache
+def uniform_basis(count: int, harmonics: int) -> Array:
+    """From coefficients to values (k, 2 H + 1) at equidistant times."""
+    return basis_at(np.arange(count) / count, harmonics)
+
+
+def differentiated(X: Array) -> Array:
+    """Coefficients (2 H + 1, b) of dx/dtau."""
+    out = np.zeros_like(X)
+    turns = 2.0 * np.pi * np.arange(1, len(X) // 2 + 1)[:, None]
+    np.multiply(turns, X[2::2], out=out[1::2])
+    np.multiply(-turns, X[1::2], out=out[2::2])
+    return out
+
+
+def shifted(X: Array, shift: float) -> Array:
+    """Coefficients (2 H + 1, b) of x(tau + shift)."""
+    angles = 2.0 * np.pi * shift * np.arange(1, len(X) // 2 + 1)[:, None]
+    c, s = np.cos(angles), np.sin(angles)
+    out = X.copy()
+    out[1::2] = c * X[1::2] + s * X[2::2]
+    out[2::2] = c * X[2::2] - s * X[1::2]
+    return out
+
+
+def with_harmonics(X: Array, harmonics: int) -> Array:
+    """Coefficients (2 H + 1, b) for another H, cut off or filled with zeros."""
+    out = np.zeros((2 * harmonics + 1, X.shape[1]))
+    kept = min(len(out), len(X))
+    out[:kept] = X[:kept]
+    return out
+
+
+@kernel(types.void(matrix, matrix, matrix, matrix, f8, i8, i8, _blocks))
+def fill_blocks(Cx, Sx, Cv, Sv, T, displacements, rows, out):
+    """Fill out (2 H + 1, b, 2 H + 1, b) with the derivatives of the balance to coefficients.
+
+    Cx, Sx (2 H + 1, b^2) are the cosine and sine coefficients k = 0..2 H, with the factor 2 / N for
+    k = 0 too, of the derivatives J of the rates to the unknown functions; Cv, Sv (2 H + 1, b m)
+    those to the velocities x' / T of the first m functions. The matrix is that of x'' / T^2 - f for
+    these m, and of x' / T - f for the others.
+    """
+    Cx, Sx, Cv, Sv, out = borrowed(Cx), borrowed(Sx), borrowed(Cv), borrowed(Sv), borrowed(out)
+    b, m = rows, displacements
+    H = len(out) // 2
+    for k in range(H + 1):
+        row_c, row_s = max(2 * k - 1, 0), 2 * k
+        half = 0.25 if k == 0 else 0.5
+        for q in range(H + 1):
+            col_c, col_s = max(2 * q - 1, 0), 2 * q
+            plus, minus = k + q, abs(k - q)
+            sign = 1.0 if k >= q else -1.0
+            turn = 2.0 * np.pi * q / T
+            for i in range(b):
+                for j in range(b):
+                    e = i * b + j
+                    cp, cm, sp, sm = Cx[plus, e], Cx[minus, e], Sx[plus, e], sign * Sx[minus, e]
+                    cc, cs = half * (cm + cp), half * (sp - sm)
+                    sc, ss = 0.5 * (sp + sm), 0.5 * (cm - cp)
+                    if j < m:
+                        e = i * m + j
+                        cp, cm, sp, sm = (Cv[plus, e], Cv[minus, e], Sv[plus, e],
+                                          sign * Sv[minus, e])
+                        cc -= turn * half * (sp - sm)
+                        cs += turn * half * (cm + cp)
+                        sc -= turn * 0.5 * (cm - cp)
+                        ss += turn * 0.5 * (sp + sm)
+                    out[row_c, i, col_c, j] = -cc
+                    if q > 0:
+                        out[row_c, i, col_s, j] = -cs
+                    if k > 0:
+                        out[row_s, i, col_c, j] = -sc
+                        if q > 0:
+                            out[row_s, i, col_s, j] = -ss
+        if k == 0:
+            continue
+        turn = 2.0 * np.pi * k / T
+        for i in range(b):
+            if i < m:
+                out[row_c, i, row_c, i] -= turn * turn
+                out[row_s, i, row_s, i] -= turn * turn
+            else:
+                out[row_c, i, row_s, i] += turn
+                out[row_s, i, row_c, i] -= turn

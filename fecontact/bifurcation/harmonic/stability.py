@@ -1,0 +1,113 @@
+"""Floquet multipliers of orbits by harmonic balance."""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from fecontact.bifurcation.harmonic.balance import Balance
+from fecontact.bifurcation.harmonic.layout import around
+from fecontact.bifurcation.harmonic.memory import LEAK
+from fecontact.bifurcation.harmonic.series import basis_at
+from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
+from fecontact.bifurcation.orbits.mesh import rule
+from fecontact.core.types import Array
+
+# Collocation of the linearised equations: degree, intervals per harmonic, at least, and samples for
+# each: who takes more samples, for kinks, gets more intervals too.
+_DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE = 4, 3, 20, 4
+
+
+@cache
+def _grid(intervals: int, radau: bool, harmonics: int) -> tuple[Array, Array]:
+    """Times tau of the collocation points, and the series there."""
+    tau = ((np.arange(intervals)[:, None] + _collocation(radau)[0]) / intervals).reshape(-1)
+    return tau, basis_at(tau, harmonics)
+
+
+@cache
+def _collocation(radau: bool) -> tuple[Array, Array, Array]:
+    """Points in (0, 1], and values and slopes there of polynomials through equal nodes."""
+    if not radau:
+        chosen = rule(_DEGREE)
+        return chosen.points, chosen.values, chosen.slopes
+    degree = 2
+    legendre = np.polynomial.legendre.Legendre
+    roots = (legendre.basis(degree) - legendre.basis(degree - 1)).roots()
+    points = np.sort((1.0 + np.real(roots)) / 2.0)
+    nodes = np.linspace(0.0, 1.0, degree + 1)
+    basis = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
+    basis = [p / p(node) for p, node in zip(basis, nodes, strict=True)]
+    return (points, np.array([[p(x) for p in basis] for x in points]),
+            np.array([[p.deriv()(x) for p in basis] for x in points]))
+
+
+def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
+    """Multipliers from the linearised equations about the orbit, x' = J(t) x.
+
+    They are solved by Gauss collocation of degree 4 on 3 H or N / 4 intervals; the multipliers are
+    as accurate as the orbit, so that one that should be one shows its error. With friction that
+    has memory, by Radau's of degree 2, which damps what is stiff, from sample to sample, with
+    internal variables z (N, c) linear between these: kinks leave errors of the order of 1 / N. An
+    element that never slides has the multiplier exp(-1e-6) of the leak that z is marched with.
+    """
+    T, values = problem.period(u), problem.parameters(u)
+    N, radau = max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE), False
+    if problem.layout.memory:
+        N, radau = problem.samples, True
+    points, basis, slopes = _collocation(radau)
+    widths = np.full(N, 1.0 / N)
+    tau, series = _grid(N, radau, problem.harmonics)
+    x = np.concatenate([series @ problem.whole(u, T), around(z, tau)], axis=1)
+    t = np.zeros(len(tau)) if problem.autonomous else tau * T
+    f, J, _ = problem.field.derivatives(t, x, values)
+    for k in range(problem.layout.states - problem.layout.memory, problem.layout.states):
+        J[:, k, k] -= LEAK / T
+    factors = condensation.factors_for(N, len(points), x.shape[1], 1)
+    condensation.condense(J, f, np.zeros((*f.shape, 1)), widths, T, basis, slopes, 0, factors)
+    return floquet_of(factors, problem.autonomous)
+
+
+def hill_matrix(J: Array, period: float, order: int) -> NDArray[np.complex128]:
+    """Hill's matrix ((2 K + 1) d, (2 K + 1) d), rows and columns k = -K..K, of x' = J(t) x.
+
+    Its blocks are J_(k - l) - i k w delta_kl with the Fourier coefficients of J, from equidistant
+    samples J (N, d, d) over one period.
+    """
+    N, d = len(J), J.shape[1]
+    spectrum = np.fft.fft(J, axis=0) / N
+    k = np.arange(-order, order + 1)
+    apart = k[:, None] - k[None, :]
+    blocks = np.where((np.abs(apart) <= (N - 1) // 2)[:, :, None, None], spectrum[apart % N], 0.0)
+    whole = np.ascontiguousarray(blocks.transpose(0, 2, 1, 3)).reshape(len(k) * d, len(k) * d)
+    turns = np.repeat(-2.0j * np.pi / period * k, d)
+    return np.asarray(whole + np.diag(turns))
+
+
+def koopman_hill(J: Array, period: float, order: int) -> NDArray[np.float64]:
+    """Monodromy matrix (d, d) of x' = J(t) x by the Koopman-Hill projection.
+
+    The functions z_k = exp(-i k w t) x obey z' = H z with Hill's matrix H, cut off at k = +-K; all
+    begin as x(0), and z_0(T) = x(T). So no exponents need to be sorted. The error falls
+    exponentially with K, beyond about |J| T times the highest harmonic of J.
+
+    References
+    ----------
+    F. Bayer, R. I. Leine, Sorting-free Hill-based stability analysis of periodic solutions through
+    Koopman analysis, Nonlinear Dynamics 111 (2023).
+    """
+    d = J.shape[1]
+    whole = expm(hill_matrix(J, period, order) * period)
+    middle = whole[order * d : (order + 1) * d].reshape(d, -1, d)
+    return np.asarray(middle.sum(axis=1).real)
+
+
+def by_hill(problem: Balance, u: Array, J: Array) -> Floquet:
+    """Multipliers by the Koopman-Hill projection with K = 2 H; J (N, d, d) at the samples."""
+    monodromy = koopman_hill(J, problem.period(u), 2 * problem.harmonics)
+    found = np.asarray(np.linalg.eigvals(monodromy), dtype=np.complex128)
+    found = found[np.argsort(-np.abs(found))]
+    trivial = int(np.argmin(np.abs(found - 1.0))) if problem.autonomous else None
+    return Floquet(found, trivial)

@@ -1,0 +1,209 @@
+"""Starts of branches of orbits by harmonic balance: motions, Hopf points, special points.
+
+A start is a problem, its unknowns u and the direction in which the branch leaves.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic.balance import turn_of
+from fecontact.bifurcation.harmonic.layout import layout_of
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.series import with_harmonics
+from fecontact.bifurcation.orbits import starts as orbit_starts
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array, ArrayLike
+
+Start = tuple[HarmonicProblem, Array, Array]
+
+_CORRECTIONS = 40
+# Mesh on which a motion is sampled before it becomes a series.
+_INTERVALS, _DEGREE = 200, 4
+
+
+def problem_for(
+    field: VectorField, values: Array, free: int, method: HarmonicBalance, scales: Array,
+    periods: int = 1,
+) -> HarmonicProblem:
+    """The problem of a field; ``scales`` (d + 2,) of states, period and parameter."""
+    layout = layout_of(field)
+    return HarmonicProblem(field, values.copy(), free, method.harmonics, method.count,
+                           np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout,
+                           periods, turn_of(field, values, free), method.stability)
+
+
+def unknowns(problem: HarmonicProblem, states: Array, period: float) -> Array:
+    """Unknowns u of states (N, d) at the samples of a period [s]."""
+    layout = problem.layout
+    X = problem.series.projection @ states[:, layout.columns]
+    return np.concatenate([X.reshape(-1), [period] if problem.autonomous else [],
+                           [problem.values[problem.free]]])
+
+
+def from_samples(
+    field: VectorField, values: Array, free: int, times: Array, states: Array,
+    period: float | None, method: HarmonicBalance, periods: int, scales: Array,
+) -> tuple[HarmonicProblem, Array]:
+    """Problem and first guess from a nearly periodic motion, as for collocation.
+
+    ``scales`` (d + 1,) are those of states and parameter.
+    """
+    found, nodes = orbit_starts.from_samples(field, values, free, times, states, period,
+                                             _INTERVALS, _DEGREE, periods, scales)
+    problem = problem_for(field, values, free, method, found.scales, periods)
+    sampled = orbit_starts.at_phase(found, nodes, problem.series.times)
+    u = unknowns(problem, sampled, found.period(nodes))
+    return replace(problem, reference=problem.coefficients(u).copy()), u
+
+
+def at_hopf(
+    field: VectorField, point: HopfPoint, method: HarmonicBalance, options: ContinuationOptions,
+    scales: ArrayLike | None, width: float | None,
+) -> Iterator[Start]:
+    """Starts at a Hopf point, x = state + eps Re(vector exp(i w t)), for several amplitudes eps."""
+    values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
+    state = np.ascontiguousarray(point.u[:-1])
+    sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
+    widths = np.concatenate([sizes, [point.period, width_of(width, options, point.parameter)]])
+    problem = replace(problem_for(field, values, free, method, widths), limits=limits)
+    waves = np.exp(2.0j * np.pi * problem.series.times)[:, None]
+    leaving = unknowns(problem, (waves * point.eigenvector).real, 0.0)
+    leaving[-2:] = 0.0
+    leaving /= np.sqrt(problem.weights() @ leaving**2)
+    u = unknowns(problem, np.tile(state, (problem.samples, 1)), point.period)
+    for amplitude in orbit_starts.AMPLITUDES:
+        reference = problem.coefficients(leaving).copy()
+        yield replace(problem, reference=reference), u + amplitude * leaving, leaving
+
+
+def restored(field: VectorField, point: BranchPoint) -> Start:
+    """Problem, unknowns and tangent of a point of a branch by harmonic balance.
+
+    Raises
+    ------
+    InputError
+        If the point is not such an orbit, or belongs to another field.
+    """
+    known = point.branch.attributes
+    if not point.by_harmonics:
+        raise InputError(f"{point.place} is no periodic orbit by harmonic balance.")
+    values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
+    method = HarmonicBalance(int(known["harmonics"]), int(known["samples"]),
+                             stability=str(known["stability"]))
+    problem = problem_for(field, values, free, method, np.asarray(known["scales"], dtype=float),
+                          int(known["periods"]))
+    if len(point.u) != problem.size + problem.common:
+        raise InputError(f"{point.place} has {len(point.u)} unknowns, which are not those of this "
+                         f"field.")
+    return (replace(problem, reference=problem.coefficients(point.u).copy(),
+                    limits=known.get("limits")), point.u, point.tangent)
+
+
+def corrected(
+    problem: HarmonicProblem, u: Array, tolerance: float = 1e-8
+) -> tuple[HarmonicProblem, Array]:
+    """The orbit near u at fixed parameter.
+
+    Raises
+    ------
+    AnalysisError
+        If Newton's method does not converge, or converges to an equilibrium.
+    """
+    row = np.zeros_like(u)
+    row[-1] = 1.0
+    name = list(problem.field.parameters)[problem.free]
+    where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
+    weights = problem.weights()
+
+    def motion(u: Array) -> float:
+        return float(np.abs(problem.coefficients(u)[1:]).max())
+
+    begin = motion(u)
+    linearised = problem.linearise(u)
+    norm = float(np.linalg.norm(linearised.residual))
+    for _ in range(_CORRECTIONS):
+        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        if not np.isfinite(step).all():
+            break
+        factor, size = 1.0, np.sqrt(weights @ step**2)
+        small = size < tolerance * (1.0 + np.sqrt(weights @ u**2))
+        while True:
+            try:
+                trial = problem.linearise(u + factor * step)
+                found = float(np.linalg.norm(trial.residual))
+            except AnalysisError:
+                found = np.inf
+            if found < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(found)):
+                break
+            factor /= 2.0
+            if factor < 1e-4:
+                raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does "
+                                    f"not converge (residual {norm:.3g}); start nearer to it, or "
+                                    f"take other than {problem.harmonics} harmonics.")
+        u, linearised, norm = u + factor * step, trial, found
+        if small:
+            if problem.autonomous and motion(u) <= 1e-4 * begin:
+                raise AnalysisError(f"No periodic orbit was found {where}: the iteration ends "
+                                    f"without any motion, as at an equilibrium; start from a "
+                                    f"motion of larger amplitude.")
+            return replace(problem, reference=problem.coefficients(u).copy()), u
+    raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does not converge "
+                        f"(residual {norm:.3g}); start nearer to it, or take other than "
+                        f"{problem.harmonics} harmonics.")
+
+
+def doubled(problem: HarmonicProblem, u: Array) -> Start:
+    """Start on the doubled orbits at a period doubling u, with twice the harmonics.
+
+    The direction is the null vector of the odd harmonics of the doubled period, which change sign
+    after one period.
+    """
+    X = problem.coefficients(u)
+    twice = np.zeros((4 * problem.harmonics + 1, X.shape[1]))
+    twice[0], twice[3::4], twice[4::4] = X[0], X[1::2], X[2::2]
+    common = u[-problem.common :].copy()
+    periods, scales = problem.periods, problem.scales.copy()
+    scales[-2] *= 2.0
+    if problem.autonomous:
+        common[0] *= 2.0
+    else:
+        periods *= 2
+    result = replace(problem, harmonics=2 * problem.harmonics, samples=2 * problem.samples,
+                     reference=twice, periods=periods, scales=scales, before=(), bend=None)
+    start = np.append(twice.reshape(-1), common)
+    odd = np.zeros(twice.shape, dtype=bool)
+    odd[1::4] = odd[2::4] = True
+    places = np.flatnonzero(odd.reshape(-1))
+    _, _, vectors = np.linalg.svd(result.linearise(start).condensed[np.ix_(places, places)])
+    leaving = np.zeros_like(start)
+    leaving[places] = vectors[-1]
+    return result, start, leaving
+
+
+def crossing(problem: HarmonicProblem, u: Array, incoming: Array) -> Start:
+    """Start on the other branch of orbits through a branch point u.
+
+    ``incoming`` is the direction of the first branch nearby.
+    """
+    row = problem.weights() * incoming
+    equations = problem.linearise(u).condensed
+    _, _, vectors = np.linalg.svd(equations / np.abs(equations).max(axis=1)[:, None])
+    first, second = vectors[-2:]
+    return problem, u, (row @ second) * first - (row @ first) * second
+
+
+def with_more(problem: HarmonicProblem, u: Array, method: HarmonicBalance) -> tuple[
+    HarmonicProblem, Array
+]:
+    """Problem and unknowns, or a tangent, with another number of harmonics and samples."""
+    X = with_harmonics(problem.coefficients(u), method.harmonics)
+    result = replace(problem, harmonics=method.harmonics, samples=method.count, reference=X,
+                     stability=method.stability, before=(), bend=None)
+    return result, np.append(X.reshape(-1), u[-problem.common :])

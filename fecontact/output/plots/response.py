@@ -1,0 +1,127 @@
+"""Nonlinear frequency responses: amplitude and phase at several levels."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic.response import FrequencyResponse
+from fecontact.core.checks import require_kind
+from fecontact.core.types import Array
+from fecontact.core.units import suitable_unit
+from fecontact.output.plots.bifurcation_diagram import SPECIAL, runs_of, stable_pieces
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.style import DASHES, distinct_colours
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def plot_response(
+    response: FrequencyResponse, *, logarithmic: bool = False, y_label: str | None = None,
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot a frequency response: amplitude and phase, a colour for each level.
+
+    Above half the range of the observed quantity, below the phase of its first harmonic against a
+    sine drive. Stable parts are solid, unstable ones dashed, special points marked. Angular
+    frequencies are shown in Hz.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+        What :func:`fecontact.bifurcation.frequency_response` found.
+    logarithmic : bool
+        Whether the amplitude has a logarithmic axis.
+    y_label : str, optional
+        Label of the amplitude with its unit, such as ``amplitude [m]``; ticks are in a unit that
+        suits the values.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_response", FrequencyResponse, response=response)
+    label = parameter_label(response.parameter_name)
+    factor = 1.0
+    if label.endswith("[rad/s]"):
+        factor, label = 2.0 * np.pi, label.replace("angular ", "").replace("[rad/s]", "[Hz]")
+    with new_figure(9.0, 6.4, path) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+        marked: dict[str, None] = {}
+        dashed = False
+        colours = distinct_colours(len(response.branches))
+        for level, (branch, colour) in enumerate(zip(response.branches, colours, strict=True)):
+            x, stable = branch.parameter / factor, stable_pieces(branch)
+            dashed |= not stable.all()
+            curves = (response.amplitude(level), np.degrees(response.phase(level)))
+            for panel, curve in zip((upper, lower), curves, strict=True):
+                for first, last in runs_of(stable):
+                    panel.plot(x[first : last + 1], curve[first : last + 1], color=colour,
+                               linewidth=1.8 if stable[first] else 1.2,
+                               linestyle="-" if stable[first] else DASHES)
+            for place, point in enumerate(branch.points):
+                if point.kind is not None:
+                    marked.setdefault(point.kind)
+                    upper.plot(x[place], curves[0][place], SPECIAL.get(point.kind, ("", "."))[1],
+                               color="#303030", markerfacecolor="white", markersize=6.0, zorder=4)
+        if logarithmic:
+            upper.set_yscale("log")
+        else:
+            upper.set_ylim(bottom=0.0)
+        name_axis(upper, "y", y_label or _amplitude_label(response), _range(response))
+        lower.set_ylabel("phase [°]")
+        lower.set_yticks(_degrees(lower.get_ylim()))
+        name_axis(lower, "x", label, np.array(lower.dataLim.intervalx))
+        upper.margins(x=0.02)
+        _legend(upper, response, colours, list(marked), dashed)
+    return figure
+
+
+def _amplitude_label(response: FrequencyResponse) -> str:
+    """Displacements of contact systems are lengths; states of a vector field have no unit."""
+    names = response.observed.split()
+    if len(names) == 2:
+        unit = "rad" if names[1].startswith("phi") else "m"
+        return f"amplitude of {response.observed} [{unit}]"
+    return f"amplitude of {response.observed}"
+
+
+def _range(response: FrequencyResponse) -> Array:
+    return np.concatenate([response.amplitude(level) for level in range(len(response.branches))])
+
+
+def _degrees(limits: tuple[float, float]) -> Array:
+    step = 45.0 if limits[1] - limits[0] < 300.0 else 90.0
+    return np.arange(np.ceil(limits[0] / step), np.floor(limits[1] / step) + 1.0) * step
+
+
+def _legend(
+    axis: Any, response: FrequencyResponse, colours: list[str], kinds: list[str], dashed: bool
+) -> None:
+    from matplotlib.lines import Line2D
+
+    handles: list[Any] = []
+    if response.level_name:
+        label = parameter_label(response.level_name)
+        name, _, unit = label.rpartition(" [")
+        unit = unit.removesuffix("]") if name else ""
+        factor, symbol = (suitable_unit(float(np.abs(response.levels).max()), unit) if unit
+                          else (1.0, ""))
+        handles.append(Line2D([], [], linestyle="none", label=name or label))
+        handles += [Line2D([], [], color=colour, linewidth=1.8,
+                           label=f"{level / factor:.4g} {symbol}".strip())
+                    for level, colour in zip(response.levels, colours, strict=True)]
+    if dashed:
+        handles += [Line2D([], [], color="#303030", linewidth=1.8, label="stable"),
+                    Line2D([], [], color="#303030", linewidth=1.2, linestyle=DASHES,
+                           label="unstable")]
+    handles += [Line2D([], [], color="#303030", marker=SPECIAL.get(kind, ("", "."))[1],
+                       markerfacecolor="white", linestyle="none", markersize=6.0, label=kind)
+                for kind in kinds]
+    if handles:
+        axis.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0))

@@ -1,0 +1,142 @@
+"""Frequency responses at several levels: closed forms, starts, files and pictures."""
+
+import numpy as np
+import pytest
+from oscillators import duffing, jenkins_amplitude, jenkins_system, unilateral
+from systems import impact_oscillator
+
+from fecontact import io, plot, simulate
+from fecontact.bifurcation import (
+    Collocation,
+    ContinuationOptions,
+    HarmonicBalance,
+    contact_field,
+    frequency_response,
+    orbit_branch,
+)
+from fecontact.core.errors import AnalysisError, InputError
+
+
+@pytest.fixture(scope="module")
+def response():
+    return frequency_response(duffing(), (0.6, 1.8), "W", levels={"P": [0.02, 0.1, 0.18]})
+
+
+def test_levels_of_the_duffing_oscillator(response):
+    assert response.levels == pytest.approx([0.02, 0.1, 0.18])
+    assert [[point.kind for point in branch.special] for branch in response.branches] == [
+        [], ["fold", "fold"], ["fold", "fold"]]
+    lower = response.branches[2].of_kind("fold")[1]
+    assert lower.parameter == pytest.approx(1.11570025, abs=1e-8)
+    assert response.peak(2).parameter == pytest.approx(1.2696, abs=2e-3)
+    for branch, level in zip(response.branches, response.levels, strict=True):
+        assert branch.points[0].parameter == 0.6
+        assert branch.points[-1].parameter == 1.8
+        p = branch.attributes["parameter_values"]
+        assert p[1] == level
+
+
+def test_one_harmonic_meets_the_cubic_equation_of_its_amplitude():
+    """[(1 - W^2) A + 3/4 .1 A^3]^2 + (.05 W A)^2 = P^2 along the whole branch, phase included."""
+    found = frequency_response(duffing(), (0.6, 1.8), "W", method=HarmonicBalance(1))
+    W, A = found.branches[0].parameter, np.abs(found.harmonic(1))
+    elastic, damped = (1.0 - W**2) * A + 0.075 * A**3, 0.05 * W * A
+    assert np.hypot(elastic, damped) == pytest.approx(0.18, rel=1e-5)
+    # The force is a cosine, a quarter of a period ahead of a sine.
+    lag = np.angle(found.harmonic(1))
+    assert np.cos(lag) == pytest.approx(elastic / 0.18, abs=1e-5)
+    assert np.sin(lag) == pytest.approx(-damped / 0.18, abs=1e-5)
+    assert found.phase()[0] == pytest.approx(np.pi / 2.0, abs=0.1)
+    assert found.phase()[-1] == pytest.approx(-np.pi / 2.0, abs=0.1)
+    assert (np.diff(found.phase()) < 1e-6).all()
+
+
+def test_one_harmonic_of_a_jenkins_element_over_frequency_and_force():
+    system = jenkins_system(relaxation=1e-6)
+    method, coarse = HarmonicBalance(1, samples=256), ContinuationOptions(largest_step=0.2)
+    found = frequency_response(system, (1.1, 1.3), levels={"drive.amplitude_x": [1.0, 1.5]},
+                               method=method, options=coarse)
+    for level, force in enumerate((1.0, 1.5)):
+        branch = found.branches[level]
+        exact = [jenkins_amplitude(w, force) for w in branch.parameter]
+        assert np.abs(found.harmonic(1, level)) == pytest.approx(exact, rel=1e-3)
+        assert branch.column("stable").all()
+    over = frequency_response(system.with_(**{"drive.angular_frequency": 1.1}), (0.7, 2.0),
+                              "drive.amplitude_x", method=method, options=coarse)
+    exact = [jenkins_amplitude(1.1, force) for force in over.branches[0].parameter]
+    assert np.abs(over.harmonic(1)) == pytest.approx(exact, rel=1e-3)
+
+
+def test_small_forces_give_the_linear_response():
+    """At an amplitude at which nothing slides: 1 / (1.5 - w^2 + .02 i w) times the force."""
+    system = jenkins_system(amplitude=1e-3)
+    found = frequency_response(system, (0.5, 1.0), method=HarmonicBalance(3, 256),
+                               options=ContinuationOptions(largest_step=0.2))
+    w = found.branches[0].parameter
+    linear = 1e-3 / (1.5 - w**2 + 0.02j * w)
+    assert 1j * found.harmonic(1) == pytest.approx(linear, rel=1e-5)
+
+
+def test_unilateral_response_agrees_with_collocation_and_a_run():
+    field = unilateral()
+    system = field.system()
+    found = frequency_response(system, (0.85, 0.95), observe=("B", "y"),
+                               method=HarmonicBalance(30, 512),
+                               options=ContinuationOptions(largest_step=0.2))
+    branch = found.branches[0]
+    here = branch.at(field, 0.9)
+    other = orbit_branch(field, here.orbit(field), method=Collocation(150), bounds=(0.9, 0.91),
+                         options=ContinuationOptions(points=1)).points[0]
+    assert here.values["minimum"] == pytest.approx(other.values["minimum"], rel=5e-4)
+    assert here.values["maximum"] == pytest.approx(other.values["maximum"], rel=5e-4)
+    assert here.values["stable"]
+    T = 2.0 * np.pi / 0.9
+    moved = system.with_(**{"drive.angular_frequency": 0.9})
+    # A multiplier of -0.93 makes runs settle slowly: start on the orbit.
+    start = here.orbit().states[0]
+    run = simulate(moved, T, initial=start, rtol=1e-9, outputs=2001).states
+    assert run[-1] == pytest.approx(start, abs=2e-3)
+    assert here.values["maximum"][0] == pytest.approx(run[:, 0].max(), rel=1e-3)
+    assert here.values["minimum"][0] == pytest.approx(run[:, 0].min(), rel=1e-3)
+
+
+def test_files_give_back_what_was_written(response, tmp_path):
+    again = io.read_response(io.write_response(tmp_path / "response.h5", response))
+    assert again.level_name == "P"
+    assert again.levels == pytest.approx(response.levels)
+    assert again.observed == response.observed
+    for level in range(3):
+        assert again.amplitude(level) == pytest.approx(response.amplitude(level), rel=1e-15)
+        assert again.harmonic(3, level) == pytest.approx(response.harmonic(3, level), rel=1e-15)
+    assert repr(again) == repr(response)
+    io.write_branch(tmp_path / "branch.h5", response.branches[0])
+    with pytest.raises(InputError):
+        io.read_response(tmp_path / "branch.h5")
+
+
+def test_picture_has_stable_and_unstable_parts_of_each_level(response, tmp_path):
+    figure = plot.plot_response(response, path=tmp_path / "response.png")
+    upper, lower = figure.axes
+    styles = {line.get_linestyle() for line in upper.lines}
+    assert {"-", "--"} <= styles
+    assert len({line.get_color() for line in lower.lines}) == 3
+    assert (tmp_path / "response.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(("changes", "told"), [
+    ({"levels": {"P": [1.0], "W": [1.0]}}, "levels has 2 names"),
+    ({"levels": {"Q": [1.0]}}, "Q"),
+    ({"observe": [1.0]}, "observe must hold 2 numbers"),
+    ({"parameter": "X"}, "X"),
+    ({"start": 5.0}, "outside the bounds")])
+def test_bad_arguments(changes, told):
+    given = {"parameter": "W", **changes}
+    with pytest.raises(InputError, match=told):
+        frequency_response(duffing(), (0.6, 1.8), **given)
+
+
+def test_system_without_excitation_is_refused():
+    system = impact_oscillator().with_(**{"drive.amplitude_y": 0.0})
+    with pytest.raises((InputError, AnalysisError), match=r"excite|period"):
+        frequency_response(system, (60.0, 70.0), observe=("B", "y"))
+    assert contact_field(impact_oscillator(), ["drive.angular_frequency"]).dimension == 4
