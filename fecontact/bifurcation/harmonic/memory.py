@@ -14,7 +14,8 @@ of these equations, cyclic and node by node.
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, borrowed, f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, i8, kernel, matrix, vector
+from fecontact.core.references import borrowed
 from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.types import Array
 from fecontact.system.kernels import node_forces

@@ -10,7 +10,8 @@ from functools import cache
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import borrowed, f8, i8, kernel, matrix
+from fecontact.core.compiled import f8, i8, kernel, matrix
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 _blocks = types.Array(f8, 4, "C")
