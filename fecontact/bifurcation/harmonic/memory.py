@@ -15,8 +15,8 @@ import numpy as np
 from numba import types
 
 from fecontact.core.compiled import block, f8, i8, kernel, matrix, vector
-from fecontact.core.references import borrowed
 from fecontact.core.dense_lu import factorise, solve, solve_rows
+from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import SYSTEM, force_room, ground_motion, in_space, node_motion

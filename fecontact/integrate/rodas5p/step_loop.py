@@ -5,7 +5,8 @@ from numba import types
 
 from fecontact.core.compiled import helper, i8, kernel, routine
 from fecontact.core.references import borrowed
-from fecontact.integrate.courses import doubtful, keep_ends, restless, set_courses, set_ends
+from fecontact.integrate.course_bounds import doubtful, restless
+from fecontact.integrate.courses import keep_ends, set_courses, set_ends
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
     set_scale,

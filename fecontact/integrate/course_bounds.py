@@ -1,0 +1,193 @@
+"""Bounds on the course of a step, which tell that no contact can have changed within it.
+
+Most steps need no such search: a mode deviates from the straight line between its ends by at most
+the deviation of its coefficients from that line, and a node by at most the sum over the modes. For
+few nodes on flat ground it is cheaper to evaluate the coefficients themselves.
+"""
+
+from fecontact.core.compiled import helper, routine
+from fecontact.integrate.courses import (
+    DOUBT,
+    FASTEST,
+    HIGHEST,
+    LOWEST,
+    QUICKEST,
+    STEEPEST,
+    set_heights,
+)
+from fecontact.integrate.rodas5p import dynamics as motion
+from fecontact.system.nodes import in_space, moved_along
+
+# Largest number of nodes that counts as few.
+_FEW = 4
+
+
+@routine
+def restless(moved, h, s, blocks, control, room):
+    """Whether :func:`doubtful` may be true.
+
+    ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
+    end; ``moved`` is its motion at the start.
+    """
+    if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
+        return _restless_nodes(moved, h, s, blocks, control, room)
+    return _restless_modes(moved, h, s, blocks, control, room)
+
+
+@helper
+def _range(first, last, k1, k2, k3):
+    """Smallest and largest coefficient of an interpolant, and whether they are monotonic."""
+    a, c = 0.75 * first + 0.25 * (last + k1), 0.25 * (first + k1 + k2 + k3) + 0.75 * last
+    b = 0.5 * (first + last) + k1 / 3.0 + k2 / 6.0
+    low, high = min(min(first, a), min(b, c)), max(max(first, a), max(b, c))
+    monotone = first <= a <= b <= c <= last or first >= a >= b >= c >= last
+    return min(low, last), max(high, last), monotone
+
+
+@helper
+def _restless_nodes(moved, h, s, blocks, control, room):
+    """As :func:`doubtful`, without slip velocities of nodes clear of the ground."""
+    levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
+    shapes = blocks.shapes
+    n, m = len(s.gap), len(control.largest)
+    some = False
+    for j in range(n):
+        spread = abs(s.sliding[j]) * control.ground[QUICKEST] * h
+        passing = moved_along(j, moved.speed, moved.second_speed, s)
+        k1, k2, k3, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for span in range(blocks.spans.shape[1]):
+            for i in range(blocks.spans[j, span, 0], blocks.spans[j, span, 1]):
+                along, away = shapes[i, j], shapes[i, n + j]
+                k1 += away * dense[0, i]
+                k2 += away * dense[1, i]
+                k3 += away * dense[2, i]
+                r1 += along * dense[0, m + i]
+                r2 += along * dense[1, m + i]
+                r3 += along * dense[2, m + i]
+        first, last = ends[0, n + j], nodes[0, n + j]
+        low, high, monotone = _range(first, last, k1, k2, k3)
+        touching = nodes[2, n + j] != 0.0
+        for level in range(levels.shape[0]):
+            shift = s.gap[j] + levels[level, j] - control.ground[HIGHEST]
+            felt = 2.0 * min(min(first, last) + shift, 0.0)
+            mixed = low + shift < 0.0 and high + shift > 0.0
+            some |= (mixed or low + shift < felt) and not monotone
+            touching |= low + shift < 0.0 or level > 0
+        if in_space(s):
+            continue
+        first, last = ends[1, j] - passing, nodes[1, j] - passing
+        low, high, monotone = _range(first, last, r1, r2, r3)
+        largest = max(-low, high) + spread
+        mixed = low < spread and high > -spread and largest > control.slip_scale[j]
+        felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j]) + spread
+        some |= touching and (mixed or largest > felt) and not (monotone and spread == 0.0)
+    return some
+
+
+@helper
+def _restless_modes(moved, h, s, blocks, control, room):
+    """The same for many nodes, from the modes only."""
+    bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
+                                          room.dense)
+    n, m = len(s.gap), len(control.largest)
+    # Sums over the modes before each one.
+    moves, speeds = room.inner[0], room.inner[1]
+    moves[0], speeds[0] = 0.0, 0.0
+    for i in range(m):
+        largest = control.largest[i]
+        moves[i + 1] = moves[i] + largest * _departure(dense[0, i], dense[1, i], dense[2, i])
+        speeds[i + 1] = speeds[i] + largest * _departure(
+            dense[0, m + i], dense[1, m + i], dense[2, m + i])
+    wavy = bounds[STEEPEST] != 0.0
+    if wavy:
+        set_heights(motion.motion_given(room.given), s, bounds, nodes[0], ends[2, n : 2 * n])
+    later = room.given[motion.SPEED]
+    some = False
+    for j in range(n):
+        move, quicken = 0.0, 0.0
+        for span in range(blocks.spans.shape[1]):
+            first_mode, last_mode = blocks.spans[j, span, 0], blocks.spans[j, span, 1]
+            move += moves[last_mode] - moves[first_mode]
+            quicken += speeds[last_mode] - speeds[first_mode]
+        reach = move
+        f, g = bounds[HIGHEST], bounds[HIGHEST]
+        if wavy:
+            f, g = ends[2, j], ends[2, n + j]
+            shift = abs(nodes[0, j] - ends[0, j]) + 2.0 * move
+            if in_space(s):
+                shift += abs(nodes[0, 2 * n + j] - ends[0, 2 * n + j]) + 2.0 * move
+            reach += 0.5 * bounds[STEEPEST] * (shift + bounds[FASTEST] * h)
+        touching = nodes[2, n + j] != 0.0
+        for level in range(levels.shape[0]):
+            shift = s.gap[j] + levels[level, j]
+            first, last = ends[0, n + j] + shift - f, nodes[0, n + j] + shift - g
+            low, high = min(first, last) - reach, max(first, last) + reach
+            some |= (low < 0.0 and high > 0.0) or low < 2.0 * min(min(first, last), 0.0)
+            touching |= low < 0.0 or level > 0
+        if in_space(s):
+            continue
+        factor = s.sliding[j]
+        first, last = ends[1, j] - factor * moved.speed, nodes[1, j] - factor * later
+        part = quicken + abs(factor) * bounds[QUICKEST] * h
+        low, high = min(first, last) - part, max(first, last) + part
+        largest = max(-low, high)
+        mixed = low < 0.0 and high > 0.0 and largest > control.slip_scale[j]
+        felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j])
+        some |= touching and (mixed or largest > felt)
+    return some
+
+
+@helper
+def _departure(k1, k2, k3):
+    """Bound on the distance of the interpolant from the straight line between its ends."""
+    return max(max(0.25 * abs(k1), abs(2.0 * k1 + k2) / 6.0), 0.25 * abs(k1 + k2 + k3))
+
+
+@routine
+def doubtful(moved, h, s, bounds, levels, slip_scale, room):
+    """Whether forces within the step may differ from what its ends suggest.
+
+    A gap or slip velocity may change sign more often than its end values show, a contact be twice
+    as deep in between, or slip begin and end. ``levels`` (k, n) are the penetrations at which
+    normal forces begin; ``moved`` is the motion of the ground. Row DOUBT of ``room.courses`` marks
+    the quantities concerned.
+    """
+    c = room.courses
+    n = levels.shape[1]
+    for j in range(n):
+        if in_space(s):
+            # Slip velocities turn there, and the error of a step sees it.
+            c[DOUBT, j], c[DOUBT, n + j] = 0.0, 0.0
+            continue
+        spread, v = abs(s.sliding[j]) * bounds[QUICKEST] * h, s.sliding[j] * moved.speed
+        low = min(min(min(c[0, j], c[1, j]), min(c[2, j], c[3, j])), c[4, j]) - v - spread
+        high = max(max(max(c[0, j], c[1, j]), max(c[2, j], c[3, j])), c[4, j]) - v + spread
+        largest = max(-low, high)
+        felt = 2.0 * max(max(abs(c[0, j] - v), abs(c[4, j] - v)), slip_scale[j])
+        mixed = low < 0.0 and high > 0.0 and largest > slip_scale[j]
+        c[DOUBT, j] = 1.0 if mixed or largest > felt + spread else 0.0
+        c[DOUBT, n + j] = 0.0
+    for level in range(levels.shape[0]):
+        for j in range(n):
+            k = n + j
+            low = min(min(min(c[0, k], c[1, k]), min(c[2, k], c[3, k])), c[4, k])
+            high = max(max(max(c[0, k], c[1, k]), max(c[2, k], c[3, k])), c[4, k])
+            top = levels[level, j] - bounds[HIGHEST]
+            bottom = levels[level, j] - bounds[LOWEST]
+            felt = 2.0 * min(min(c[0, k], c[4, k]) + bottom, 0.0)
+            mixed = low + top < 0.0 and high + bottom > 0.0
+            c[DOUBT, k] += 1.0 if mixed or low + top < felt else 0.0
+    some = 0.0
+    for j in range(2 * n):
+        some += c[DOUBT, j]
+    if some == 0.0:
+        return False
+    some = 0.0
+    for j in range(2 * n):
+        # A monotonic control polygon implies a monotonic curve.
+        if bounds[QUICKEST if j < n else STEEPEST] == 0.0 and (
+                (c[0, j] <= c[1, j] <= c[2, j] <= c[3, j] <= c[4, j])
+                or (c[0, j] >= c[1, j] >= c[2, j] >= c[3, j] >= c[4, j])):
+            c[DOUBT, j] = 0.0
+        some += c[DOUBT, j]
+    return some != 0.0
