@@ -43,13 +43,13 @@ from .reduction.reduce_body import modal_basis
 from .study.study import Study
 from .sweeps.sweep import sweep
 from .system.contact_system import ContactSystem
+from .system.equilibrium.static_solution import static_solution
+from .system.equilibrium.statics import static_equilibrium
 from .system.forcing_period import forcing_period
 from .system.gap import Crown
 from .system.interfaces import Interface
 from .system.quasistatic.loading import load_history
 from .system.quasistatic.path import LoadPath
-from .system.static_solution import static_solution
-from .system.statics import static_equilibrium
 
 __version__: str
 

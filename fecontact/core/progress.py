@@ -1,10 +1,12 @@
-"""Progress bars on a terminal or in a notebook.
+"""Progress bars on a terminal or in a notebook, and interruption by Ctrl-C.
 
 Public functions take ``progress``: True for a progress bar, or a callback. Internal functions take
 the callback alone and draw nothing.
 """
 
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -177,3 +179,27 @@ class _NotebookBar:
             self._handle = display(shapes, raw=True, display_id=True)
         else:
             self._handle.update(shapes, raw=True)
+
+
+@contextmanager
+def held_back_interrupt() -> Iterator[Callable[[], None]]:
+    """Yield a function that raises KeyboardInterrupt if Ctrl-C was pressed within the block.
+
+    For libraries that swallow exceptions raised in callbacks, or are left in an inconsistent state
+    by them. If Ctrl-C is ignored, it stays ignored.
+    """
+    came: list[int] = []
+
+    def check() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield check
+        return
+    signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -14,10 +14,10 @@ from fecontact.fem.faces.frames import turned
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.equilibrium.statics import equilibrium
 from fecontact.system.friction_memory import settled
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
-from fecontact.system.statics import equilibrium
 
 RigidMotion = (tuple[float, float, float]
                | tuple[float, float, float, float, float, float])

@@ -23,8 +23,8 @@ from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.equilibrium.statics import equilibrium
 from fecontact.system.forcing_period import forcing_period
-from fecontact.system.statics import equilibrium
 
 # Difference of depth along the face in one block, relative to the penetration, that is warned of.
 _UNEVEN = 0.5

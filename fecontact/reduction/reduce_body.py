@@ -66,11 +66,10 @@ def modal_basis(
     contact : str or sequence of str
         Boundary that touches the ground, facing -y, of solids -z; several interfaces; or none, ().
     contact_nodes : int or 'all', or one of them for each boundary
-        Number of equal segments of the boundary, each a contact node with the mean displacement;
-        'all' takes every displacement node. Of solids patches of about equal area, or every facet;
-        two numbers for one boundary are those along its first and second tangent.
+        Equal segments of a boundary, each a contact node with the mean displacement; 'all': every
+        displacement node. Of solids patches of about equal area, or (n, m) along both tangents.
     B, C : place, optional
-        Excitation and load point: the name of a point or boundary of the mesh, coordinates, or a
+        Excitation and load point: the name of a point or boundary, coordinates, or a
         :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.
     points : mapping of name to place, optional
         Further points to observe.
@@ -83,11 +82,11 @@ def modal_basis(
         For 'residual': largest fraction of its static compliance that may be missing at any of
         these points along an axis, or for one of the loads. Zero keeps all residual vectors.
     loads : sequence of 'gravity' or place
-        Adds static responses, if not for 'vibration': 'gravity', loads on boundaries, at points.
+        Adds static responses to gravity or loads at places, if not for 'vibration'.
     rotation : Rotation, optional
-        The plane body rotates; displacements are those in its frame, modes those at rest.
+        Of the plane body: displacements are those in its frame, modes those at rest.
     rows : sequence of sparse (k, d N) arrays
-        Further motions on which forces act; see :func:`fecontact.reduction.reduce_bodies`.
+        Further motions with forces; see :func:`fecontact.reduction.reduce_bodies`.
     eigensolver : 'auto', 'direct' or 'iterative'
         Of solids, see :func:`fecontact.reduction.eigenmodes.eigenmodes`.
 

@@ -238,8 +238,8 @@ def _simplified(J: Array, f: Array) -> float:
 
 def steady_sliding(field: ContactField, values: Array) -> Array:
     """State [q, 0, z] of steady sliding of a contact system, to start Newton's method."""
+    from fecontact.system.equilibrium.statics import equilibrium
     from fecontact.system.friction_memory import settled
-    from fecontact.system.statics import equilibrium
 
     system = field.system(values)
     state = np.zeros(field.dimension)

@@ -28,7 +28,7 @@ from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.statics import equilibrium
+from fecontact.system.equilibrium.statics import equilibrium
 
 # Samples a period of what is observed, and harmonics of it that are stored.
 _SAMPLES, _HARMONICS = 512, 15

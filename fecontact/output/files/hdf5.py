@@ -21,7 +21,7 @@ from fecontact.core.files.stored import (
     sound_sparse,
     values,
 )
-from fecontact.core.interrupts import held_back_interrupt
+from fecontact.core.progress import held_back_interrupt
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality

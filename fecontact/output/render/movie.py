@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import as_path, require_frame_rate
 from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.core.files.atomic_write import beside, put, replaced, unwritable
-from fecontact.core.interrupts import held_back_interrupt
-from fecontact.core.progress import counting_bar, shown
+from fecontact.core.progress import counting_bar, held_back_interrupt, shown
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.output.files.frames import frame_indices, require_field

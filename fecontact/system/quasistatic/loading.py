@@ -12,8 +12,9 @@ from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.types import Array
 from fecontact.core.units import count, listed
 from fecontact.laws.signals.harmonic import Constant
-from fecontact.system.balance import Balance
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.equilibrium.balance import Balance
+from fecontact.system.equilibrium.statics import resting
 from fecontact.system.interfaces import motion_sources
 from fecontact.system.model_limits import limits_exceeded, require_plane, warn_of_limits
 from fecontact.system.quasistatic.history import LoadHistory
@@ -28,7 +29,6 @@ from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, 
 from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.quasistatic.sliders import require_sliders, sliders_of
-from fecontact.system.statics import resting
 
 
 def load_history(

@@ -9,10 +9,10 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import require_choice
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.equilibrium.statics import at_rest, follower
 from fecontact.system.jacobian import jacobian
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
-from fecontact.system.statics import at_rest, follower
 
 # Part of the largest eigenvalue below which rounding hides rigid modes, which are double roots.
 _ZERO = 1e-7

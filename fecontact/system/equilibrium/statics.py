@@ -11,8 +11,8 @@ from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, signal
 from fecontact.system.arrays import with_sides
-from fecontact.system.balance import Balance
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.equilibrium.balance import Balance
 from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
 from fecontact.system.nodes import SystemArrays
 
