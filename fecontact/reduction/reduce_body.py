@@ -69,18 +69,16 @@ def modal_basis(
         Equal segments of a boundary, each a contact node with the mean displacement; 'all': every
         displacement node. Of solids patches of about equal area, or (n, m) along both tangents.
     B, C : place, optional
-        Excitation and load point: the name of a point or boundary, coordinates, or a
-        :class:`~fecontact.Patch`; "" for none. Default: the mesh's point of that name, if any.
+        Excitation and load point, "" for none. Default: the mesh's point of that name, if any.
     points : mapping of name to place, optional
-        Further points to observe.
+        Further points. A place is a name, coordinates or a :class:`~fecontact.Patch`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
         See :func:`fecontact.reduction.damping.modal_damping`; the last ratio holds on.
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Vibration modes alone; with residual vectors of forces at B, C and contact nodes, for exact
         static deflections there; or fixed-interface and constraint modes.
     tolerance : float
-        For 'residual': largest fraction of its static compliance that may be missing at any of
-        these points along an axis, or for one of the loads. Zero keeps all residual vectors.
+        For 'residual': largest part missing of the static compliance there; zero keeps all vectors.
     loads : sequence of 'gravity' or place
         Adds static responses to gravity or loads at places, if not for 'vibration'.
     rotation : Rotation, optional

@@ -68,10 +68,8 @@ def render(
         ``NAME.mp4`` for a movie, ``NAME.png`` for ``NAME_0000.png`` and so on, or a folder for
         ``frame_0000.png`` and so on. Earlier files of these names are replaced, and further
         pictures of an earlier series removed.
-    frames : int
-        Number of frames, evenly spaced, at most the number of output times.
-    fps : float
-        Frames per second of the movie.
+    frames, fps : int, float
+        Number of frames, evenly spaced, at most that of output times; frames per second.
     size : (int, int)
         Width and height in pixels, even, at least 320 x 180.
     colour : "displacement" or "von_mises"
@@ -82,10 +80,8 @@ def render(
         Shown at the top.
     t_start, t_end : float, optional
         Part of the run to draw [s].
-    view : "above" or "below"
-        Where solids are seen from.
-    wear : EnergyWear or ArchardWear, optional
-        Adds maps of the depth that solids have worn.
+    view, wear : "above" or "below"; EnergyWear or ArchardWear, optional
+        Where solids are seen from; adds maps of the depth that they have worn.
     progress : bool or callable, optional
         True for a progress bar; a function is called as ``progress(done, total)`` after each frame.
 
