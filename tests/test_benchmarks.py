@@ -19,6 +19,7 @@ BENCHMARKS = {
     # With all residual vectors nothing is missing of the compliance.
     "reduction": ((), [(r"^slender beam, P2 +0 .* (\S+)$", 0.0, 1e-9)]),
     "shooting": ((), [(r"^ +(3) ", 3.0, 0.0)]),
+    "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
 HELPERS = {"integrator", "integrator_peers", "integrator_problems"}
