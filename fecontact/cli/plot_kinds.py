@@ -132,6 +132,9 @@ def redraw(
     chosen = choice or PlotRequest()
     if chosen.component is None:
         chosen = replace(chosen, component=usual_component(part.system))
+    elif chosen.component not in (known := part.system.basis.components):
+        raise InputError(f"component = {chosen.component!r} is not one of this run; choose from "
+                         f"{choices(known)}.")
     return KINDS[kind](part, chosen, path)
 
 

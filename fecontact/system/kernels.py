@@ -58,7 +58,7 @@ def friction_across(force, rates):
 
 @helper
 def node_forces(j, motion, moved, z, s, force, rates):
-    """F and R of node j, and its :class:`NodeContact`.
+    """F and R of node j, and its :class:`~fecontact.system.nodes.NodeContact`.
 
     ``force`` and ``rates`` are filled by friction with memory and, in space, by all friction; see
     the contract in :mod:`fecontact.laws.signatures`.
@@ -106,7 +106,7 @@ def normal_gradients(j, contact, s, out):
 
 @helper
 def node_gradients(j, motion, moved, z, s, force, rates, out):
-    """F of node j, its force T in -x, and its :class:`NodeContact`, with derivatives.
+    """F of node j, its force T in -x, and a :class:`~fecontact.system.nodes.NodeContact`.
 
     Fills out (3, 4) with those of F, T and the force that friction sees to x, y, x', y'; in space
     (4, 6), with the force against the second tangent and derivatives to the motion across.

@@ -169,5 +169,5 @@ def test_a_study_takes_solids_their_supports_and_places():
     assert Study.from_toml(study.to_toml()).mesh().volume == mesh.volume
     with pytest.raises(InputError, match=r"must be one of .*'sphere-segment'"):
         Study.from_toml('[geometry]\nshape = "sphere"')
-    with pytest.raises(InputError, match="thickness and plane are those of plane bodies"):
+    with pytest.raises(InputError, match=r"thickness = 0\.1 is for plane bodies, but the"):
         Study.from_toml('[geometry]\nshape = "plate"\n[body]\nthickness = 0.1').elastic_body()

@@ -69,7 +69,7 @@ def test_flat_ground():
 
 def test_drive():
     drive = Drive(10.0, 20.0, 1.0, 2.0, 0.5e-3, -0.47e-3, 13.8)
-    for motion, amplitude in zip(drive.motions, (0.5e-3, -0.47e-3), strict=True):
+    for motion, amplitude in zip(drive.motions, (0.5e-3, -0.47e-3, 0.0), strict=True):
         for t in (0.0, 0.1, 3.3):
             value, rate = motion.kernel.python(t, motion.parameters())
             assert value == pytest.approx(amplitude * math.sin(13.8 * t), abs=1e-18)
@@ -169,7 +169,7 @@ def test_variation_that_reaches_zero_friction():
 def test_motions_of_the_drive():
     shake = SweptSine(1e-3, 1.0, 50.0, 10.0)
     drive = Drive(10.0, 20.0, motion_x=shake, amplitude_y=1e-4, angular_frequency=6.0)
-    assert drive.motions == (shake, Harmonic(1e-4, 6.0))
+    assert drive.motions == (shake, Harmonic(1e-4, 6.0), Harmonic(0.0, 6.0))
     assert drive.frequency_hz == pytest.approx(6.0 / (2.0 * math.pi))
     assert Drive(motion_x=shake).frequency_hz == 0.0
     # An angular frequency without an amplitude moves nothing beside a given motion.
@@ -221,7 +221,7 @@ def test_loads_at_points():
     (Drive, {"motion_y": 3.0}, r"Drive: motion_y = 3\.0 must be a Signal"),
     (Drive, {"motion_x": Constant(), "motion_y": Constant(), "angular_frequency": 2.0},
      r"angular_frequency = 2\.0 has no effect"),
-    (PointLoad, {"component": "z", "signal": Constant()}, "component = 'z' must be one of 'phi'"),
+    (PointLoad, {"component": "w", "signal": Constant()}, "component = 'w' must be one of 'phi'"),
     (PointLoad, {"point": 1.5, "signal": Constant()}, r"point = 1\.5 must be the name"),
     (PointLoad, {"signal": 3.0}, r"PointLoad: signal = 3\.0 must be a Signal"),
     (Load, {"forces": (Constant(),)}, "Load: forces = .* must be a list of PointLoad"),

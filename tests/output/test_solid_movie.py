@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 from solid_blocks import quadratic_grid
-from test_solid_files import SIZE, moved, solid, stacked, system
+from test_solid_result_files import SIZE, moved, solid, stacked, system
 
 import fecontact as fc
 from fecontact.laws import ConstantFriction, EnergyWear, HeightMap, Sine

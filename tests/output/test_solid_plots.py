@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_solid_files import SIZE, moved, solid, stacked, system
+from test_solid_result_files import SIZE, moved, solid, stacked, system
 
 import fecontact as fc
 from fecontact.integrate import WearHistory

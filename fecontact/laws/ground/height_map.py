@@ -104,8 +104,8 @@ class HeightMap:
     origin_x, origin_y : float
         Place of the first point [m].
     file : str, optional
-        Text or CSV file with columns x, y and height [m], one line for each point of the grid in
-        any order, instead of all the others; lines before the first line of numbers are a header.
+        Text or CSV file with columns x, y and height in metres, one line for each point of the grid
+        in any order, instead of all the others; lines before the first of numbers are a header.
         It is read once; then ``file`` is None.
 
     Raises
