@@ -14,7 +14,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import borrowed
+from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import Blocks, blocks_of
@@ -47,7 +47,7 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     n, m = arrays.Tx.shape
     room = {"given": np.zeros(dynamics.GIVEN), "pull": np.zeros(m),
             "nodes": np.zeros((3, 2 * n))}
-    scratch = run_arrays.gradients_for(n, problem.system.memory)
+    scratch = run_arrays.gradients_for(n, problem.system.memory, 2)
     held = {**room, **{f"g{k}": item for k, item in enumerate(scratch)},
             **{f"b{k}": item for k, item in enumerate(blocks_of(problem.system.basis, arrays))},
             **{f"s{k}": item for k, item in enumerate(arrays) if isinstance(item, np.ndarray)}}

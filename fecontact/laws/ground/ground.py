@@ -59,8 +59,10 @@ class Ground:
         Time-dependent speed; by default the constant V.
     friction_variation : Profile, optional
         s(xi): the friction force is multiplied by 1 + s, which must not be negative.
-    speed_y, motion_y : float and GroundMotion, optional
-        The same along y, below solids only [m/s].
+    speed_y : float
+        Speed along y, below solids only [m/s].
+    motion_y : GroundMotion, optional
+        The same in time; by default the constant ``speed_y``.
     rotation_speed : float
         Rotation about the normal, below solids only, positive counter-clockwise from above
         [rad/s]; of flat and even ground.

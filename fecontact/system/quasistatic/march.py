@@ -39,6 +39,8 @@ COUNTS = 3
 SOLVED, CUT, JUMPS = range(COUNTS)
 # Shortest increments, as parts of the one asked for: at a jump, and where none is in equilibrium.
 _SHORTEST, _LEAST = 2.0**-40, 2.0**-20
+# Energies that are noise beside all works of an increment: forces balance to 1e-13 at best.
+_UNRESOLVED = 1e-11
 # Entries of the turnover of an increment.
 ERROR, TURNED, GAP, PRESSED = range(4)
 # Abscissae and weights of Gauss on [0, 1].
@@ -240,7 +242,7 @@ def march(held_s, held_sliders, given, rtol, held_old, held_new, held_room, held
             floor = rubbed + pressed
             for i in range(len(WORKS)):
                 floor += abs(part[i])
-            floor = 1e-14 * floor + 1e-300
+            floor = min(_UNRESOLVED, 0.01 * rtol) * floor + 1e-300
             excess = max(turnover[ERROR] / (rtol * max(rubbed, rubbing + turned) + floor),
                          turnover[GAP] / (rtol * max(pressed, pressing + moved) + floor))
         if not solved and (row == 0 or length <= _LEAST):
