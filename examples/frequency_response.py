@@ -1,10 +1,10 @@
 """Frequency responses of a mass with a friction damper, and of a hardening spring.
 
-    python examples/frequency_response.py [folder] [--quick]
-
 Left alone, the mass would resonate at 1 rad/s; while its Jenkins element sticks, at 1.22 rad/s. In
 between lies a force level at which the element damps best. The spring that hardens bends its
 resonance over: two stable responses at the same frequency, an unstable one between them.
+
+Usage: python examples/frequency_response.py [FOLDER] [--quick]
 """
 
 import sys

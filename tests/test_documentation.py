@@ -289,8 +289,18 @@ def check_faces_in_space(names, printed, folder):
     assert "uniform pressure" in printed
 
 
+def check_frequency_responses(names, printed, folder):
+    assert (folder / "response.png").stat().st_size > 10000
+    peaks = [[float(word) for word in line.split()[:3]] for line in printed.splitlines()]
+    assert [force for force, *_ in peaks] == [1.0, 1.2]
+    # Above the frequency at which the element slides all the time, below that of a stuck one.
+    assert all(1.0 < w < 1.2247 for _, w, _ in peaks)
+    found = fc.io.read_response(folder / "response.h5")
+    assert found.amplitude(1) == pytest.approx(names["response"].amplitude(1), rel=1e-12)
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
-          "laws.md": check_laws,
+          "laws.md": check_laws, "frequency-responses.md": check_frequency_responses,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,

@@ -61,12 +61,30 @@ def beam(folder: Path) -> dict[str, Path]:
     return made
 
 
+def solid(folder: Path) -> dict[str, Path]:
+    """The solid pad on a belt: a picture, and its report seen from below."""
+    from fecontact import Study
+    from fecontact.cli.templates import TEMPLATES, template
+    from fecontact.io import report
+    from fecontact.plot import picture
+
+    study = Study.read(_written(folder / f"{TEMPLATES['solid']}.toml", template("solid")))
+    run, how = study.run(), study.render
+    made = {name: folder / f"{name}.png" for name in ("solid_on_belt", "report-solid")}
+    picture(run, made["solid_on_belt"], time=0.45 * run.time[-1], size=how.size,
+            colour="von_mises", scale=how.scale, title=how.title)
+    page = report(run, folder / "run.html", title=how.title, study=study.to_toml())
+    if not _photographed(page, made["report-solid"], "below"):
+        del made["report-solid"]
+    return made
+
+
 def _written(path: Path, text: str) -> Path:
     path.write_text(text, encoding="utf-8")
     return path
 
 
-def _photographed(page: Path, path: Path) -> bool:
+def _photographed(page: Path, path: Path, view: str = "") -> bool:
     """Screenshot of a report, without a browser none."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
@@ -77,13 +95,15 @@ def _photographed(page: Path, path: Path) -> bool:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=[
             "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
-        view = browser.new_page(viewport={"width": 1400, "height": 920})
-        view.goto(page.as_uri())
-        view.wait_for_selector("html[data-ready]", state="attached", timeout=60_000)
-        view.evaluate("() => { const one = document.querySelector('.scrub');"
-                      "one.value = 430; one.oninput(); }")
-        view.wait_for_timeout(500)
-        view.screenshot(path=path)
+        shown = browser.new_page(viewport={"width": 1400, "height": 920})
+        shown.goto(page.as_uri())
+        shown.wait_for_selector("html[data-ready]", state="attached", timeout=60_000)
+        shown.evaluate("() => { const one = document.querySelector('.scrub');"
+                       "one.value = 430; one.oninput(); }")
+        if view:
+            shown.get_by_label("view").select_option(view)
+        shown.wait_for_timeout(500)
+        shown.screenshot(path=path)
         browser.close()
     return True
 
@@ -132,7 +152,8 @@ def responses(folder: Path) -> dict[str, Path]:
 
 
 MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
-    beam: ("beam_on_wavy_ground", "contact_map", "report"), squeal: ("flutter_modes",),
+    beam: ("beam_on_wavy_ground", "contact_map", "report"),
+    solid: ("solid_on_belt", "report-solid"), squeal: ("flutter_modes",),
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
     responses: ("friction_damper_response", "hardening_response")}
