@@ -16,8 +16,8 @@ from fecontact.bifurcation.harmonic.series import (
     uniform_basis,
 )
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
-from fecontact.bifurcation.orbits.floquet import Floquet, unresolved
-from fecontact.bifurcation.orbits.same_orbit import HALVING, same_heading
+from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
+from fecontact.bifurcation.orbits.same_orbit import HALVING, same_place
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
@@ -75,7 +75,7 @@ class HarmonicLinearisation(Linearised):
 
 
 @dataclass(frozen=True, eq=False)
-class HarmonicProblem(Balance, Problem):
+class HarmonicProblem(FloquetTests, Balance, Problem):
     """The problem of following orbits by harmonic balance; see :class:`Balance`.
 
     Attributes
@@ -131,16 +131,6 @@ class HarmonicProblem(Balance, Problem):
         found[layout.columns] = np.sqrt(np.einsum("ki,ki->i", X, X))
         found = np.clip(found, self.scales, np.append(self.limits, self.scales[-2:]))
         return found if (found > 1.5 * self.scales).any() else self.scales
-
-    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Test functions of 'period doubling', 'torus' and 'branch point'."""
-        found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
-        return found
-
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
-        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
-        return unresolved((first, last), values, tests)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
@@ -201,11 +191,7 @@ class HarmonicProblem(Balance, Problem):
         within: float,
     ) -> Array | None:
         """See :meth:`Problem.met_again`: in the phase of ``like``."""
-        weights = self.weights()
-        if len(u) != len(like) or not same_heading(weights, tangent, heading, self.common):
-            return None
-        common = slice(-self.common, None)
-        if weighted_norm(weights[common], u[common] - like[common]) > within:
+        if len(u) != len(like) or not same_place(self, (u, tangent), (like, heading), within):
             return None
         return self._in_phase(u, like)
 

@@ -8,14 +8,14 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
-from fecontact.bifurcation.orbits.floquet import unresolved
+from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.mesh import (
     carry_over,
     equidistributed,
     extremes,
 )
 from fecontact.bifurcation.orbits.normal_forms import examined
-from fecontact.bifurcation.orbits.same_orbit import HALVING, halves_meet, in_phase, same_heading
+from fecontact.bifurcation.orbits.same_orbit import HALVING, halves_meet, in_phase, same_place
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
@@ -26,7 +26,7 @@ _AMPLITUDE_CHANGE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class CollocationProblem(Discretisation, Problem):
+class CollocationProblem(FloquetTests, Discretisation, Problem):
     """The problem of following orbits by collocation; see :class:`Discretisation`.
 
     Attributes
@@ -63,18 +63,6 @@ class CollocationProblem(Discretisation, Problem):
         """As :meth:`linearise`, for the residual alone."""
         return CollocationLinearisation(self, u, whole=False)
 
-    def tests(
-        self, u: Array, linearisation: Any, tangent: Array
-    ) -> dict[str, float]:
-        """Test functions of 'period doubling', 'torus' and 'branch point'."""
-        found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
-        return found
-
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
-        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
-        return unresolved((first, last), values, tests)
-
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, mesh and the extremes of the states."""
         stability = linearisation.floquet
@@ -106,12 +94,9 @@ class CollocationProblem(Discretisation, Problem):
     ) -> Array | None:
         """See :meth:`Problem.met_again`: on this mesh, in the phase of ``like``."""
         if not (isinstance(origin, CollocationProblem)
-                and same_heading(self.weights(), tangent, heading, self.common)):
+                and same_place(self, (u, tangent), (like, heading), within)):
             return None
-        # Period, parameter and amplitude do not depend on the phase.
-        common = slice(-self.common, None)
-        if weighted_norm(self.weights()[common], u[common] - like[common]) > within:
-            return None
+        # The amplitude does not depend on the phase either.
         one, other = origin._amplitude(u, self.scales), self._amplitude(like, self.scales)
         if abs(one - other) > within + _AMPLITUDE_CHANGE * max(one, other):
             return None

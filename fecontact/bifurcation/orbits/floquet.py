@@ -14,6 +14,7 @@ from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.core.compiled import i8, kernel, vector
 from fecontact.core.errors import AnalysisError
+from fecontact.core.types import Array
 
 # Smallest and largest uncertainty of the distance of a multiplier from the unit circle.
 _ROUNDING, _WORST = 1e-8, 0.1
@@ -204,3 +205,22 @@ def _near_one(stored: Mapping[str, Any]) -> bool:
     off = np.sort(np.abs(np.asarray(stored["multipliers"]) - 1.0))
     error = max(float(stored["trivial_error"]), 1e-10)
     return len(off) > 1 and bool(off[1] <= _RESOLVED * error)
+
+
+class FloquetTests:
+    """Test functions of problems whose linearisations have multipliers, ``floquet``.
+
+    The parameter comes last in the unknowns u and in their ``scales``.
+    """
+
+    scales: Array
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Test functions of 'period doubling', 'torus' and 'branch point'."""
+        found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
+        return found
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
+        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
+        return unresolved((first, last), values, tests)

@@ -5,9 +5,11 @@ orbits may return to single orbits; beyond, it repeats the same orbits with thei
 """
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import interpolate, node_times
 from fecontact.core.types import Array
@@ -21,9 +23,22 @@ _HALVES_MEET, _HALVES_PART = 0.02, 0.9
 HALVING = "period halving"
 
 
-def same_heading(weights: Array, one: Array, other: Array, common: int) -> bool:
-    """Whether two directions agree in period and parameter, which are independent of the phase."""
-    return float(weights[-common:] * one[-common:] @ other[-common:]) > 0.0
+class _Weighted(Protocol):
+    @property
+    def common(self) -> int:
+        """Number of unknowns, last in u, that do not depend on the phase."""
+
+    def weights(self) -> Array:
+        """Weights of the unknowns in their inner product."""
+
+
+def same_place(
+    problem: _Weighted, one: tuple[Array, Array], other: tuple[Array, Array], within: float
+) -> bool:
+    """Whether two points, unknowns and tangents, agree in period, parameter and heading."""
+    weights, common = problem.weights()[-problem.common :], slice(-problem.common, None)
+    heading = float(weights * one[1][common] @ other[1][common])
+    return heading > 0.0 and weighted_norm(weights, one[0][common] - other[0][common]) <= within
 
 
 def in_phase(problem: Discretisation, u: Array, like: Array) -> Array:

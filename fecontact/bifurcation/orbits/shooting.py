@@ -8,15 +8,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
-from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of, unresolved
+from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.same_orbit import same_heading
+from fecontact.bifurcation.orbits.same_orbit import same_place
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensemble import ensemble
@@ -37,7 +36,7 @@ _RETURNS = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class ShootingProblem(Problem):
+class ShootingProblem(FloquetTests, Problem):
     """Equations of a periodic orbit of a contact system, one parameter free.
 
     The period is divided into K segments; the run from the start x_j of each ends at the start of
@@ -175,15 +174,6 @@ class ShootingProblem(Problem):
         return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
                        before=(u, tangent), bend=bend), u, tangent
 
-    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Test functions of 'period doubling', 'torus' and 'branch point'."""
-        return linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
-
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
-        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
-        return unresolved((first, last), values, tests)
-
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""
         if not isinstance(self.solver, Rodas5P):
@@ -218,12 +208,7 @@ class ShootingProblem(Problem):
         within: float,
     ) -> Array | None:
         """See :meth:`Problem.met_again`: started in the phase of ``like``."""
-        weights = self.weights()
-        if len(u) != len(like) or not same_heading(weights, tangent, heading, self.common):
-            return None
-        # Period and parameter do not depend on the phase.
-        common = slice(-self.common, None)
-        if weighted_norm(weights[common], u[common] - like[common]) > within:
+        if len(u) != len(like) or not same_place(self, (u, tangent), (like, heading), within):
             return None
         try:
             return started_in_phase(self, u, like)
