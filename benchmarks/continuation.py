@@ -11,6 +11,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from continuation_peer import auto
@@ -79,24 +80,22 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
     field = two_masses()
     sliding = equilibrium_branch(field, parameter="B", bounds=(0.3, 12.0))
     hopf = sliding.of_kind("Hopf")[0]
-    peer = auto()
-    print("intervals, by   points  CPU time  per point   error of fold, doubling   of its time")
-    for intervals in (50,) if quick else (50, 70, 100, 200):
-        settings = ContinuationOptions(step=0.002, largest_step=0.065, points=1000)
-
-        def task(intervals: int = intervals, settings: ContinuationOptions = settings) -> Branch:
-            return orbit_branch(field, hopf, method=Collocation(intervals=intervals),
-                                options=settings, bounds=(0.3, 12.0), scales=np.ones(4))
-
-        if not quick:
-            task()
-        seconds, branch = timed(task, repetitions)
-        print(row(f"{intervals:4} fecontact", seconds, len(branch),
-                  branch.of_kind("fold")[0].parameter,
-                  branch.of_kind("period doubling")[0].parameter))
-        if peer is not None:
-            other = peer.branch(intervals, repetitions)
-            print(row(f"{intervals:4} AUTO-07p", *other) + f"   {seconds / other.seconds:6.2f}")
+    with auto() as peer:
+        print("intervals, by   points  CPU time  per point   error of fold, doubling   of its time")
+        for intervals in (50,) if quick else (50, 70, 100, 200):
+            task = partial(
+                orbit_branch, field, hopf, method=Collocation(intervals=intervals),
+                options=ContinuationOptions(step=0.002, largest_step=0.065, points=1000),
+                bounds=(0.3, 12.0), scales=np.ones(4))
+            if not quick:
+                task()
+            seconds, branch = timed(task, repetitions)
+            print(row(f"{intervals:4} fecontact", seconds, len(branch),
+                      branch.of_kind("fold")[0].parameter,
+                      branch.of_kind("period doubling")[0].parameter))
+            if peer is not None:
+                other = peer.branch(intervals, repetitions)
+                print(row(f"{intervals:4} AUTO-07p", *other) + f"   {seconds / other.seconds:6.2f}")
     large = chain(20)
     sliding = equilibrium_branch(large, parameter="B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]

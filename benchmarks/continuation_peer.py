@@ -1,7 +1,7 @@
-"""The branch of `continuation.py` followed by AUTO-07p, where its program ``auto-07p`` is installed.
+"""The branch of `continuation.py` followed by AUTO-07p, where ``auto-07p`` is installed.
 
-On Debian: ``apt-get install auto-07p gfortran``. Equations have analytic derivatives; tolerances are
-AUTO's usual ones.
+On Debian: ``apt-get install auto-07p gfortran``. Derivatives are analytic, tolerances AUTO's usual
+ones.
 """
 
 import os
@@ -10,6 +10,8 @@ import shutil
 import statistics
 import subprocess
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -90,11 +92,10 @@ class PeerBranch(NamedTuple):
 
 
 class Auto:
-    """AUTO-07p with the two masses compiled, in a folder of its own."""
+    """AUTO-07p with the two masses compiled, in a folder."""
 
-    def __init__(self) -> None:
-        self.folder = tempfile.TemporaryDirectory()
-        self.path = Path(self.folder.name)
+    def __init__(self, path: Path) -> None:
+        self.path = path
         # Threads that wait for each other would count as CPU time.
         self.environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         (self.path / "masses.f90").write_text(EQUATIONS)
@@ -132,6 +133,11 @@ class Auto:
                 for row in rows if len(row) > 4 and row[0] != "0"]
 
 
-def auto() -> Auto | None:
+@contextmanager
+def auto() -> Iterator[Auto | None]:
     """AUTO-07p, if it is installed with its compiler."""
-    return Auto() if shutil.which("auto-07p") and shutil.which("gfortran") else None
+    if not (shutil.which("auto-07p") and shutil.which("gfortran")):
+        yield None
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        yield Auto(Path(folder))
