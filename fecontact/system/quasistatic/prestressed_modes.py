@@ -79,7 +79,7 @@ def prestressed_modes(
     springs = np.einsum("ne,nekl->nkl", stiffness, holding)
     full[m:, :m] -= np.einsum("nki,nkl,nlj->ij", tangents, springs, tangents, optimize=True)
     free = _free(tangents, holding[sliders.rigid > 0.0], np.nonzero(sliders.rigid > 0.0)[0])
-    within = np.kron(np.eye(2), free)
+    within = np.asarray(np.kron(np.eye(2), free), dtype=float)
     return ComplexModes.of(full, within=within, zero=_ZERO)
 
 
