@@ -6,7 +6,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, require_finite
 from fecontact.core.types import Array
-from fecontact.laws.excitation import Load
+from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
@@ -194,7 +194,8 @@ def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
     direction = problem.loose(problem.guess(1.0))
     if direction is not None:
         body, motion = named_motion(system.basis, direction)
-        remedy = ("a spring at B (drive.stiffness_x, drive.stiffness_y) or a support"
+        springs = ", ".join(f"drive.stiffness_{axis}" for axis in AXES[: system.basis.dimension])
+        remedy = (f"a spring at B ({springs}) or a support"
                   if not system.basis.parts else "a support, an interface or a link")
         return f"There is no {kind}: nothing holds {body} against {motion}; give it {remedy}."
     load = system.load

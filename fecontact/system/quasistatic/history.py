@@ -76,7 +76,8 @@ class LoadHistory(Summarised):
 
     In space these are vectors in the tangent plane of the node. Paths of a node that are straight
     within an increment are followed exactly, others are cut until the force turns so little that
-    work and loss agree: to rtol = 1e-6 the direction of forces is right to about 1e-3.
+    work and loss agree: then forces and losses are right to about twice the root of ``rtol``, as
+    long as they turn.
 
     Jenkins' and Iwan's laws have springs and limits of their own. For laws without memory the
     limit is the coefficient at rest, mu(0+), and the spring is the tangential stiffness of stuck

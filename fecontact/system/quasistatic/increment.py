@@ -59,6 +59,8 @@ _HASTY, _TRIES, _SHIFTS = 12, 60, 15
 _LOOSE = 1e-13
 # Repetitions of the augmented Lagrangian, and the part of the force that may change in the last.
 _REPEATS, _SETTLED = 100, 1e-11
+# Rounding of a displacement.
+_ROUNDING = 1e-15
 # Relative distance from its limit, by rounding, at which a slider slides.
 _SLIDES = 1e-14
 # Columns of `Pose.node`; in space the last three follow for the second tangent.
@@ -443,14 +445,17 @@ def find_equilibrium(load, moved, held_sliders, held_s, held_pose, held_room):
         solved = _newton(load, moved, sliders, s, pose, room)
         if not solved or not held:
             break
-        changed, largest = 0.0, 0.0
+        changed, largest, noise = 0.0, 0.0, 0.0
         for j in range(n):
             for k in range(elements * tangents):
                 if sliders.rigid[j, k // tangents] != 0.0:
+                    place = abs(pose.node[j, PLACE + PER_TANGENT * (k % tangents)])
+                    noise = max(noise, sliders.stiffness[j, k // tangents] * (
+                        place + abs(pose.left[j, k])))
                     changed = max(changed, abs(pose.force[j, k] - room.multiplier[j, k]))
                     largest = max(largest, abs(pose.force[j, k]))
                     room.multiplier[j, k] = pose.force[j, k]
-        if changed <= _SETTLED * largest:
+        if changed <= _SETTLED * largest + _ROUNDING * noise:
             break
         solved = False
     if not solved:
