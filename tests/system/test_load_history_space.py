@@ -21,7 +21,8 @@ from fecontact.laws import (
 )
 from fecontact.system.nodes import GroundMotion
 from fecontact.system.quasistatic.given import travelling
-from fecontact.system.quasistatic.increment import evaluate, pose_for, room_for
+from fecontact.system.quasistatic.increment import evaluate
+from fecontact.system.quasistatic.pose import pose_for, room_for
 from fecontact.system.quasistatic.sliders import sliders_of
 
 C, LIMIT = 2e4, 4.0  # of `jenkins()`

@@ -11,7 +11,8 @@ from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.given import actions_of, travel_forces
-from fecontact.system.quasistatic.increment import (
+from fecontact.system.quasistatic.path import LoadPath
+from fecontact.system.quasistatic.pose import (
     AGAINST,
     FORCE,
     PENETRATION,
@@ -20,7 +21,6 @@ from fecontact.system.quasistatic.increment import (
     PRESSING,
     Sliders,
 )
-from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.rest_state import STATES, RestState, total_friction
 
 

@@ -18,15 +18,13 @@ radius phi F along its own direction a = R* / |R*|, with
 
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import helper, i8, integers, kernel, matrix, vector
+from fecontact.core.compiled import helper, i8, kernel, vector
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import (
     GROUND_MOTION,
@@ -37,6 +35,18 @@ from fecontact.system.nodes import (
     moved_across,
     moved_along,
     node_contact,
+)
+from fecontact.system.quasistatic.pose import (
+    AGAINST,
+    FORCE,
+    LEANING,
+    PENETRATION,
+    PER_TANGENT,
+    PLACE,
+    POSE,
+    PRESSING,
+    ROOM,
+    SLIDERS,
 )
 from fecontact.system.space_nodes import (
     WAVES_X,
@@ -63,85 +73,6 @@ _REPEATS, _SETTLED = 100, 1e-11
 _ROUNDING = 1e-15
 # Relative distance from its limit, by rounding, at which a slider slides.
 _SLIDES = 1e-14
-# Columns of `Pose.node`; in space the last three follow for the second tangent.
-FORCE, PRESSING, PENETRATION, PLACE, AGAINST, LEANING = range(6)
-PER_TANGENT = 3
-
-
-class Sliders(NamedTuple):
-    """Sliders of the contact nodes, each array (n, e).
-
-    ``stiffness`` is c, ``limit`` phi; ``rigid`` is 1 where c is only a penalty, else 0.
-    """
-
-    stiffness: Array
-    limit: Array
-    rigid: Array
-
-
-SLIDERS = types.NamedUniTuple(matrix, 3, Sliders)
-
-
-class Pose(NamedTuple):
-    """A body in equilibrium, or on the way to it.
-
-    ``q`` (m,); ``node`` (n, 6), in space (n, 9), with F, the force that friction sees, u, and per
-    tangent g, the force against it and its part F y_R'; ``force`` and ``left`` (n, e) are R and z
-    of the sliders, in space (n, 2 e), both components of each one after the other.
-    """
-
-    q: Array
-    node: Array
-    force: Array
-    left: Array
-
-
-POSE = types.NamedTuple([vector, matrix, matrix, matrix], Pose)
-
-
-class Room(NamedTuple):
-    """Room for Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
-
-    ``acting`` (m,) sums the magnitudes of the forces on each mode.
-    """
-
-    scale: Array
-    start: Array
-    acting: Array
-    residual: Array
-    step: Array
-    before: Array
-    multiplier: Array
-    along: Array
-    away: Array
-    across: Array
-    matrix: Array
-    partial: Array
-    pivots: Integers
-
-
-ROOM = types.NamedTuple(
-    [vector] * 6 + [matrix] * 6 + [integers], Room)
-
-
-def node_columns(tangents: int) -> int:
-    """Number of columns of `Pose.node`."""
-    return PLACE + PER_TANGENT * tangents
-
-
-def pose_for(m: int, n: int, sliders: int, tangents: int) -> Pose:
-    """An empty pose."""
-    force, left = np.zeros((2, n, sliders * tangents))
-    return Pose(np.zeros(m), np.zeros((n, node_columns(tangents))), force, left)
-
-
-def room_for(m: int, n: int, sliders: int, tangents: int, scale: Array) -> Room:
-    """Room for a body of m modes and n contact nodes."""
-    start, acting, residual, step, before = np.zeros((5, m))
-    return Room(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step, before,
-                np.zeros((n, sliders * tangents)), np.zeros((n, m)), np.zeros((n, m)),
-                np.zeros((n if tangents == 2 else 0, m)), np.zeros((m, m)), np.zeros((4, 3)),
-                np.zeros(m, np.int64))
 
 
 @helper

@@ -18,15 +18,15 @@ from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.quasistatic.given import given_rows, travelled, travelling
 from fecontact.system.quasistatic.history import LoadHistory
-from fecontact.system.quasistatic.increment import (
+from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, kept_for, march
+from fecontact.system.quasistatic.path import LoadPath
+from fecontact.system.quasistatic.pose import (
     PENETRATION,
     Pose,
     Sliders,
     pose_for,
     room_for,
 )
-from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, kept_for, march
-from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.quasistatic.sliders import require_sliders, sliders_of
 

@@ -20,7 +20,8 @@ from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import SYSTEM, GroundMotion, in_space, moved_across, moved_along
-from fecontact.system.quasistatic.increment import (
+from fecontact.system.quasistatic.increment import find_equilibrium
+from fecontact.system.quasistatic.pose import (
     AGAINST,
     FORCE,
     LEANING,
@@ -31,7 +32,6 @@ from fecontact.system.quasistatic.increment import (
     PRESSING,
     ROOM,
     SLIDERS,
-    find_equilibrium,
     node_columns,
 )
 

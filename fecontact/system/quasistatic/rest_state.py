@@ -9,7 +9,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, count, quantity
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.quasistatic.increment import (
+from fecontact.system.quasistatic.pose import (
     FORCE,
     PER_TANGENT,
     PLACE,

@@ -11,7 +11,7 @@ from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array
 from fecontact.laws.friction_curve import static_coefficient
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.quasistatic.increment import Sliders
+from fecontact.system.quasistatic.pose import Sliders
 
 # Penalty of rigid sticking, in stiffnesses of the contact or the body.
 _PENALTY = 1e3
