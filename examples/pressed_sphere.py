@@ -8,14 +8,15 @@ Poisson's ratio near 1/2 a rigid plane couples normal and tangential contact no 
 The body is five times as wide and high as the contact. Its forces are those of the half-space; but
 it gives way a little less, by a compliance that belongs to the resultant force alone. That is taken
 from uniform tractions on the contact face, whose mean displacements of a half-space are
-16 (1 - nu^2) / (3 pi^2 c E) and 8 (2 - nu) (1 + nu) / (3 pi^2 c E) per force, c its radius. What
-prevents tilting is that the basis has no rigid rotations. Radii of contact and of the circle that
-sticks follow from second moments,
+16 (1 - nu^2) / (3 pi^2 a E) and 8 (2 - nu) (1 + nu) / (3 pi^2 a E) per force. What prevents tilting
+is that the basis has no rigid rotations. The contact face ends where Hertz's contact does, so that
+edges of elements lie there; outside of it the sphere has to stay clear of the plane. Radii of
+contact and of the circle that sticks follow from second moments,
 
     integral of p r^2 = 2/5 P a^2,    integral of q r^2 = 2/5 mu P (a^2 - c^5 / a^3)
 
 which feel where forces are, not the few elements at the edges. Cattaneo and Mindlin take friction
-as parallel everywhere; with Poisson's ratio it turns, here by up to 7 degrees.
+as parallel everywhere; with Poisson's ratio some of it points across the load.
 
 Usage: python examples/pressed_sphere.py [OUTPUT_FOLDER] [--quick]
 """
@@ -38,14 +39,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RATIO, PART = 0.49, 0.75  # Poisson's ratio, Q / (mu P)
-FACE, SIZE = 1.15, 5.0  # contact face and body, in radii of the contact
+SIZE = 5.0  # of the body, in radii of the contact
 STEPS = 5
 
 
 def sphere(elements: int) -> fc.ModalBasis:
     """The body, with so many elements along the radius of the contact, which cannot turn."""
     shape = SphereSegment(
-        radius=RADIUS, base_radius=SIZE * WIDTH, height=SIZE * WIDTH, contact_radius=FACE * WIDTH,
+        radius=RADIUS, base_radius=SIZE * WIDTH, height=SIZE * WIDTH, contact_radius=WIDTH,
         contact_element_size=WIDTH / elements, element_size=4.0 * WIDTH)
     body = fc.ElasticBody(fc.generate(shape), fc.Material(MODULUS, RATIO))
     basis = fc.modal_basis(body, 12, C="top", reduction="residual", tolerance=0.0)
@@ -102,6 +103,15 @@ class PressedSphere:
         left = WIDTH**2 - 2.5 * moment / (MU * self.exact.load)
         return float((WIDTH**3 * left) ** 0.2 / WIDTH)
 
+    @property
+    def clearance(self) -> float:
+        """Least distance of the sphere from the plane outside of the contact face [m]."""
+        field = self.basis.fields(self.history.modal_coordinates[0])
+        away = np.hypot(*field.nodes[:, :2].T)
+        low = RADIUS - np.sqrt(RADIUS**2 - away**2)
+        outside = (np.abs(field.nodes[:, 2] - low) < 1e-6 * WIDTH) & (away > 1.001 * WIDTH)
+        return float((field.nodes + field.displacement)[outside, 2].min())
+
     def beyond(self, axis: int) -> float:
         """What the body gives way beyond a half-space under uniform traction on the face [m/N].
 
@@ -156,7 +166,7 @@ def figure(found: PressedSphere, path: Path | None = None) -> "Figure":
     exact, part = found.exact, found.part
     with new_figure(8.6, 4.0, path) as drawn:
         face, loop = drawn.subplots(1, 2)
-        r = np.linspace(0.0, FACE, 400)
+        r = np.linspace(0.0, 1.1, 400)
         c = (1.0 - part) ** (1.0 / 3.0)
         outer, inner = (scale * np.sqrt(np.maximum(1.0 - (r / scale) ** 2, 0.0))
                         for scale in (1.0, c))

@@ -103,13 +103,19 @@ def test_plots_check_what_they_draw(file):
 
 
 SOLID = """
-geometry = { shape = "solid-block", length = 0.06, width = 0.04, height = 0.02, element_size = 0.02 }
 body = { material = "steel" }
 basis = { modes = 12, contact_nodes = [3, 2], damping = 0.01 }
 normal = { law = "linear", stiffness = 2e8, damping = 2e3 }
 friction = { law = "jenkins", stiffness = 1e8, friction_coefficient = 0.4 }
 drive = { stiffness_x = 1e9, stiffness_y = 1e9 }
 load = { normal = 500.0 }
+
+[geometry]
+shape = "solid-block"
+length = 0.06
+width = 0.04
+height = 0.02
+element_size = 0.02
 
 [preload]
 motion_x = [0.0, 3e-6, 3e-6, -3e-6]
