@@ -34,7 +34,7 @@ LONG = {
     "test_convergence", "test_mode_convergence",
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",
     "test_receptance", "test_references", "test_eigen", "test_set_valued_search",
-    "test_two_bodies", "test_two_spheres", "test_sliding_box",
+    "test_two_bodies", "test_two_spheres", "test_pressed_sphere", "test_sliding_box",
     "test_report", "test_report_branches", "test_sweep_report",
     "test_solid_basis", "test_solid_assembly", "test_surface_patches", "test_solid_movie",
     "test_solid_plots",

@@ -17,7 +17,8 @@ GROUPS = {
     "Impacts": ("impact_oscillator", "impact_figures", "impact_map", "impact_orbits",
                 "impact_calibration", "colliding_bars"),
     "Contact pressure and partial slip": (
-        "line_contact", "two_bodies", "two_spheres", "stacked_blocks", "contact_convergence"),
+        "line_contact", "two_bodies", "two_spheres", "pressed_sphere", "stacked_blocks",
+        "contact_convergence"),
     "Joints and dampers": ("lap_joint", "bolted_plate", "clamped_layers", "friction_damper",
                            "frequency_response"),
     "Solids": ("sliding_box", "thrown_block", "dithered_friction", "tipping_pad"),

@@ -78,12 +78,17 @@ def write_preload(study: "Study", history: "LoadHistory", folder: Path) -> list[
     from fecontact.core.files.atomic_write import write_text
     from fecontact.output.plots.preload import plot_loop, plot_shear
 
-    kinds = {"normal_force_N": history.normal_force, "friction_force_N": history.friction_force,
-             "slip_m": history.slip, "state": history.contact_state}
-    columns = ["point", "travel_m", "work_J", "loss_J",
+    # Of solids along both tangents.
+    tangents = ("", "_across")[: history.slips.shape[2]]
+    kinds = {"normal_force_N": history.normal_force,
+             **{f"friction_force{name}_N": history.friction_forces[..., k]
+                for k, name in enumerate(tangents)},
+             **{f"slip{name}_m": history.slips[..., k] for k, name in enumerate(tangents)},
+             "state": history.contact_state}
+    columns = ["point", *("travel_m", "travel_y_m")[: len(tangents)], "work_J", "loss_J",
                *(f"{kind}_{j}" for kind in kinds for j in range(history.slip.shape[1]))]
     text = StringIO()
-    np.savetxt(text, np.column_stack([np.arange(len(history)), history.travel, history.work,
+    np.savetxt(text, np.column_stack([np.arange(len(history)), history.travels, history.work,
                                       history.loss, *kinds.values()]),
                delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
     files = [folder / f"{study.name}-preload.csv", folder / f"{study.name}-shear.png"]

@@ -59,7 +59,7 @@ def preload_table(history: "LoadHistory", basis: "ModalBasis") -> Any:
     """
     from fecontact.core.units import quantity
     from fecontact.reduction.assembly.contact_faces import contact_faces
-    from fecontact.system.quasistatic.rest_state import STATES
+    from fecontact.system.quasistatic.rest_state import STATES, total_friction
 
     faces, rows = contact_faces(basis), dict(history.summary())
     if not faces[0].name:
@@ -69,8 +69,9 @@ def preload_table(history: "LoadHistory", basis: "ModalBasis") -> Any:
     found = [("points", rows.pop("points"))]
     for face in faces:
         states, forces = history.contact_state[-1, face.nodes], [
-            quantity(float(values[-1, face.nodes].sum()), "N", 4)
-            for values in (history.normal_force, history.friction_force)]
+            quantity(value, "N", 4) for value in (
+                float(history.normal_force[-1, face.nodes].sum()),
+                total_friction(history.friction_forces[-1, face.nodes]))]
         found.append((face.title, "at the end " + ", ".join(
             f"{np.count_nonzero(states == code)} {name}" for code, name in enumerate(STATES))))
         found.append((f"{face.name}: forces", f"normal {forces[0]}, friction {forces[1]}"))

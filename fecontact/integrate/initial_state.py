@@ -16,6 +16,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.statics import equilibrium
 from fecontact.system.friction_memory import settled
+from fecontact.system.quasistatic.given import travelled
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
@@ -162,13 +163,17 @@ def _rest_under_friction(
     """State at rest with what its friction remembers."""
     rest = initial.state() if isinstance(initial, LoadHistory) else initial
     memory = rest.memory(system)
-    ground, travel = system.ground, system.prescribed_motion.motions[0].travel(time)
-    moved = travel - rest.travel
-    if moved and (ground.wavy or ground.friction_scale_kernel is not None):
-        raise InputError(f"The ground has travelled {rest.travel:g} m in the state at rest, but "
-                         f"{travel:g} m at the start of the run, where it has other "
-                         f"heights or friction; end the path of loads at travel = "
-                         f"{travel:g}, or start the run at another time.")
+    ground, nodes = system.ground, system.basis.ground_nodes
+    before = travelled(system, rest.travels)[nodes]
+    now = system.prescribed_motion.travel(time)[nodes]
+    if (ground.wavy or ground.friction_scale_kernel is not None) and (before != now).any():
+        away = int(np.argmax(np.abs(now - before).reshape(len(now), -1).max(axis=1)))
+        told, wanted = (", ".join(f"{value:g}" for value in np.atleast_1d(one[away]))
+                        for one in (before, now))
+        raise InputError(f"The ground has travelled {told} m in the state at rest, but {wanted} m "
+                         f"at the start of the run, where it has other heights or friction; end "
+                         f"the path of loads where the ground of the run begins, or start the run "
+                         f"at another time.")
     q = rest.modal_coordinates
     return np.concatenate([q, np.zeros(len(q)), memory.reshape(-1)])
 

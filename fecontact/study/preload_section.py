@@ -24,10 +24,14 @@ class PreloadSettings(LoadPath):
         Factor of constant loads [-]; one number, or one for each vertex of the path, as below.
     forces : list of float or list, optional
         Values of ``load.forces``, in their order [N], [N m]; by default their constant parts.
-    motion_x, motion_y : float or list, optional
-        Displacements of the driven ends of the springs at B [m]; by default their constant parts.
+    motion_x, motion_y, motion_z : float or list, optional
+        Displacements of the driven ends of the springs at B [m], along z of solids; by default
+        their constant parts.
     travel : float or list
-        Travel of the ground in +x [m], or of the one interface that slides [m], [rad].
+        Travel of the ground in +x [m], or of the one interface that slides, along its velocity
+        [m], [rad].
+    travel_y : float or list, optional
+        Travel of the ground in +y below solids [m]; zero by default.
     steps : int or list
         Increments between two vertices, of each of the sections if it is a list.
     tangential_ratio : float

@@ -1,7 +1,7 @@
 from .interfaces import PrescribedMotion
 from .nodes import SystemArrays
 from .quasistatic.history import LoadHistory, Loop
-from .quasistatic.increment import Sliders
+from .quasistatic.pose import Sliders
 from .quasistatic.rest_state import RestState
 
 __all__ = [

@@ -105,6 +105,12 @@ def with_sides(arrays: SystemArrays) -> SystemArrays:
     return arrays._replace(sides=sides, space_node=space_node.address)
 
 
+def with_motions(arrays: SystemArrays, factors: Array) -> SystemArrays:
+    """Arrays of solids whose other sides have motions with factors (k, n, 2) for both tangents."""
+    return with_sides(arrays._replace(sliding=factors[0, :, 0].copy(),
+                                      sliding_across=_sliding_across(factors)))
+
+
 def _sliding_across(factors: Array) -> Array:
     """Rows (3, n): first motion across, second motion along and across."""
     second = factors[1] if len(factors) > 1 else np.zeros_like(factors[0])

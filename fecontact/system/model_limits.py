@@ -8,9 +8,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fecontact.core.errors import InputError, ModelWarning, choices
+from fecontact.core.errors import ModelWarning, choices
 from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw
+from fecontact.laws.excitation import AXES
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
@@ -43,13 +44,6 @@ def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple
     """
     found = (_too_far(system, states), _too_deep(system, times, states))
     return tuple(sentence for sentence in found if sentence)
-
-
-def require_plane(system: ContactSystem, what: str) -> None:
-    """Raise :class:`InputError` for solids where only plane bodies are computed."""
-    if system.basis.dimension == 3:
-        raise InputError(f"{what} is for plane bodies, but this system has contact in space; use "
-                         f"the default solver with smoothed friction, or static_equilibrium.")
 
 
 def warn_of_limits(sentences: Iterable[str], what: str) -> None:
@@ -110,13 +104,16 @@ def _too_deep(system: ContactSystem, times: Array, states: Array) -> str | None:
 
 def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
     """What moves along modal coordinates (m,), and how: 'the body', 'a rotation'."""
+    d = basis.dimension
     if not basis.parts:
-        x, y, turn = np.abs(basis.contact_T @ direction).max(axis=0)
+        rows = np.abs(basis.contact_T @ direction).max(axis=0)
         size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
-        named = _named(x, y, turn * size)
-        return "the body", {"x": "a translation along the ground (x)", "y":
-                            "a translation away from the ground (y)"}.get(named, named)
-    found = {}
+        named = _named(rows[:d], rows[d:].max() * size)
+        ways = [f"along the ground ({axis})" for axis in AXES[: d - 1]]
+        ways.append(f"away from the ground ({AXES[d - 1]})")
+        told = {axis: f"a translation {way}" for axis, way in zip(AXES, ways, strict=False)}
+        return "the body", told.get(named, named)
+    found: dict[str, tuple[Array, float]] = {}
     for part in basis.parts:
         first, count = part.nodes
         if count and basis.mode_shapes is not None:
@@ -125,21 +122,23 @@ def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
             points = [basis.point_index(name) for name in basis.extra
                       if name.startswith(f"{part.name}.")]
             rows = basis.T[points] @ direction
-            moved, turn = rows[:, :2], float(np.abs(rows[:, 2]).max(initial=0.0))
+            moved, turn = rows[:, :d], float(np.abs(rows[:, d:]).max(initial=0.0))
         if not len(moved):
             continue
-        x, y = np.abs(moved.mean(axis=0))
         # In a rotation displacements differ between the places, or there are none.
         apart = float(np.ptp(moved, axis=0).max())
-        found[part.name] = (x, y, turn if turn > 1e9 * np.abs(moved).max() else apart)
-    largest = max(max(motion) for motion in found.values())
-    who = [name for name, motion in found.items() if max(motion) > 0.01 * largest]
-    named = _named(*found[max(who, key=lambda name: max(found[name]))])
+        found[part.name] = (np.abs(moved.mean(axis=0)),
+                            turn if turn > 1e9 * np.abs(moved).max() else apart)
+    sizes = {name: max(float(motion.max()), turn) for name, (motion, turn) in found.items()}
+    who = [name for name, size in sizes.items() if size > 0.01 * max(sizes.values())]
+    named = _named(*found[max(who, key=lambda name: sizes[name])])
     bodies = f"body '{who[0]}'" if len(who) == 1 else f"the bodies {choices(who)}"
-    return bodies, {"x": "a translation in x", "y": "a translation in y"}.get(named, named)
+    return bodies, f"a translation in {named}" if named in AXES else named
 
 
-def _named(x: float, y: float, turn: float) -> str:
-    if turn > 0.1 * max(x, y):
+def _named(moved: Array, turn: float) -> str:
+    """The axis of a translation, of magnitudes (d,) along the axes, or another motion."""
+    order = np.argsort(moved)
+    if turn > 0.1 * moved[order[-1]]:
         return "a rotation"
-    return "x" if x > 10.0 * y else "y" if y > 10.0 * x else "a translation"
+    return AXES[order[-1]] if moved[order[-1]] > 10.0 * moved[order[-2]] else "a translation"

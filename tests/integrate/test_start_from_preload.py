@@ -93,3 +93,52 @@ def test_other_friction_and_other_ground_are_refused():
     moved = load_history(wavy, path)
     with pytest.raises(InputError, match="has travelled 0"):
         simulate(wavy, 0.1, initial=moved)
+
+
+def solid(friction, force, **parts):
+    """Two masses in space, joined by equal springs along the ground, with a force on the second."""
+    rows = np.zeros((2, 6, 6))
+    rows[0, :3, :3] = rows[1, :3, 3:] = np.eye(3)
+    springs = np.kron([[K, -K], [-K, K]], np.diag([1.0, 1.0, 0.0]))
+    basis = basis_from_matrices(np.eye(6), springs, {"contact": rows}, dimension=3)
+    forces = (*(PointLoad(k, "z", signal=Constant(-10.0)) for k in (0, 1)),
+              *(PointLoad(1, axis, signal=Constant(value))
+                for axis, value in zip("xy", force, strict=True)))
+    return ContactSystem(basis, normal=LinearContact(2e6, 50.0), friction=friction,
+                         load=Load(forces=forces), **parts)
+
+
+def loaded_solid(friction, **options):
+    """After 8 N along x, at which the second mass has slid, under 6 N in another direction."""
+    path = LoadPath(forces=(-10.0, -10.0, (0.0, 8.0, 4.0), (0.0, 0.0, 4.0)))
+    return load_history(solid(friction, (4.0, 4.0)), path, **options)
+
+
+@pytest.mark.parametrize("friction", [JenkinsFriction(6e4, 0.5), IwanFriction(6e4, 0.5)])
+def test_springs_of_solids_hold_what_they_held(friction):
+    history = loaded_solid(friction)
+    assert (np.abs(history.friction_forces[-1]) > 0.5).any(axis=0).all()
+    run = simulate(history.system, 0.2, initial=history, outputs=201)
+    assert np.abs(run.modal_velocities).max() < 1e-8
+    assert np.abs(run.modal_coordinates - history.modal_coordinates[-1]).max() < 1e-9
+    assert run.friction_forces[-1] == pytest.approx(history.friction_forces[-1], rel=1e-6,
+                                                    abs=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [0.82, np.inf])
+def test_set_valued_friction_of_solids_holds_what_it_held(ratio):
+    history = loaded_solid(ConstantFriction(0.5), tangential_ratio=ratio)
+    run = simulate(history.system, 0.2, initial=history.state(), outputs=101,
+                   solver=SetValued())
+    assert np.abs(run.modal_velocities).max() < 1e-8
+    assert np.abs(run.modal_coordinates - history.modal_coordinates[-1]).max() < 1e-9
+    assert run.friction_forces[-1] == pytest.approx(history.friction_forces[-1], rel=1e-6,
+                                                    abs=1e-8)
+
+
+def test_ground_below_solids_must_be_where_it_was():
+    friction = JenkinsFriction(6e4, 0.5)
+    wavy = solid(friction, (0.0, 0.0), ground=Ground(amplitude=1e-6, wave_direction=(0.0, 1.0)))
+    path = LoadPath(forces=(-10.0, -10.0, 0.0, 0.0), travel_y=(0.0, 1e-4))
+    with pytest.raises(InputError, match=r"has travelled 0, 0\.0001 m in the state at rest, but 0"):
+        simulate(wavy, 0.1, initial=load_history(wavy, path))

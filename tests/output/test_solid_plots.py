@@ -194,16 +194,25 @@ def test_every_other_plot_takes_solids(run, two, tmp_path):
     assert {"contact compliance in z", "in z"} <= set(labels)
 
 
-def test_shear_along_a_face_is_refused_for_solids(run):
-    from types import SimpleNamespace
+def test_shear_over_a_face_of_a_solid(tmp_path):
+    """Arrows are the friction on the body; colours are its size over the areas, and the states."""
+    from fecontact.plot import plot_loop, plot_shear
 
-    from fecontact.plot import plot_shear
-    from fecontact.system.quasistatic.history import LoadHistory
-
-    history = object.__new__(LoadHistory)
-    object.__setattr__(history, "system", SimpleNamespace(basis=run.system.basis))
-    with pytest.raises(fc.InputError, match=r"plot_shear: .* these are solids;"):
-        plot_shear(history)
+    one = system(solid(), load=fc.Load(100.0), drive=fc.Drive(stiffness_x=1e8, stiffness_y=1e8))
+    path = fc.LoadPath(motion_x=(0.0, 3e-7, 6e-7), travel_y=(0.0, 5e-7, 5e-7), steps=4)
+    history = fc.load_history(one, path)
+    figure = plot_shear(history, path=tmp_path / "shear.png")
+    shear = panel(figure, "friction")
+    drawn = np.asarray(shear.collections[0].get_array())
+    size = np.linalg.norm(history.friction_forces[-1], axis=1) / one.basis.contact_areas
+    assert drawn / drawn.max() == pytest.approx(size / size.max(), rel=1e-9)
+    (arrows,) = collections_of(shear, "Quiver")
+    across = np.column_stack([arrows.U, arrows.V])
+    force = -history.friction_forces[-1]
+    assert across / np.abs(across).max() == pytest.approx(force / np.abs(force).max(), abs=1e-6)
+    loop = plot_loop(history, action="travel_y", path=tmp_path / "loop.png")
+    assert "along y" in loop.axes[0].get_xlabel()
+    assert loop.axes[0].lines[0].get_ydata()[-1] != 0.0
 
 
 def test_faces_around_an_axis_are_unrolled():

@@ -100,3 +100,80 @@ def test_plots_check_what_they_draw(file):
         plot_shear(history, 9)
     with pytest.raises(InputError, match="action = 'travvel'"):
         plot_loop(history, action="travvel")
+
+
+SOLID = """
+body = { material = "steel" }
+basis = { modes = 12, contact_nodes = [3, 2], damping = 0.01 }
+normal = { law = "linear", stiffness = 2e8, damping = 2e3 }
+friction = { law = "jenkins", stiffness = 1e8, friction_coefficient = 0.4 }
+drive = { stiffness_x = 1e9, stiffness_y = 1e9 }
+load = { normal = 500.0 }
+
+[geometry]
+shape = "solid-block"
+length = 0.06
+width = 0.04
+height = 0.02
+element_size = 0.02
+
+[preload]
+motion_x = [0.0, 3e-6, 3e-6, -3e-6]
+motion_y = [0.0, 0.0, 3e-6, 0.0]
+motion_z = 0.0
+travel_y = [0.0, 0.0, -1e-6, 0.0]
+steps = 10
+rtol = 1e-5
+
+[simulation]
+t_end = 1e-3
+outputs = 11
+initial = "preload"
+"""
+
+
+@pytest.fixture
+def solid_file(tmp_path):
+    path = tmp_path / "solid.toml"
+    path.write_text(SOLID)
+    return path
+
+
+def test_a_solid_is_loaded_along_two_directions(solid_file, capsys):
+    study = Study.read(solid_file)
+    history = study.load_history()
+    same = load_history(study.system(), LoadPath(
+        motion_x=(0.0, 3e-6, 3e-6, -3e-6), motion_y=(0.0, 0.0, 3e-6, 0.0),
+        travel_y=(0.0, 0.0, -1e-6, 0.0), steps=10), rtol=1e-5)
+    assert history.friction_forces == pytest.approx(same.friction_forces)
+    assert (np.abs(history.friction_forces.sum(axis=1))[20] > 20.0).all()
+    assert Study.from_toml(study.to_toml(), study.path) == study
+    assert execute(["preload", str(solid_file), "--modes"]) == 0
+    said = capsys.readouterr().out
+    assert "finished" in said
+    results = solid_file.parent / "results"
+    table = np.genfromtxt(results / "solid-preload.csv", delimiter=",", names=True)
+    assert table["loss_J"] == pytest.approx(history.loss)
+    assert table["travel_y_m"] == pytest.approx(history.travels[:, 1])
+    for k, name in enumerate(("", "_across")):
+        assert table[f"friction_force{name}_N_4"] == pytest.approx(history.friction_forces[:, 4, k])
+        assert table[f"slip{name}_m_5"] == pytest.approx(history.slips[:, 5, k])
+    for kind in ("shear", "loop"):
+        assert (results / f"solid-{kind}.png").stat().st_size > 10_000
+
+
+def test_a_run_of_a_solid_starts_at_the_end_of_the_path(solid_file):
+    study = Study.read(solid_file)
+    history = study.load_history()
+    constant = {"law": "constant", "value": -3e-6}
+    run = study.with_(**{"drive.motion_x": constant}).run()
+    assert run.modal_coordinates[0] == pytest.approx(history.modal_coordinates[-1])
+    assert np.abs(run.modal_coordinates - run.modal_coordinates[0]).max() < 1e-8 * np.abs(
+        run.modal_coordinates[0]).max()
+
+
+def test_keys_of_solids_are_refused_for_plane_bodies(file):
+    file.write_text(file.read_text().replace(
+        "steps = 10", "steps = 10\ntravel_y = [0.0, 1e-6, 0.0, 0.0]"))
+    with pytest.raises(InputError, match=r"\[preload\]: travel_y is for solids"):
+        Study.read(file).load_history()

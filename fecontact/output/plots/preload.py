@@ -1,4 +1,4 @@
-"""Plots of quasi-static loading: shear and slip along the face, force loops."""
+"""Plots of quasi-static loading: shear and slip over the face, force loops."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +9,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import quantity, suitable_unit
+from fecontact.laws.ground.sliding import SlidingRotation
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS
@@ -26,7 +27,9 @@ _LABELS = {
     "load": ("work of the load per scale", "N m", "scale of the load", ""),
     "motion_x": ("displacement of the drive x", "m", "force of the drive", "N"),
     "motion_y": ("displacement of the drive y", "m", "force of the drive", "N"),
+    "motion_z": ("displacement of the drive z", "m", "force of the drive", "N"),
     "travel": ("travel of the ground", "m", "force of the ground on the body", "N"),
+    "travel_y": ("travel of the ground along y", "m", "force of the ground on the body", "N"),
 }
 
 
@@ -41,6 +44,9 @@ def plot_shear(
     direction of the tangents, and slip is relative to the other side. Of one body each contact
     group has one. Columns of similar values have one scale.
 
+    Of solids: maps of pressure, friction (with arrows of the force on the body), displacement and
+    state over each face, seen along its normal from the body through its face.
+
     Parameters
     ----------
     history : LoadHistory
@@ -53,16 +59,16 @@ def plot_shear(
     Raises
     ------
     InputError
-        For solids, a vertex that does not exist or was not reached, another suffix, or a file that
-        cannot be written.
+        For a vertex that does not exist or was not reached, another suffix, or a file that cannot
+        be written.
     """
     require_kind("plot_shear", LoadHistory, history=history)
-    if history.system.basis.dimension == 3:
-        raise InputError("plot_shear: shear along a face is that of plane bodies, but these are "
-                         "solids; plot_contact_map shows pressure, friction and states over their "
-                         "faces in a run.")
     early = vertex == -1 and history.status != "finished"
     row = len(history) - 1 if early else history.row(vertex)
+    if history.system.basis.dimension == 3:
+        from fecontact.output.plots.solids.maps import shear_maps
+
+        return shear_maps(history, row, path)
     basis = history.system.basis
     faces, length = shown_faces(basis, "contact at a load step"), basis.tributary
     shear = history.friction_force[row] / length
@@ -129,6 +135,9 @@ def plot_loop(
     part = history.loop(first, last, action)
     wide, wide_unit, high, high_unit = _LABELS.get(
         part.action, ("displacement of the force", "m", "force", "N"))
+    if part.action == "travel" and any(
+            isinstance(one, SlidingRotation) for one in history.system.sliding.values()):
+        wide, wide_unit, high, high_unit = "turn of the other side", "rad", "its moment", "N m"
     vertices = [row for row in history.path.rows_of_vertices
                 if history.row(first) <= row <= history.row(last)]
     marks = np.array(vertices) - vertices[0]

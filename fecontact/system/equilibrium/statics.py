@@ -6,10 +6,10 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, require_finite
 from fecontact.core.types import Array
-from fecontact.laws.excitation import Load
-from fecontact.laws.friction.planar import along_slip
+from fecontact.laws.excitation import AXES, Load
+from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signals.harmonic import Constant
-from fecontact.laws.signatures import friction_law, signal
+from fecontact.laws.signatures import friction_law, planar_friction_law, signal
 from fecontact.system.arrays import with_sides
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.balance import Balance
@@ -29,6 +29,15 @@ def _frictionless(v, F, p):
 def follower(v, F, p):
     """R = p[0] F, whatever the slip velocity: a contact that slides on at rest."""
     return p[0] * F, 0.0, p[0]
+
+
+@planar_friction_law
+def planar_follower(law, v1, v2, F, z, p, force, rates):
+    """R = (p[0], p[1]) F along the tangents, whatever the slip velocity."""
+    clear(force, rates)
+    second = 4 + len(rates)
+    force[0], force[2] = p[0] * F, p[0]
+    force[second], force[second + 2] = p[1] * F, p[1]
 
 
 @signal
@@ -144,15 +153,15 @@ def at_rest(
 
 
 def resting(
-    system: ContactSystem, load: Array, motion: Array, travel: float
+    system: ContactSystem, arrays: SystemArrays, load: Array, motion: Array, travel: Array
 ) -> tuple[Balance, Array]:
-    """Problem and equilibrium (m,) without friction under modal loads (m,) and drive motions (2,).
+    """Problem and equilibrium (m,) without friction under modal loads (m,) and drive motions (d,).
 
-    AnalysisError if there is none.
+    ``arrays`` are those of the system with the motions of which ``travel`` (1,), in space (2,), is
+    that of the other sides. AnalysisError if there is none.
     """
-    arrays = system.arrays
     pulls = (arrays.drive_stiffness * motion) @ arrays.drive_shapes
-    arrays = at_rest(arrays, travel)._replace(
+    arrays = at_rest(arrays, *travel.tolist())._replace(
         constant_load=load + pulls, drive_shapes=np.zeros_like(arrays.drive_shapes),
         load_shapes=np.zeros_like(arrays.load_shapes))
     problem = Balance(arrays, 0.0, system.penetration_scale)
@@ -185,7 +194,8 @@ def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
     direction = problem.loose(problem.guess(1.0))
     if direction is not None:
         body, motion = named_motion(system.basis, direction)
-        remedy = ("a spring at B (drive.stiffness_x, drive.stiffness_y) or a support"
+        springs = ", ".join(f"drive.stiffness_{axis}" for axis in AXES[: system.basis.dimension])
+        remedy = (f"a spring at B ({springs}) or a support"
                   if not system.basis.parts else "a support, an interface or a link")
         return f"There is no {kind}: nothing holds {body} against {motion}; give it {remedy}."
     load = system.load

@@ -10,16 +10,18 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.quasistatic.increment import (
+from fecontact.system.quasistatic.given import actions_of, travel_forces
+from fecontact.system.quasistatic.path import LoadPath
+from fecontact.system.quasistatic.pose import (
     AGAINST,
     FORCE,
     PENETRATION,
+    PER_TANGENT,
     PLACE,
     PRESSING,
     Sliders,
 )
-from fecontact.system.quasistatic.path import LoadPath
-from fecontact.system.quasistatic.rest_state import STATES, RestState
+from fecontact.system.quasistatic.rest_state import STATES, RestState, total_friction
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,12 +31,14 @@ class Loop(Summarised):
     Attributes
     ----------
     action : str
-        'load', 'motion_x', 'motion_y', 'travel', or 'forces.K' for the force number K.
+        'load', 'motion_x', 'motion_y', 'travel', or 'forces.K' for the force number K; of solids
+        'motion_z' and 'travel_y' too.
     displacement : (N,) array
         Displacement on which the force does its work [m]; of the load, per unit of its scale
         [N m].
     force : (N,) array
-        Force that the action exerts on the body [N]; for the load, its scale [-].
+        Force that the action exerts on the body [N]; for the load, its scale [-]; for a travel
+        that is an angle, a moment [N m].
     loss : float
         What friction loses from the first of these points to the last [J].
     """
@@ -70,6 +74,11 @@ class LoadHistory(Summarised):
         R^* = c\,(x_j - s - z), \qquad R = R^* \min(1,\ \mu F / |R^*|), \qquad
         z \leftarrow x_j - s - R / c
 
+    In space these are vectors in the tangent plane of the node. Paths of a node that are straight
+    within an increment are followed exactly, others are cut until the force turns so little that
+    work and loss agree: then forces and losses are right to about twice the root of ``rtol``, as
+    long as they turn.
+
     Jenkins' and Iwan's laws have springs and limits of their own. For laws without memory the
     limit is the coefficient at rest, mu(0+), and the spring is the tangential stiffness of stuck
     contacts, c_T = tangential_ratio c_N, with c_N = dF/du at the first point of the path at which
@@ -86,12 +95,13 @@ class LoadHistory(Summarised):
     path : LoadPath
         The path; N points on it.
     given : (N, m + 3) array
-        Modal forces of the loads, displacements of the driven ends in x and y [m], travel [m].
+        Modal forces of the loads, displacements of the driven ends in x and y [m], travel [m]; in
+        space (N, m + 5), with z and the travel along y.
     modal_coordinates : (N, m) array
         q.
-    node : (N, n, 6) array
+    node : (N, n, 6) array, in space (N, n, 9)
         As :attr:`RestState.node`.
-    slider_force, slider_place : (N, n, e) arrays
+    slider_force, slider_place : (N, n, e) arrays, in space (N, n, e, 2)
         As in :class:`RestState`.
     works : (N, 4) array
         Work done so far by loads, drive, travel of the ground, and stiffness that is not symmetric
@@ -135,7 +145,7 @@ class LoadHistory(Summarised):
                                      for code, name in enumerate(STATES))),
             ("normal force", quantity(
                 float(self.normal_force[-1, touching].sum()), "N", 4)),
-            ("friction force", quantity(float(self.friction_force[-1].sum()), "N", 4)),
+            ("friction force", quantity(total_friction(self.friction_forces[-1]), "N", 4)),
             ("work", quantity(float(self.work[-1]), "J", 4)),
             ("loss", quantity(float(self.loss[-1]), "J", 4)),
         ]
@@ -150,8 +160,13 @@ class LoadHistory(Summarised):
 
     @property
     def friction_force(self) -> Array:
-        """R (N, n), on the body in -x [N]."""
-        return self.slider_force.sum(axis=-1)
+        """R (N, n), on the body in -x [N]; in space along the first tangent."""
+        return self.friction_forces[..., 0]
+
+    @property
+    def friction_forces(self) -> Array:
+        """Friction forces (N, n, 1), in space (N, n, 2), against the tangents [N]."""
+        return self.slider_force.reshape(len(self), *self.sliders.limit.shape, -1).sum(axis=2)
 
     @property
     def friction_limit(self) -> Array:
@@ -160,13 +175,18 @@ class LoadHistory(Summarised):
 
     @property
     def slip(self) -> Array:
-        """Tangential displacement (N, n) of each node relative to the ground [m]."""
+        """Displacement (N, n) of each node relative to the ground along the first tangent [m]."""
         return self.node[..., PLACE]
 
     @property
-    def force_against_x(self) -> Array:
-        """Force (N, n) of each node on the body in -x, with what leans on waves [N]."""
-        return self.node[..., AGAINST]
+    def slips(self) -> Array:
+        """Displacements (N, n, 1), in space (N, n, 2), relative to the ground [m]."""
+        return self.node[..., PLACE::PER_TANGENT]
+
+    @property
+    def tangential_forces(self) -> Array:
+        """Forces (N, n, 1), in space (N, n, 2), against the tangents, leaning ones too [N]."""
+        return self.node[..., AGAINST::PER_TANGENT]
 
     @property
     def contact_state(self) -> Integers:
@@ -175,8 +195,13 @@ class LoadHistory(Summarised):
 
     @property
     def travel(self) -> Array:
-        """Travel (N,) of the ground [m]."""
-        return self.given[:, -1]
+        """Travel (N,) of the ground along x, or of the interface that slides [m], [rad]."""
+        return self.travels[:, 0]
+
+    @property
+    def travels(self) -> Array:
+        """The travel (N, 1), in space (N, 2) with that along y [m]."""
+        return self.given[:, 1 - self.system.basis.dimension :]
 
     @property
     def work(self) -> Array:
@@ -193,13 +218,14 @@ class LoadHistory(Summarised):
         """Energy (N,) of the body, the drive's springs, the normal contact and friction springs."""
         arrays, q = self.system.arrays, self.modal_coordinates
         m = q.shape[1]
-        ends = self.given[:, m : m + 2]
+        ends = self.given[:, m : m + self.system.basis.dimension]
         springs = arrays.drive_stiffness
         body = 0.5 * np.einsum("ni,ij,nj->n", q, arrays.stiffness, q)
         pulled = ((0.5 * ends - q @ arrays.drive_shapes.T) * springs * ends).sum(axis=1)
         compliance = np.where(self.sliders.rigid > 0.0, 0.0, 1.0 / np.where(
             self.sliders.stiffness > 0.0, self.sliders.stiffness, np.inf))
-        friction = 0.5 * (self.slider_force**2 * compliance).sum(axis=(1, 2))
+        squares = (self.slider_force.reshape(len(self), *compliance.shape, -1) ** 2).sum(axis=-1)
+        friction = 0.5 * (squares * compliance).sum(axis=(1, 2))
         return np.asarray(body + pulled + friction
                           + self.system.stored_energy(self.node[..., PENETRATION]))
 
@@ -259,10 +285,13 @@ class LoadHistory(Summarised):
         q, given, path = self.modal_coordinates, self.given, self.path
         arrays, m = self.system.arrays, q.shape[1]
         yield "load", q @ arrays.constant_load, path.at_points(path.load_scale)[: len(self)]
-        for axis, name in enumerate(("motion_x", "motion_y")):
+        motions, travels = actions_of(self.system.basis.dimension)
+        for axis, name in enumerate(motions):
             end = given[:, m + axis]
             yield name, end, arrays.drive_stiffness[axis] * (end - q @ arrays.drive_shapes[axis])
-        yield "travel", self.travel, -self.force_against_x @ arrays.sliding
+        forces = travel_forces(self.system, self.tangential_forces)
+        for axis, name in enumerate(travels):
+            yield name, self.travels[:, axis], forces[:, axis]
         for k, values in enumerate(path.forces or ()):
             yield f"forces.{k}", q @ arrays.load_shapes[k], path.at_points(values)[: len(self)]
 

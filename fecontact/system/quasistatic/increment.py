@@ -9,20 +9,52 @@ where a slider was left,
 
 lambda is zero for a spring c, and the force so far of a slider that sticks rigidly; c is then the
 penalty of an augmented Lagrangian, which is repeated until g = z wherever R stays below its limit.
+
+In space g, z and R have two components, along the tangents of the node: R* returns to the disc of
+radius phi F along its own direction a = R* / |R*|, with
+
+    dR = c dg  where it sticks,     dR = phi a dF + phi F c / |R*| (I - a a^T) dg  where it slides.
 """
 
 
-from typing import NamedTuple
+import math
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, helper, i8, integers, kernel, matrix, vector
+from fecontact.core.compiled import helper, i8, kernel, vector
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array, Integers
-from fecontact.system.kernels import normal_gradients
-from fecontact.system.nodes import SYSTEM, GroundMotion, NodeMotion, leaning, node_contact
+from fecontact.laws.signatures import normal_at
+from fecontact.system.nodes import (
+    GROUND_MOTION,
+    SYSTEM,
+    NodeMotion,
+    in_space,
+    leaning,
+    moved_across,
+    moved_along,
+    node_contact,
+)
+from fecontact.system.quasistatic.pose import (
+    AGAINST,
+    FORCE,
+    LEANING,
+    PENETRATION,
+    PER_TANGENT,
+    PLACE,
+    POSE,
+    PRESSING,
+    ROOM,
+    SLIDERS,
+)
+from fecontact.system.space_nodes import (
+    WAVES_X,
+    WAVES_Y,
+    contact_in_space,
+    laws_of,
+    scale_under,
+)
 
 # Out-of-balance force that counts as rounding, relative to the forces that cancel, and the most
 # that is accepted where it falls no further.
@@ -37,101 +69,128 @@ _HASTY, _TRIES, _SHIFTS = 12, 60, 15
 _LOOSE = 1e-13
 # Repetitions of the augmented Lagrangian, and the part of the force that may change in the last.
 _REPEATS, _SETTLED = 100, 1e-11
-# Columns of `Node`.
-NODE_COLUMNS = 6
-FORCE, PRESSING, PENETRATION, PLACE, AGAINST, LEANING = range(NODE_COLUMNS)
-
-
-class Sliders(NamedTuple):
-    """Sliders of the contact nodes, each array (n, e).
-
-    ``stiffness`` is c, ``limit`` phi; ``rigid`` is 1 where c is only a penalty, else 0.
-    """
-
-    stiffness: Array
-    limit: Array
-    rigid: Array
-
-
-SLIDERS = types.NamedUniTuple(matrix, 3, Sliders)
-
-
-class Pose(NamedTuple):
-    """A body in equilibrium, or on the way to it.
-
-    ``q`` (m,); ``node`` (n, 6) with F, the force that friction sees, u, g, the force in -x and
-    its part F y_R'; ``force`` and ``left`` (n, e) are R and z of the sliders.
-    """
-
-    q: Array
-    node: Array
-    force: Array
-    left: Array
-
-
-POSE = types.NamedTuple([vector, matrix, matrix, matrix], Pose)
-
-
-class Room(NamedTuple):
-    """Room for Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
-
-    ``acting`` (m,) sums the magnitudes of the forces on each mode.
-    """
-
-    scale: Array
-    start: Array
-    acting: Array
-    residual: Array
-    step: Array
-    before: Array
-    multiplier: Array
-    along: Array
-    away: Array
-    matrix: Array
-    partial: Array
-    pivots: Integers
-
-
-ROOM = types.NamedTuple(
-    [vector] * 6 + [matrix] * 5 + [integers], Room)
-
-
-def pose_for(m: int, n: int, sliders: int) -> Pose:
-    """An empty pose."""
-    return Pose(np.zeros(m), np.zeros((n, NODE_COLUMNS)), np.zeros((n, sliders)),
-                np.zeros((n, sliders)))
-
-
-def room_for(m: int, n: int, sliders: int, scale: Array) -> Room:
-    """Room for a body of m modes and n contact nodes."""
-    start, acting, residual, step, before = np.zeros((5, m))
-    return Room(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step, before,
-                np.zeros((n, sliders)), np.zeros((n, m)), np.zeros((n, m)), np.zeros((m, m)),
-                np.zeros((3, 4)), np.zeros(m, np.int64))
+# Rounding of a displacement.
+_ROUNDING = 1e-15
+# Relative distance from its limit, by rounding, at which a slider slides.
+_SLIDES = 1e-14
 
 
 @helper
-def _rub(j, g, pressing, sliders, pose, room, out):
-    """Forces of the sliders of node j; fills out[1, :2] with the derivatives of their sum."""
-    total = 0.0
-    out[1, 0], out[1, 1] = 0.0, 0.0
-    for e in range(sliders.stiffness.shape[1]):
-        stiffness, limit = sliders.stiffness[j, e], sliders.limit[j, e]
-        trial = room.multiplier[j, e] + stiffness * (g - pose.left[j, e])
-        if abs(trial) <= limit * pressing:
-            pose.force[j, e] = trial
+def _node(j, q, moved, s):
+    """Displacements of node j along its first tangent and its second one, and where it is."""
+    x, height, across = 0.0, 0.0, 0.0
+    for i in range(len(q)):
+        x += s.Tx[j, i] * q[i]
+        height += s.Ty[j, i] * q[i]
+    if in_space(s):
+        for i in range(len(q)):
+            across += s.T2[j, i] * q[i]
+        motion = NodeMotion(x, height, 0.0, 0.0, across, 0.0)
+        return x, across, contact_in_space(motion, moved, laws_of(j, s), s.sides[j],
+                                           s.profile_parameters)
+    return x, across, node_contact(j, NodeMotion(x, height, 0.0, 0.0, 0.0, 0.0), moved, s)
+
+
+@helper
+def _press(j, contact, s, out):
+    """F of node j and the force that friction sees under it.
+
+    Fills out[0] and out[2] with their derivatives to displacements along, away and across.
+    """
+    F, F_u, _ = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])
+    out[0, 0], out[0, 1], out[0, 2] = F_u * contact.slope, -F_u, F_u * contact.slope_across
+    sign = 1.0 if F >= 0.0 else -1.0
+    pressing = abs(F)
+    for k in range(3):
+        out[2, k] = sign * out[0, k]
+    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
+        a, b = 1.0, 0.0
+        if in_space(s):
+            a, b = s.sides[j, WAVES_X], s.sides[j, WAVES_Y]
+        scale, slope = scale_under(contact, a, b, s.friction_scale, s.friction_scale_parameters)
+        for k in range(3):
+            out[2, k] *= scale
+        out[2, 0] += a * slope * pressing
+        out[2, 2] += b * slope * pressing
+        pressing *= scale
+    return F, pressing
+
+
+@helper
+def _rub(j, g, g_across, pressing, sliders, pose, room, out):
+    """Sums of the forces of the sliders of node j along its tangents.
+
+    Fills out[1] and out[3] with their derivatives to displacements along, away and across.
+    """
+    elements = sliders.stiffness.shape[1]
+    tangents = pose.force.shape[1] // elements
+    along, across = 0.0, 0.0
+    for k in range(3):
+        out[1, k], out[3, k] = 0.0, 0.0
+    for e in range(elements):
+        stiffness, limit, first = sliders.stiffness[j, e], sliders.limit[j, e], tangents * e
+        R = room.multiplier[j, first] + stiffness * (g - pose.left[j, first])
+        R2 = 0.0
+        size = abs(R)
+        if tangents == 2:
+            R2 = room.multiplier[j, first + 1] + stiffness * (g_across - pose.left[j, first + 1])
+            size = math.hypot(R, R2)
+        if size <= limit * pressing:
             out[1, 0] += stiffness
+            out[3, 2] += stiffness
         else:
-            side = limit if trial > 0.0 else -limit
-            pose.force[j, e] = side * pressing
-            out[1, 0] += side * out[2, 0]
-            out[1, 1] += side * out[2, 1]
-        total += pose.force[j, e]
+            a, b = R / size, R2 / size
+            turn = limit * pressing * stiffness / size
+            R, R2 = limit * pressing * a, limit * pressing * b
+            for k in range(3):
+                out[1, k] += limit * a * out[2, k]
+                out[3, k] += limit * b * out[2, k]
+            out[1, 0] += turn * b * b
+            out[1, 2] -= turn * a * b
+            out[3, 0] -= turn * a * b
+            out[3, 2] += turn * a * a
+        pose.force[j, first] = R
+        if tangents == 2:
+            pose.force[j, first + 1] = R2
+        along += R
+        across += R2
+    return along, across
+
+
+@helper
+def _lean(F, contact, out):
+    """Add the derivatives of what leans with the ground to those of the forces of a node."""
+    for k in range(3):
+        out[1, k] += contact.slope * out[0, k]
+        out[3, k] += contact.slope_across * out[0, k]
+    out[1, 0] += F * contact.curvature
+    out[1, 2] += F * contact.twist
+    out[3, 0] += F * contact.twist
+    out[3, 2] += F * contact.curvature_across
+
+
+@helper
+def _push(row, force, rounding, room):
+    """Add a force along a row to the out-of-balance force, and to the sizes of forces."""
+    for i in range(len(row)):
+        room.residual[i] += row[i] * force
+        room.before[i] += abs(row[i]) * (abs(force) + rounding)
+        room.acting[i] += abs(row[i] * force)
+
+
+@helper
+def _stretched(j, tangent, sliders, pose):
+    """What the springs of node j would do along a tangent by the places of their sliders alone."""
+    elements = sliders.stiffness.shape[1]
+    tangents = pose.left.shape[1] // elements
+    total = 0.0
+    for e in range(elements):
+        total += sliders.stiffness[j, e] * abs(pose.left[j, tangents * e + tangent])
     return total
 
 
-@kernel(types.f8(vector, f8, SLIDERS, SYSTEM, POSE, ROOM, i8))
-def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
+@kernel(types.f8(vector, GROUND_MOTION, SLIDERS, SYSTEM, POSE, ROOM, i8))
+def evaluate(load, moved, held_sliders, held_s, held_pose, held_room, derive):
     """Set nodes, slider forces, out-of-balance force and its matrix; size of forces that cancel.
 
     The matrix is minus the derivative of the out-of-balance force.
@@ -140,7 +199,6 @@ def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
                               borrowed(held_room))
     n, m = s.Tx.shape
     q, node, residual, out = pose.q, pose.node, room.residual, room.partial
-    moved = GroundMotion(travel, 0.0, 0.0, 0.0)
     terms = 0.0
     for i in range(m):
         total, size = load[i], abs(load[i])
@@ -151,39 +209,52 @@ def _evaluate(load, travel, held_sliders, held_s, held_pose, held_room, derive):
         residual[i] = total
         room.before[i] = room.acting[i] = size
     for j in range(n):
-        x, height = 0.0, 0.0
-        for i in range(m):
-            x += s.Tx[j, i] * q[i]
-            height += s.Ty[j, i] * q[i]
-        contact = node_contact(j, NodeMotion(x, height, 0.0, 0.0, 0.0, 0.0), moved, s)
-        F, pressing = normal_gradients(j, contact, s, out)
-        gone = s.sliding[j] * travel
-        R = _rub(j, x - gone, pressing, sliders, pose, room, out)
+        x, across, contact = _node(j, q, moved, s)
+        F, pressing = _press(j, contact, s, out)
+        gone = moved_along(j, moved.travel, moved.second_travel, s)
+        gone_across = 0.0
+        if in_space(s):
+            gone_across = moved_across(j, moved.travel, moved.second_travel, s)
+        R, R2 = _rub(j, x - gone, across - gone_across, pressing, sliders, pose, room, out)
         T = leaning(F, R, contact.slope, s)
         node[j, FORCE], node[j, PRESSING], node[j, PENETRATION] = F, pressing, contact.penetration
         node[j, PLACE], node[j, AGAINST], node[j, LEANING] = x - gone, T, F * contact.slope
         if s.leans:
-            out[1, 0] += contact.slope * out[0, 0] + F * contact.curvature
-            out[1, 1] += contact.slope * out[0, 1]
+            _lean(F, contact, out)
         # Springs round off with the displacements whose difference they feel.
-        rounding = 0.0
+        springs = 0.0
         for e in range(sliders.stiffness.shape[1]):
-            rounding += sliders.stiffness[j, e] * (abs(x) + abs(gone) + abs(pose.left[j, e]))
-        rounding = abs(T) + _SPRINGS * rounding
-        for i in range(m):
-            tx, ty = s.Tx[j, i], s.Ty[j, i]
-            residual[i] += ty * F - tx * T
-            room.before[i] += abs(ty * F) + abs(tx) * rounding
-            room.acting[i] += abs(ty * F) + abs(tx * T)
-            if derive:
+            springs += sliders.stiffness[j, e]
+        rounding = _SPRINGS * (springs * (abs(x) + abs(gone)) + _stretched(j, 0, sliders, pose))
+        _push(s.Ty[j], F, 0.0, room)
+        _push(s.Tx[j], -T, rounding, room)
+        if derive:
+            for i in range(m):
+                tx, ty = s.Tx[j, i], s.Ty[j, i]
                 room.along[j, i] = out[1, 0] * tx + out[1, 1] * ty
                 room.away[j, i] = out[0, 0] * tx + out[0, 1] * ty
+        if in_space(s):
+            T = leaning(F, R2, contact.slope_across, s)
+            second = PER_TANGENT
+            node[j, PLACE + second], node[j, AGAINST + second] = across - gone_across, T
+            node[j, LEANING + second] = F * contact.slope_across
+            rounding = _SPRINGS * (springs * (abs(across) + abs(gone_across))
+                                   + _stretched(j, 1, sliders, pose))
+            _push(s.T2[j], -T, rounding, room)
+            if derive:
+                for i in range(m):
+                    tx, ty, t2 = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
+                    room.along[j, i] += out[1, 2] * t2
+                    room.away[j, i] += out[0, 2] * t2
+                    room.across[j, i] = out[3, 0] * tx + out[3, 1] * ty + out[3, 2] * t2
     for i in range(m):
         terms += room.before[i] ** 2 / room.scale[i]
     if derive:
         room.matrix[:] = s.stiffness
         room.matrix[:] += np.dot(held_s.Tx.T, held_room.along)
         room.matrix[:] -= np.dot(held_s.Ty.T, held_room.away)
+        if in_space(s):
+            room.matrix[:] += np.dot(held_s.T2.T, held_room.across)
     return np.sqrt(terms)
 
 
@@ -222,7 +293,7 @@ def _step(q, room):
 
 
 @helper
-def _hasty_newton(load, travel, sliders, s, pose, room):
+def _hasty_newton(load, moved, sliders, s, pose, room):
     """Newton's method in full steps; whether it succeeded, else the pose is as before.
 
     On its way to the set of sliders that slide, the balance may become worse for a step: at a
@@ -231,7 +302,7 @@ def _hasty_newton(load, travel, sliders, s, pose, room):
     q, last = pose.q, np.inf
     room.start[:] = q
     for _ in range(_HASTY):
-        terms = _evaluate(load, travel, sliders, s, pose, room, 1)
+        terms = evaluate(load, moved, sliders, s, pose, room, 1)
         size = _size(room)
         if _balanced(size, terms, _FINE, room) or (
                 _balanced(size, terms, _ROUGH, room) and size >= 0.5 * last):
@@ -244,14 +315,14 @@ def _hasty_newton(load, travel, sliders, s, pose, room):
 
 
 @helper
-def _newton(load, travel, sliders, s, pose, room):
+def _newton(load, moved, sliders, s, pose, room):
     """Newton's method with a shift that grows after failed steps; whether it succeeded."""
-    if _hasty_newton(load, travel, sliders, s, pose, room):
+    if _hasty_newton(load, moved, sliders, s, pose, room):
         return True
     m = len(pose.q)
     shift, q = 0.0, pose.q
     for _ in range(_TRIES):
-        terms = _evaluate(load, travel, sliders, s, pose, room, 1)
+        terms = evaluate(load, moved, sliders, s, pose, room, 1)
         size = _size(room)
         if not np.isfinite(size):
             return False
@@ -264,9 +335,9 @@ def _newton(load, travel, sliders, s, pose, room):
                 room.matrix[i, i] += shift * room.scale[i]
             if not _step(q, room):
                 shift = max(30.0 * shift, 1e-10)
-                _evaluate(load, travel, sliders, s, pose, room, 1)
+                evaluate(load, moved, sliders, s, pose, room, 1)
                 continue
-            _evaluate(load, travel, sliders, s, pose, room, 0)
+            evaluate(load, moved, sliders, s, pose, room, 0)
             if _size(room) < size:
                 better = True
                 break
@@ -275,16 +346,16 @@ def _newton(load, travel, sliders, s, pose, room):
             if shift == 0.0 and _balanced(size, terms, _ROUGH, room):
                 break
             shift = max(30.0 * shift, 1e-10)
-            _evaluate(load, travel, sliders, s, pose, room, 1)
+            evaluate(load, moved, sliders, s, pose, room, 1)
         if not better:
-            _evaluate(load, travel, sliders, s, pose, room, 0)
+            evaluate(load, moved, sliders, s, pose, room, 0)
             return _balanced(size, terms, _ROUGH, room)
         shift = 0.0 if shift <= 1e-9 else 0.1 * shift
     return False
 
 
-@kernel(types.boolean(vector, f8, SLIDERS, SYSTEM, POSE, ROOM))
-def find_equilibrium(load, travel, held_sliders, held_s, held_pose, held_room):
+@kernel(types.boolean(vector, GROUND_MOTION, SLIDERS, SYSTEM, POSE, ROOM))
+def find_equilibrium(load, moved, held_sliders, held_s, held_pose, held_room):
     """Bring ``pose`` into equilibrium from where it is; whether that succeeded.
 
     ``pose.force`` and ``pose.left`` are those of the last equilibrium at the begin. Rigid sliders
@@ -292,34 +363,43 @@ def find_equilibrium(load, travel, held_sliders, held_s, held_pose, held_room):
     """
     sliders, s, pose, room = (borrowed(held_sliders), borrowed(held_s), borrowed(held_pose),
                               borrowed(held_room))
-    n, e = sliders.stiffness.shape
+    n, elements = sliders.stiffness.shape
+    tangents = pose.force.shape[1] // elements
     held = False
     for j in range(n):
-        for k in range(e):
-            rigid = sliders.rigid[j, k] != 0.0
+        for k in range(elements * tangents):
+            rigid = sliders.rigid[j, k // tangents] != 0.0
             held |= rigid
             room.multiplier[j, k] = pose.force[j, k] if rigid else 0.0
     solved = False
     for _ in range(_REPEATS if held else 1):
-        solved = _newton(load, travel, sliders, s, pose, room)
+        solved = _newton(load, moved, sliders, s, pose, room)
         if not solved or not held:
             break
-        changed, largest = 0.0, 0.0
+        changed, largest, noise = 0.0, 0.0, 0.0
         for j in range(n):
-            for k in range(e):
-                if sliders.rigid[j, k] != 0.0:
+            for k in range(elements * tangents):
+                if sliders.rigid[j, k // tangents] != 0.0:
+                    place = abs(pose.node[j, PLACE + PER_TANGENT * (k % tangents)])
+                    noise = max(noise, sliders.stiffness[j, k // tangents] * (
+                        place + abs(pose.left[j, k])))
                     changed = max(changed, abs(pose.force[j, k] - room.multiplier[j, k]))
                     largest = max(largest, abs(pose.force[j, k]))
                     room.multiplier[j, k] = pose.force[j, k]
-        if changed <= _SETTLED * largest:
+        if changed <= _SETTLED * largest + _ROUNDING * noise:
             break
         solved = False
     if not solved:
         return False
     for j in range(n):
-        for k in range(e):
-            force, limit = pose.force[j, k], sliders.limit[j, k] * pose.node[j, PRESSING]
-            if abs(force) >= limit:
-                give = 0.0 if sliders.rigid[j, k] != 0.0 else force / sliders.stiffness[j, k]
-                pose.left[j, k] = pose.node[j, PLACE] - give
+        for e in range(elements):
+            limit, size = sliders.limit[j, e] * pose.node[j, PRESSING], 0.0
+            for k in range(tangents):
+                size = math.hypot(size, pose.force[j, tangents * e + k])
+            if size >= (1.0 - _SLIDES) * limit:
+                for k in range(tangents):
+                    at = tangents * e + k
+                    give = (0.0 if sliders.rigid[j, e] != 0.0
+                            else pose.force[j, at] / sliders.stiffness[j, e])
+                    pose.left[j, at] = pose.node[j, PLACE + PER_TANGENT * k] - give
     return True

@@ -3,30 +3,30 @@
 import warnings
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any
 
 import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.types import Array
-from fecontact.core.units import count, listed
-from fecontact.laws.signals.harmonic import Constant
+from fecontact.core.units import count
+from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.balance import Balance
 from fecontact.system.equilibrium.statics import resting
-from fecontact.system.interfaces import motion_sources
-from fecontact.system.model_limits import limits_exceeded, require_plane, warn_of_limits
+from fecontact.system.model_limits import limits_exceeded, warn_of_limits
+from fecontact.system.nodes import SystemArrays
+from fecontact.system.quasistatic.given import given_rows, travelled, travelling
 from fecontact.system.quasistatic.history import LoadHistory
-from fecontact.system.quasistatic.increment import (
+from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, kept_for, march
+from fecontact.system.quasistatic.path import LoadPath
+from fecontact.system.quasistatic.pose import (
     PENETRATION,
     Pose,
     Sliders,
     pose_for,
     room_for,
 )
-from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, kept_for, march
-from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.quasistatic.sliders import require_sliders, sliders_of
 
@@ -70,7 +70,7 @@ def load_history(
     ------
     InputError
         For bristle laws, which have no quasi-static limit of springs; values out of range; a travel
-        where several sides move.
+        where several sides move; motions in space of a plane body.
     AnalysisError
         If the first vertex has no equilibrium.
 
@@ -80,46 +80,45 @@ def load_history(
         If the path ends early or the body jumps, and as for static equilibria.
     """
     require_kind("load_history", ContactSystem, system=system)
-    require_plane(system, "load_history")
     require_kind("load_history", LoadPath, path=path)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"load_history: rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_sliders(system)
-    given = _given(system, path)
-    _require_one_motion(system, given[:, -1])
+    given, arrays = given_rows(system, path), travelling(system)
     if start is None:
-        m = system.basis.modes
-        balance, q = resting(system, given[0, :m], given[0, m : m + 2], given[0, -1])
-        slope = _slope_under_preload(system, path, given, balance, q, rtol)
+        loads, ends, travel = np.split(given[0], [system.basis.modes, 1 - system.basis.dimension])
+        balance, q = resting(system, arrays, loads, ends, travel)
+        slope = _slope_under_preload(system, arrays, path, given, balance, q, rtol)
         sliders = sliders_of(system, tangential_ratio, tangential_stiffness, slope)
-        # Sliders begin where the nodes are.
-        place = system.arrays.Tx @ q - system.arrays.sliding * given[0, -1]
-        pose = _pose(q, sliders, np.repeat(place[:, None], sliders.limit.shape[1], axis=1))
-        return _loaded(system, path, given, pose, sliders, balance, rtol, 0)
+        pose = _begin(system, q, given[0], sliders)
+        return _loaded(system, arrays, path, given, pose, sliders, balance, rtol, 0)
     require_kind("load_history", (LoadHistory, RestState), start=start)
     state = start.state() if isinstance(start, LoadHistory) else start
     state.check(system)
     pose = _pose(state.modal_coordinates, state.sliders, state.slider_place, state.slider_force)
-    balance = _balance(system, given[0])
-    return _loaded(system, path, np.vstack([state.given, given]), pose, state.sliders, balance,
-                   rtol, 1)
+    balance = _balance(system, arrays, given[0])
+    return _loaded(system, arrays, path, np.vstack([state.given, given]), pose, state.sliders,
+                   balance, rtol, 1)
 
 
 def _loaded(
-    system: ContactSystem, path: LoadPath, given: Array, pose: Pose, sliders: Sliders,
-    balance: Balance, rtol: float, skipped: int,
+    system: ContactSystem, arrays: SystemArrays, path: LoadPath, given: Array, pose: Pose,
+    sliders: Sliders, balance: Balance, rtol: float, skipped: int,
 ) -> LoadHistory:
     """Result of a march, without its first ``skipped`` rows; issues the warnings."""
-    reached, found = _marched(system, given, pose, sliders, balance.scale, rtol)
+    reached, found = _marched(arrays, given, pose, sliders, balance.scale, rtol)
     counts = found.counts
     if reached <= skipped:
         raise AnalysisError("There is no equilibrium with friction at the first vertex of the "
                             "path; begin at loads that the state before can carry.")
     kept = slice(skipped, reached)
     complete = reached == len(given)
+    # Vectors of sliders in space.
+    shape = (-1, *sliders.limit.shape, *([2] if system.basis.dimension == 3 else []))
     history = LoadHistory(
-        system, path, given[kept], found.q[kept], found.node[kept], found.force[kept],
-        found.left[kept], found.work[kept, : len(WORKS)], found.work[kept, len(WORKS) :], sliders,
+        system, path, given[kept], found.q[kept], found.node[kept],
+        found.force[kept].reshape(shape), found.left[kept].reshape(shape),
+        found.work[kept, : len(WORKS)], found.work[kept, len(WORKS) :], sliders,
         "finished" if complete else "no-equilibrium",
         {"solved": int(counts[SOLVED]), "cut": int(counts[CUT]), "jumps": int(counts[JUMPS])})
     if not complete:
@@ -140,90 +139,69 @@ def _loaded(
 
 
 def _marched(
-    system: ContactSystem, given: Array, pose: Pose, sliders: Sliders, scale: Array, rtol: float
+    arrays: SystemArrays, given: Array, pose: Pose, sliders: Sliders, scale: Array, rtol: float
 ) -> tuple[int, Kept]:
     """Number of rows reached, and results."""
-    n, m = system.arrays.Tx.shape
-    e = sliders.limit.shape[1]
-    kept = kept_for(len(given), m, n, e)
-    reached = march(system.arrays, sliders, np.ascontiguousarray(given), rtol, pose,
-                    pose_for(m, n, e), room_for(m, n, e, scale), kept)
+    n, m = arrays.Tx.shape
+    e, tangents = sliders.limit.shape[1], _tangents(pose, sliders)
+    kept = kept_for(len(given), m, n, e, tangents)
+    reached = march(arrays, sliders, np.ascontiguousarray(given), rtol, pose,
+                    pose_for(m, n, e, tangents), room_for(m, n, e, tangents, scale), kept)
     return int(reached), kept
 
 
+def _tangents(pose: Pose, sliders: Sliders) -> int:
+    return pose.force.shape[1] // sliders.limit.shape[1]
+
+
+def _begin(system: ContactSystem, q: Array, given: Array, sliders: Sliders) -> Pose:
+    """The pose at a row of given loads and motions, with sliders where the nodes are."""
+    d = system.basis.dimension
+    rows = system.basis.contact_T[:, : d - 1]
+    place = rows @ q - travelled(system, given[1 - d :]).reshape(-1, d - 1)
+    return _pose(q, sliders, np.repeat(place[:, None], sliders.limit.shape[1], axis=1))
+
+
 def _pose(q: Array, sliders: Sliders, left: Array, force: Array | None = None) -> Pose:
-    pose = pose_for(len(q), *sliders.limit.shape)
-    pose.q[:], pose.left[:] = q, left
+    """A pose with places of the sliders (n, e), in space (n, e, 2), and forces likewise."""
+    n, e = sliders.limit.shape
+    pose = pose_for(len(q), n, e, left.size // (n * e))
+    pose.q[:], pose.left[:] = q, left.reshape(n, -1)
     if force is not None:
-        pose.force[:] = force
+        pose.force[:] = force.reshape(n, -1)
     return pose
 
 
-def _balance(system: ContactSystem, given: Array) -> Balance:
-    arrays = system.arrays
+def _balance(system: ContactSystem, arrays: SystemArrays, given: Array) -> Balance:
     return Balance(arrays._replace(
         constant_load=given[: system.basis.modes].copy(),
         drive_shapes=np.zeros_like(arrays.drive_shapes),
         load_shapes=np.zeros_like(arrays.load_shapes)), 0.0, system.penetration_scale)
 
 
-def _given(system: ContactSystem, path: LoadPath) -> Array:
-    """Rows (N, m + 3) of the path: modal forces of the loads, driven ends, travel."""
-    arrays, forces = system.arrays, system.load.forces
-    scale = path.at_points(path.load_scale)
-    loads = np.outer(scale, arrays.constant_load)
-    if path.forces is not None and len(path.forces) != len(forces):
-        raise InputError(f"LoadPath: forces has {len(path.forces)} entries, but the system has "
-                         f"{len(forces)} in load.forces; give one for each.")
-    for k, signal in enumerate(system.load.signals.values()):
-        value = (scale * _constant(signal) if path.forces is None or k >= len(forces)
-                 else path.at_points(path.forces[k]))
-        loads += np.outer(value, arrays.load_shapes[k])
-    ends = [scale * _constant(motion) if own is None else path.at_points(own)
-            for own, motion in zip((path.motion_x, path.motion_y), system.drive.motions[:2],
-                                   strict=True)]
-    return np.ascontiguousarray(np.column_stack([loads, *ends, path.at_points(path.travel)]))
-
-
-def _constant(source: Any) -> float:
-    """Constant part of a signal."""
-    return float(source.value) if isinstance(source, Constant) else 0.0
-
-
 def _slope_under_preload(
-    system: ContactSystem, path: LoadPath, given: Array, balance: Balance, q: Array, rtol: float
+    system: ContactSystem, arrays: SystemArrays, path: LoadPath, given: Array, balance: Balance,
+    q: Array, rtol: float,
 ) -> Array:
     """Slope dF/du (n,) under the largest load of the path, with nodes that stick without limit."""
-    arrays = system.arrays
     scale = np.abs(path.at_points(path.load_scale))
     preload = int(np.argmax(scale >= scale.max() * (1.0 - 1e-12)))
-    slope = balance.normal(_penetration(system, given[0], q))[1]
+    slope = balance.normal(_penetration(balance.arrays, q))[1]
     if preload == 0:
         return slope
     stuck = np.full((len(arrays.gap), 1), max(float(np.max(slope)), float(np.mean(
         balance.face_stiffness)), 1.0))
     sliders = Sliders(stuck, np.full_like(stuck, 1e30), np.zeros_like(stuck))
-    place = (arrays.Tx @ q - arrays.sliding * given[0, -1])[:, None]
-    reached, found = _marched(system, given[[0, preload]], _pose(q, sliders, place), sliders,
-                              balance.scale, max(rtol, 1e-4))
+    reached, found = _marched(arrays, given[[0, preload]], _begin(system, q, given[0], sliders),
+                              sliders, balance.scale, max(rtol, 1e-4))
     if reached < 2:
         raise AnalysisError("There is no equilibrium under the largest load of the path, even if "
                             "all nodes stuck; check the sign and place of the loads.")
     return balance.normal(found.node[1, :, PENETRATION].copy())[1]
 
 
-def _require_one_motion(system: ContactSystem, travel: Array) -> None:
-    """Raise InputError for a travel (N,) that could be that of several sides."""
-    sources = motion_sources(system.basis, system.ground, system.sliding)
-    if travel.any() and len(sources) > 1:
-        raise InputError(f"load_history: travel moves one side, but the system has "
-                         f"{listed([source.what for source in sources])}; leave out the sliding of "
-                         f"interfaces that rest.")
-
-
-def _penetration(system: ContactSystem, given: Array, q: Array) -> Array:
-    """Penetration (n,) at a row of given loads and motions."""
-    arrays = system.arrays
-    places = arrays.abscissa + arrays.Tx @ q - arrays.sliding * given[-1]
-    heights = np.where(arrays.on_ground, system.ground.height(places), 0.0)
-    return np.asarray(heights - arrays.Ty @ q - arrays.gap)
+def _penetration(arrays: SystemArrays, q: Array) -> Array:
+    """Penetration (n,) of a system at rest."""
+    found = np.empty((len(arrays.gap), kernels.state_columns(arrays)))
+    kernels.contact_state(0.0, np.concatenate([q, np.zeros_like(q)]), arrays, found)
+    return found[:, kernels.PENETRATION].copy()

@@ -2,11 +2,14 @@
 
 Work is taken by the trapezoidal rule, which is exact for the elastic body. What friction loses is
 exact where displacement and normal force of a node change in proportion within an increment. The
-two disagree where sliders begin to slide or nodes close and open within it; an increment is cut
-until they agree.
+two disagree where sliders begin to slide, in space turn while they slide, or nodes close and open
+within it; an increment is cut until they agree. Turned by the angle b within an increment, the
+force of a slider takes the part b^2 / 4 of its loss more or less as work, and is off by about b / 2
+itself.
 """
 
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,19 +19,20 @@ from fecontact.core.compiled import block, f8, helper, integers, kernel, matrix,
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import normal_at
-from fecontact.system.nodes import SYSTEM
-from fecontact.system.quasistatic.increment import (
+from fecontact.system.nodes import SYSTEM, GroundMotion, in_space, moved_across, moved_along
+from fecontact.system.quasistatic.increment import find_equilibrium
+from fecontact.system.quasistatic.pose import (
     AGAINST,
     FORCE,
     LEANING,
-    NODE_COLUMNS,
     PENETRATION,
+    PER_TANGENT,
     PLACE,
     POSE,
     PRESSING,
     ROOM,
     SLIDERS,
-    find_equilibrium,
+    node_columns,
 )
 
 # Works that a path does, and the columns of `march` in which they stand before the losses.
@@ -52,8 +56,9 @@ _WEIGHTS = (0.118463442528095, 0.239314335249683, 0.284444444444444, 0.239314335
 class Kept(NamedTuple):
     """Results of a march.
 
-    q (N, m), nodes (N, n, 6), forces and places of the sliders (N, n, e), work (N, 4 + n): that of
-    :data:`WORKS` and the loss of each node so far; and numbers of increments.
+    q (N, m), nodes (N, n, 6), forces and places of the sliders (N, n, e), in space (N, n, 9) and
+    (N, n, 2 e), work (N, 4 + n): that of :data:`WORKS` and the loss of each node so far; and
+    numbers of increments.
     """
 
     q: Array
@@ -67,22 +72,22 @@ class Kept(NamedTuple):
 KEPT = types.NamedTuple([matrix, block, block, block, matrix, integers], Kept)
 
 
-def kept_for(rows: int, m: int, n: int, sliders: int) -> Kept:
+def kept_for(rows: int, m: int, n: int, sliders: int, tangents: int) -> Kept:
     """Room for the results."""
-    return Kept(np.zeros((rows, m)), np.zeros((rows, n, NODE_COLUMNS)),
-                np.zeros((rows, n, sliders)), np.zeros((rows, n, sliders)),
+    force, left = np.zeros((2, rows, n, sliders * tangents))
+    return Kept(np.zeros((rows, m)), np.zeros((rows, n, node_columns(tangents))), force, left,
                 np.zeros((rows, len(WORKS) + n)), np.zeros(COUNTS, dtype=np.int64))
 
 
 @helper
 def _apply(given, s, load):
-    """Fill load (m,) from a row of given loads and motions; returns the travel."""
-    m = len(load)
+    """Fill load (m,) from a row of given loads and motions; returns the motion of the ground."""
+    m, d = len(load), len(s.drive_stiffness)
     for i in range(m):
         load[i] = given[i]
-        for axis in range(2):
+        for axis in range(d):
             load[i] += given[m + axis] * s.drive_stiffness[axis] * s.drive_shapes[axis, i]
-    return given[m + 2]
+    return GroundMotion(given[m + d], 0.0, given[m + d + 1] if in_space(s) else 0.0, 0.0)
 
 
 @helper
@@ -96,27 +101,80 @@ def _pressed_energy(j, before, after, s):
 
 
 @helper
+def _begin(j, e, old, new, sliders):
+    """Part of an increment in proportional motion at which slider e of node j reaches its limit.
+
+    There |R + t c dg| = phi (P + t dP), a quadratic equation in t.
+    """
+    tangents = old.force.shape[1] // sliders.stiffness.shape[1]
+    limit, P = sliders.limit[j, e], old.node[j, PRESSING]
+    risen = new.node[j, PRESSING] - P
+    second, first, below = -(limit * risen) ** 2, -limit**2 * P * risen, -(limit * P) ** 2
+    for k in range(tangents):
+        R, place = old.force[j, tangents * e + k], PLACE + PER_TANGENT * k
+        rise = sliders.stiffness[j, e] * (new.node[j, place] - old.node[j, place])
+        second += rise * rise
+        first += R * rise
+        below += R * R
+    root = np.sqrt(max(first * first - second * below, 0.0))
+    if first > 0.0:
+        return min(max(-below / (first + root), 0.0), 1.0)
+    return min(max((root - first) / second, 0.0), 1.0) if second > 0.0 else 0.0
+
+
+@helper
 def _slid(j, e, old, new, sliders):
-    """What slider e of node j loses between two poses, in proportional motion."""
-    way = new.left[j, e] - old.left[j, e]
+    """What slider e of node j loses between two poses, in proportional motion; and its work.
+
+    The work is that of the mean force on the way of the slider.
+    """
+    tangents = old.force.shape[1] // sliders.stiffness.shape[1]
+    way, work = 0.0, 0.0
+    for k in range(tangents):
+        at = tangents * e + k
+        part = new.left[j, at] - old.left[j, at]
+        way = math.hypot(way, part)
+        work += 0.5 * (old.force[j, at] + new.force[j, at]) * part
     if way == 0.0:
-        return 0.0
-    limit = sliders.limit[j, e] if way > 0.0 else -sliders.limit[j, e]
+        return 0.0, 0.0
     P0, P1 = old.node[j, PRESSING], new.node[j, PRESSING]
-    begin = 0.0
-    if sliders.rigid[j, e] == 0.0:
-        # Sliding begins where the spring reaches its limit.
-        rise = sliders.stiffness[j, e] * (new.node[j, PLACE] - old.node[j, PLACE])
-        nearing = rise - limit * (P1 - P0)
-        if nearing * way > 0.0:
-            begin = min(max((limit * P0 - old.force[j, e]) / nearing, 0.0), 1.0)
-    return 0.5 * limit * (P0 + begin * (P1 - P0) + P1) * way
+    begin = 0.0 if sliders.rigid[j, e] != 0.0 else _begin(j, e, old, new, sliders)
+    return 0.5 * sliders.limit[j, e] * (P0 + begin * (P1 - P0) + P1) * way, work
+
+
+@helper
+def _rubbed(j, e, old, new, sliders):
+    """Work of the mean force of slider e of node j on the way of the node, without its sign."""
+    tangents = old.force.shape[1] // sliders.stiffness.shape[1]
+    total = 0.0
+    for k in range(tangents):
+        at, place = tangents * e + k, PLACE + PER_TANGENT * k
+        total += 0.5 * (old.force[j, at] + new.force[j, at]) * (
+            new.node[j, place] - old.node[j, place])
+    return abs(total)
+
+
+@helper
+def _leant(j, tangent, old, new):
+    """Work of what leans with the ground, as node j moves along a tangent."""
+    k = PER_TANGENT * tangent
+    return 0.5 * (old.node[j, LEANING + k] + new.node[j, LEANING + k]) * (
+        new.node[j, PLACE + k] - old.node[j, PLACE + k])
+
+
+@helper
+def _moving(j, tangent, travelled, old, new, s):
+    """Work of the other side of node j, which has travelled along a tangent."""
+    k = PER_TANGENT * tangent
+    work = -0.5 * (old.node[j, AGAINST + k] + new.node[j, AGAINST + k]) * travelled
+    # Ground that pushes vertically lifts the node wherever it moves along.
+    return work if s.leans else work + _leant(j, tangent, old, new)
 
 
 @helper
 def _works(old, new, given, s, out):
-    """Fill out (4,) with the works of an increment between the rows of ``given`` (2, m + 3)."""
-    m = len(old.q)
+    """Fill out (4,) with the works of an increment between two rows ``given``."""
+    m, d = len(old.q), len(s.drive_stiffness)
     for i in range(len(WORKS)):
         out[i] = 0.0
     for i in range(m):
@@ -125,20 +183,19 @@ def _works(old, new, given, s, out):
         for k in range(m):
             out[_CIRCULATORY] -= 0.25 * (s.stiffness[i, k] - s.stiffness[k, i]) * (
                 old.q[k] + new.q[k]) * moved
-    for axis in range(2):
+    for axis in range(d):
         stretch = given[0, m + axis] + given[1, m + axis]
         for i in range(m):
             stretch -= s.drive_shapes[axis, i] * (old.q[i] + new.q[i])
         out[_DRIVE] += 0.5 * s.drive_stiffness[axis] * stretch * (
             given[1, m + axis] - given[0, m + axis])
-    travelled = given[1, m + 2] - given[0, m + 2]
+    travelled, second = given[1, m + d] - given[0, m + d], 0.0
+    if in_space(s):
+        second = given[1, m + d + 1] - given[0, m + d + 1]
     for j in range(len(old.node)):
-        out[_TRAVEL] -= 0.5 * (old.node[j, AGAINST] + new.node[j, AGAINST]) * (
-            s.sliding[j] * travelled)
-        if not s.leans:
-            # Ground that pushes vertically lifts the node wherever it moves along.
-            out[_TRAVEL] += 0.5 * (old.node[j, LEANING] + new.node[j, LEANING]) * (
-                new.node[j, PLACE] - old.node[j, PLACE])
+        out[_TRAVEL] += _moving(j, 0, moved_along(j, travelled, second, s), old, new, s)
+        if in_space(s):
+            out[_TRAVEL] += _moving(j, 1, moved_across(j, travelled, second, s), old, new, s)
 
 
 @kernel(types.void(SYSTEM, SLIDERS, POSE, POSE, matrix, vector, vector))
@@ -153,23 +210,23 @@ def _measure(held_s, held_sliders, held_old, held_new, given, part, turnover):
     error, turned, gap, pressed = 0.0, 0.0, 0.0, 0.0
     for j in range(len(old.node)):
         lost = 0.0
-        along = new.node[j, PLACE] - old.node[j, PLACE]
         for e in range(sliders.stiffness.shape[1]):
-            loss = _slid(j, e, old, new, sliders)
-            mean = 0.5 * (old.force[j, e] + new.force[j, e])
+            loss, work = _slid(j, e, old, new, sliders)
             lost += loss
-            error += abs(mean * (new.left[j, e] - old.left[j, e]) - loss)
-            turned += abs(mean * along)
+            error += abs(work - loss)
+            turned += _rubbed(j, e, old, new, sliders)
         part[len(WORKS) + j] = lost
         # By the trapezoidal rule F du is F y_R' dg - F dy.
         F = 0.5 * (old.node[j, FORCE] + new.node[j, FORCE])
-        lean = 0.5 * (old.node[j, LEANING] + new.node[j, LEANING])
+        lean, leaning = _leant(j, 0, old, new), 0.0
+        if in_space(s):
+            leaning = _leant(j, 1, old, new)
         lifted = 0.0
         for i in range(len(old.q)):
             lifted += s.Ty[j, i] * (new.q[i] - old.q[i])
         before, after = old.node[j, PENETRATION], new.node[j, PENETRATION]
-        gap += _pressed_energy(j, before, after, s) - lean * along + F * lifted
-        pressed += abs(F * (after - before)) + abs(lean * along)
+        gap += _pressed_energy(j, before, after, s) - lean - leaning + F * lifted
+        pressed += abs(F * (after - before)) + abs(lean) + abs(leaning)
     turnover[ERROR], turnover[TURNED] = error, turned
     turnover[GAP], turnover[PRESSED] = abs(gap), pressed
 
@@ -204,16 +261,18 @@ def _keep(row, pose, total, kept):
 
 @kernel(types.i8(SYSTEM, SLIDERS, matrix, f8, POSE, POSE, ROOM, KEPT))
 def march(held_s, held_sliders, given, rtol, held_old, held_new, held_room, held_kept):
-    """Go along rows of given loads and motions (N, m + 3): modal loads, drive in x and y, travel.
+    """Go along rows of given loads and motions: modal loads, drive in x and y, travel, (N, m + 3).
+
+    In space (N, m + 5): with the drive in z, and the travel along y.
 
     ``old`` holds the pose at the first row, whose F and places are found here; ``new`` is room.
     Fills ``kept`` and returns the number of rows that were reached.
     """
     s, sliders, room = borrowed(held_s), borrowed(held_sliders), borrowed(held_room)
     old, new, kept = borrowed(held_old), borrowed(held_new), borrowed(held_kept)
-    rows, m = len(given), len(old.q)
+    rows, columns = given.shape
     size = kept.work.shape[1]
-    load, ends = np.empty(m), np.zeros((2, m + 3))
+    load, ends = np.empty(len(old.q)), np.zeros((2, columns))
     part, total, turnover = np.zeros(size), np.zeros(size), np.zeros(4)
     rubbed, pressed, rubbing, pressing = 0.0, 0.0, 0.0, 0.0
     row, done, proposed, failed, steepness = 0, 0.0, 1.0, 2.0, 0.0
@@ -225,26 +284,26 @@ def march(held_s, held_sliders, given, rtol, held_old, held_new, held_room, held
             goal = failed if steepness * rest * rest <= 1.0 else done + 0.5 * rest
         length = goal - done
         last = max(row - 1, 0)
-        for i in range(m + 3):
+        for i in range(columns):
             ends[1, i] = given[row, i] if goal == 1.0 else (
                 given[last, i] + goal * (given[row, i] - given[last, i]))
         _copy(old, new)
-        travel = _apply(ends[1], s, load)
-        solved = find_equilibrium(load, travel, sliders, s, new, room)
+        moved = _apply(ends[1], s, load)
+        solved = find_equilibrium(load, moved, sliders, s, new, room)
         kept.counts[SOLVED] += 1
         excess = np.inf if row > 0 else 0.0
         turnover[TURNED], turnover[PRESSED] = 0.0, 0.0
         if solved and row > 0:
             _measure(s, sliders, old, new, ends, part, turnover)
-            turned, moved = turnover[TURNED], turnover[PRESSED]
+            turned, heaved = turnover[TURNED], turnover[PRESSED]
             if length == 1.0:
-                rubbed, pressed = max(rubbed, turned), max(pressed, moved)
+                rubbed, pressed = max(rubbed, turned), max(pressed, heaved)
             floor = rubbed + pressed
             for i in range(len(WORKS)):
                 floor += abs(part[i])
             floor = min(_UNRESOLVED, 0.01 * rtol) * floor + 1e-300
             excess = max(turnover[ERROR] / (rtol * max(rubbed, rubbing + turned) + floor),
-                         turnover[GAP] / (rtol * max(pressed, pressing + moved) + floor))
+                         turnover[GAP] / (rtol * max(pressed, pressing + heaved) + floor))
         if not solved and (row == 0 or length <= _LEAST):
             return row
         if excess > 1.0:
@@ -257,7 +316,7 @@ def march(held_s, held_sliders, given, rtol, held_old, held_new, held_room, held
         for i in range(size):
             total[i] += part[i]
         _copy(new, old)
-        for i in range(m + 3):
+        for i in range(columns):
             ends[0, i] = ends[1, i]
         done = goal
         rubbing += turnover[TURNED]

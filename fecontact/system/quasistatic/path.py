@@ -1,6 +1,6 @@
 """Paths of quasi-static loading: loads and motions at vertices, straight lines between."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
@@ -12,6 +12,8 @@ from fecontact.core.units import Unit
 
 Values = float | tuple[float, ...]
 
+_HISTORIES = ("load_scale", "motion_x", "motion_y", "motion_z", "travel", "travel_y")
+_OPTIONAL = ("motion_x", "motion_y", "motion_z", "travel_y")
 _MOST = 1_000_000
 
 
@@ -30,10 +32,13 @@ class LoadPath:
     forces : list of float or list, optional
         Values of the forces of the system's ``load.forces``, in their order [N], [N m]; they are
         not scaled.
-    motion_x, motion_y : float or list, optional
-        Displacements of the driven ends of the springs at B [m].
+    motion_x, motion_y, motion_z : float or list, optional
+        Displacements of the driven ends of the springs at B, along z of solids [m].
     travel : float or list
-        Travel s of the ground in +x [m], or of the one interface that slides [m], [rad].
+        Travel s of the ground in +x [m], or of the one interface that slides, along its velocity
+        [m], [rad].
+    travel_y : float or list, optional
+        Travel of the ground in +y below solids [m]; zero by default.
     steps : int or list
         Increments between two vertices, of each of the sections if it is a list. They are the
         points at which results are given; increments are cut further where accuracy needs it.
@@ -49,11 +54,15 @@ class LoadPath:
     forces: tuple[float | tuple[float, ...], ...] | None = None
     motion_x: Annotated[float | tuple[float, ...] | None, Unit("m")] = None
     motion_y: Annotated[float | tuple[float, ...] | None, Unit("m")] = None
+    motion_z: Annotated[float | tuple[float, ...] | None, Unit("m")] = field(
+        default=None, kw_only=True)
     travel: Annotated[float | tuple[float, ...], Unit("m")] = 0.0
+    travel_y: Annotated[float | tuple[float, ...] | None, Unit("m")] = field(
+        default=None, kw_only=True)
     steps: int | tuple[int, ...] = 20
 
     def __post_init__(self) -> None:
-        for name in ("load_scale", "motion_x", "motion_y", "travel"):
+        for name in _HISTORIES:
             object.__setattr__(self, name, _values(getattr(self, name), name))
         if self.forces is not None:
             if not isinstance(self.forces, tuple | list | np.ndarray):
@@ -65,7 +74,8 @@ class LoadPath:
                    if isinstance(value, tuple)}
         if not lengths or max(lengths.values()) < 2:
             raise InputError("LoadPath: a path needs at least two vertices; give a list of two "
-                             "values or more for load_scale, forces, motion_x, motion_y or travel.")
+                             "values or more for load_scale, forces, motion_x, motion_y, motion_z, "
+                             "travel or travel_y.")
         if len(set(lengths.values())) > 1:
             told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
             raise InputError(f"LoadPath: all lists need one value for each vertex, but {told}.")
@@ -87,8 +97,7 @@ class LoadPath:
                              f"increments; at most {_MOST} are possible.")
 
     def _histories(self) -> list[tuple[str, Values | None]]:
-        given = [(name, getattr(self, name)) for name in ("load_scale", "motion_x", "motion_y",
-                                                          "travel")]
+        given = [(name, getattr(self, name)) for name in _HISTORIES]
         return given + [(f"forces[{k}]", value) for k, value in enumerate(self.forces or ())]
 
     @property
@@ -117,7 +126,7 @@ class LoadPath:
 
 def _values(given: object, name: str) -> Values | None:
     """One number or a tuple of them."""
-    if given is None and name.startswith("motion"):
+    if given is None and name in _OPTIONAL:
         return None
     array = as_floats(given, f"LoadPath: {name}")
     if array.ndim > 1 or not array.size:

@@ -7,10 +7,12 @@ from scipy.linalg import null_space
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import require_choice
+from fecontact.core.types import Array, Integers
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.equilibrium.statics import at_rest, follower
+from fecontact.system.equilibrium.statics import at_rest, follower, planar_follower
 from fecontact.system.jacobian import jacobian
+from fecontact.system.quasistatic.given import travelling
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
@@ -30,8 +32,9 @@ def prestressed_modes(
     The tangent of the normal law, with its damping, acts at nodes in contact, and the springs of
     sliders that stick; rigid sticking is a constraint. Open nodes add nothing. A slider that slides
     follows the normal force, ``dR = phi\, dF\, \mathrm{sgn} R``, which makes the stiffness
-    unsymmetric, so that modes may be complex and may grow. Modes of steady sliding are those of
-    ``fecontact.analysis.complex_modes(system, "sliding")``.
+    unsymmetric, so that modes may be complex and may grow. In space ``R / |R|`` takes the place of
+    the sign, and across that direction the slider still sticks. Modes of steady sliding are those
+    of ``fecontact.analysis.complex_modes(system, "sliding")``.
 
     Parameters
     ----------
@@ -54,19 +57,37 @@ def prestressed_modes(
     require_kind("prestressed_modes", (LoadHistory, RestState), state=state)
     rest = state.state() if isinstance(state, LoadHistory) else state
     rest.check(system)
-    sliders, Tx = rest.sliders, system.arrays.Tx
-    closed = rest.normal_force != 0.0
-    sliding = rest.at_limit & (sliders.limit > 0.0) & (at_limit == "slip")
-    sticking = closed[:, None] & (sliders.limit > 0.0) & ~sliding
+    sliders, arrays = rest.sliders, travelling(system)
+    tangents = system.basis.contact_T[:, : system.basis.dimension - 1]
+    closed = (rest.normal_force != 0.0)[:, None] & (sliders.limit > 0.0)
+    sliding = closed & rest.at_limit & (at_limit == "slip")
+    force = rest.slider_force.reshape(*sliders.limit.shape, -1)
+    size = np.linalg.norm(force, axis=-1, keepdims=True)
+    along = np.where(sliding[..., None] & (size > 0.0), force / np.where(size > 0.0, size, 1.0),
+                     0.0)
     # Sliding sliders as a friction law that follows the normal force.
-    follow = (sliders.limit * np.sign(rest.slider_force) * sliding).sum(axis=1, keepdims=True)
-    arrays = at_rest(system.arrays, rest.travel)._replace(
-        friction=np.full(n, follower.address), friction_parameters=np.ascontiguousarray(follow))
+    follow = (sliders.limit[..., None] * along).sum(axis=1)
+    arrays = at_rest(arrays, *rest.travels.tolist())._replace(
+        friction=np.full(n, follower.address), friction_parameters=np.ascontiguousarray(follow),
+        planar=np.full_like(arrays.planar, planar_follower.address))
     full = np.empty((2 * m, 2 * m))
     jacobian(0.0, np.concatenate([rest.modal_coordinates, np.zeros(m)]), arrays, full)
-    rigid = (sticking & (sliders.rigid > 0.0)).any(axis=1)
-    springs = np.where(sticking & (sliders.rigid == 0.0), sliders.stiffness, 0.0).sum(axis=1)
-    full[m:, :m] -= (Tx.T * springs) @ Tx
-    free = null_space(Tx[rigid]) if rigid.any() else np.eye(m)
-    within = np.kron(np.eye(2), free)
+    # What holds each slider (n, e, k, k): across the direction of sliding, or all around.
+    holding = closed[..., None, None] * (np.eye(tangents.shape[1])
+                                         - along[..., :, None] * along[..., None, :])
+    stiffness = np.where(sliders.rigid == 0.0, sliders.stiffness, 0.0)
+    springs = np.einsum("ne,nekl->nkl", stiffness, holding)
+    full[m:, :m] -= np.einsum("nki,nkl,nlj->ij", tangents, springs, tangents, optimize=True)
+    free = _free(tangents, holding[sliders.rigid > 0.0], np.nonzero(sliders.rigid > 0.0)[0])
+    within = np.asarray(np.kron(np.eye(2), free), dtype=float)
     return ComplexModes.of(full, within=within, zero=_ZERO)
+
+
+def _free(tangents: Array, holding: Array, nodes: Integers) -> Array:
+    """Motions (m, k) that rigid sliders of some nodes allow, which they hold by projections."""
+    rows = [np.zeros((0, tangents.shape[2]))]
+    for node, held in zip(nodes.tolist(), holding, strict=True):
+        values, directions = np.linalg.eigh(held)
+        rows.append(directions[:, values > 0.5].T @ tangents[node])
+    constraints = np.vstack(rows)
+    return np.asarray(null_space(constraints)) if len(constraints) else np.eye(tangents.shape[2])

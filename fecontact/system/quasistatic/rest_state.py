@@ -9,10 +9,17 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, count, quantity
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.quasistatic.increment import FORCE, PLACE, PRESSING, Sliders
+from fecontact.system.quasistatic.pose import (
+    FORCE,
+    PER_TANGENT,
+    PLACE,
+    PRESSING,
+    Sliders,
+)
 
 STATES = ("open", "stick", "slip")
 OPEN, STICK, SLIP = range(len(STATES))
+_KINDS = ("plane bodies", "solids")
 # Relative distance from its limit at which a slider counts as sliding.
 _AT_LIMIT = 1e-9
 
@@ -27,12 +34,14 @@ class RestState(Summarised):
         q.
     given : (m + 3,) array
         Modal forces of the loads, displacements of the driven ends of the springs at B in x and y
-        [m], travel of the ground [m].
+        [m], travel of the ground [m]; in space (m + 5,), with z and the travel along y.
     node : (n, 6) array
         F [N], the force that friction sees [N], penetration [m], place relative to the ground [m],
-        force in -x [N] and its part that leans with the ground [N].
+        force in -x [N] and its part that leans with the ground [N]; in space (n, 9), the last three
+        along the first tangent, then along the second one.
     slider_force, slider_place : (n, e) arrays
-        R of the sliders of each node [N], and the place to which each has slid [m].
+        R of the sliders of each node [N], and the place to which each has slid [m]; in space
+        (n, e, 2), along the tangents.
     sliders : Sliders
         Stiffness [N/m] and limit, as a part of F, of each slider, and whether it sticks rigidly.
     """
@@ -51,7 +60,7 @@ class RestState(Summarised):
             ("nodes", ", ".join(f"{np.count_nonzero(states == code)} {name}"
                                 for code, name in enumerate(STATES))),
             ("normal force", quantity(float(self.normal_force.sum()), "N", 4)),
-            ("friction force", quantity(float(self.friction_force.sum()), "N", 4)),
+            ("friction force", quantity(total_friction(self.friction_forces), "N", 4)),
             ("sliders", f"{count(self.slider_force.shape[1], 'slider')} per node"),
         ]
 
@@ -62,25 +71,41 @@ class RestState(Summarised):
 
     @property
     def friction_force(self) -> Array:
-        """R (n,), on the body in -x [N]."""
-        return self.slider_force.sum(axis=1)
+        """R (n,), on the body in -x [N]; in space along the first tangent."""
+        return self.friction_forces[:, 0]
+
+    @property
+    def friction_forces(self) -> Array:
+        """Friction forces (n, 1), in space (n, 2), against the tangents [N]."""
+        return self.slider_force.reshape(*self.sliders.limit.shape, -1).sum(axis=1)
 
     @property
     def travel(self) -> float:
-        """Travel of the ground [m]."""
-        return float(self.given[-1])
+        """Travel of the ground along x, or of the interface that slides [m], [rad]."""
+        return float(self.travels[0])
+
+    @property
+    def travels(self) -> Array:
+        """The travel (1,), in space (2,) with that along y [m]."""
+        return self.given[1 - self.slider_force.ndim :]
 
     @property
     def deflection(self) -> Array:
-        """Deflections (n, e) of the springs of the sliders [m]; zero where sticking is rigid."""
-        return np.where(self.sliders.rigid > 0.0, 0.0,
-                        self.node[:, PLACE, None] - self.slider_place)
+        """Deflections (n, e) of the springs of the sliders [m]; zero where sticking is rigid.
+
+        In space (n, e, 2), along the tangents.
+        """
+        shape = self.slider_force.shape
+        place = self.node[:, None, PLACE::PER_TANGENT].reshape(len(self.node), 1, *shape[2:])
+        rigid = self.sliders.rigid.reshape(*shape[:2], *([1] * len(shape[2:])))
+        return np.where(rigid > 0.0, 0.0, place - self.slider_place)
 
     @property
     def at_limit(self) -> Any:
         """Whether each slider (n, e) is at its limit."""
         limit = self.sliders.limit * self.node[:, PRESSING, None]
-        return np.abs(self.slider_force) >= (1.0 - _AT_LIMIT) * limit
+        size = np.linalg.norm(self.slider_force.reshape(*limit.shape, -1), axis=-1)
+        return size >= (1.0 - _AT_LIMIT) * limit
 
     @property
     def contact_state(self) -> Integers:
@@ -90,10 +115,12 @@ class RestState(Summarised):
     def check(self, system: ContactSystem) -> None:
         """Raise InputError unless the state fits a system."""
         n, m = system.basis.contact_nodes, system.basis.modes
-        if len(self.modal_coordinates) != m or len(self.node) != n:
+        solid, rests = system.basis.dimension == 3, self.slider_force.ndim == 3
+        if len(self.modal_coordinates) != m or len(self.node) != n or solid != rests:
             raise InputError(f"The state at rest has {len(self.modal_coordinates)} modes and "
-                             f"{len(self.node)} contact nodes, but the system has {m} and {n}; "
-                             f"load that system itself with load_history.")
+                             f"{len(self.node)} contact nodes of {_KINDS[rests]}, but the system "
+                             f"has {m} and {n} of {_KINDS[solid]}; load that system itself with "
+                             f"load_history.")
 
     def memory(self, system: ContactSystem) -> Array:
         """Internal variables (n, s) of the system's friction at this state.
@@ -109,8 +136,16 @@ class RestState(Summarised):
                     raise InputError(f"{type(law).__name__} cannot go on from this state at rest, "
                                      f"whose friction is that of other springs; use the friction "
                                      f"law with which it was loaded.")
-                out[nodes, : law.memory] = self.slider_force[nodes, : law.memory] / springs[0]
+                force = self.slider_force[nodes, : law.memory]
+                stiffness = springs[0].reshape(*springs[0].shape, *([1] * (force.ndim - 2)))
+                out[nodes, : force[0].size] = (force / stiffness).reshape(len(force), -1)
         return out
+
+
+def total_friction(forces: Array) -> float:
+    """Sum of friction forces (n, k) against tangents [N]: in space the size of a vector."""
+    total = forces.sum(axis=0)
+    return float(total[0]) if len(total) == 1 else float(np.linalg.norm(total))
 
 
 def contact_states(normal_force: Array, at_limit: Any) -> Integers:

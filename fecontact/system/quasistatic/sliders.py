@@ -11,7 +11,7 @@ from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array
 from fecontact.laws.friction_curve import static_coefficient
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.quasistatic.increment import Sliders
+from fecontact.system.quasistatic.pose import Sliders
 
 # Penalty of rigid sticking, in stiffnesses of the contact or the body.
 _PENALTY = 1e3
@@ -107,10 +107,13 @@ def _everywhere(slope: Array, share: Array) -> Array:
 
 def _penalty(system: ContactSystem, slope: Array) -> Array:
     """Penalty (n,) for rigid sticking, well above the stiffness of contact and body."""
-    rows = system.arrays.Tx
-    size = (rows**2).sum(axis=1)
-    # Nodes on supports do not move at all.
-    moves = size > 1e-24 * size.max(initial=0.0)
-    body = np.where(moves, (rows**2) @ np.abs(np.diag(system.arrays.stiffness)), 0.0)
-    body /= np.where(moves, size, 1.0) ** 2
+    body = np.zeros_like(slope)
+    for rows in (system.arrays.Tx, system.arrays.T2):
+        if not len(rows):
+            continue
+        size = (rows**2).sum(axis=1)
+        # Nodes on supports do not move at all.
+        moves = size > 1e-24 * size.max(initial=0.0)
+        along = np.where(moves, (rows**2) @ np.abs(np.diag(system.arrays.stiffness)), 0.0)
+        body = np.maximum(body, along / np.where(moves, size, 1.0) ** 2)
     return _PENALTY * np.maximum(np.maximum(slope, body), 1e-6 * max(body.max(), slope.max(), 1.0))

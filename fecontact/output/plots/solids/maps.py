@@ -21,6 +21,8 @@ from fecontact.output.plots.run import thinned
 from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan, face_plans
 from fecontact.output.plots.style import COLOURS, STATE_COLOURS, add_note, state_names
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import STATES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,6 +86,34 @@ def contact_maps(
         _shares(upper.subplots(), run, states, shades, run.time[which])
         _draw_rows(lower, rows, titles, states, max(float(np.linalg.norm(
             friction, axis=2).max()), 0.0))
+    return figure
+
+
+def shear_maps(history: LoadHistory, row: int, path: str | Path | None) -> "Figure":
+    """What :func:`fecontact.plot.plot_shear` draws of solids."""
+    basis, state = history.system.basis, history.state(row)
+    plans = face_plans(basis, "contact at a load step")
+    friction = -np.einsum("nk,nkd->nd", history.friction_forces[row], basis.tangents)
+    size = np.linalg.norm(friction, axis=1)
+    shear, pressure = size / basis.contact_areas, history.normal_force[row] / basis.contact_areas
+    slip = np.linalg.norm(history.slips[row], axis=1)
+    shades = [{"open": OPEN, **STATE_COLOURS}[name] for name in STATES]
+    most, rows = quantity(float(size.max()), "N"), []
+    for plan in plans:
+        nodes = plan.face.nodes
+        arrows = plan.directions(friction[None, nodes])
+        for label, values, colours, unit in (
+                ("pressure", pressure, PRESSURE_MAP, "Pa"),
+                (f"friction\non the body\nup to {most}", shear, WORK_MAP, "Pa"),
+                ("displacement\nrelative to\nthe other side", slip, WORK_MAP, "m")):
+            rows.append(_Row(label, plan, values[None, nodes], colours, float(values.max()), unit,
+                             arrows if values is shear and size.any() else None))
+        rows.append(_Row("state", plan, state.contact_state[None, nodes], shades,
+                         len(STATES) - 1.0))
+    width = 0.5 * _WIDTH
+    height = sum(float(np.clip((width - 2.5) / one.plan.aspect + 0.4, 1.3, 3.5)) for one in rows)
+    with new_figure(width, min(height + 0.5, 1.3 * _LARGEST), path) as figure:
+        _draw_rows(figure, rows, [f"point {row} of the path"], STATES, float(size.max()))
     return figure
 
 

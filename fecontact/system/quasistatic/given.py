@@ -1,0 +1,118 @@
+"""Loads and motions of a path as rows of numbers, and whose motion the travel is."""
+
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array
+from fecontact.core.units import listed
+from fecontact.laws.excitation import AXES
+from fecontact.laws.signals.harmonic import Constant
+from fecontact.system.arrays import with_motions
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.interfaces import MotionSource, motion_sources
+from fecontact.system.nodes import SystemArrays
+from fecontact.system.quasistatic.path import LoadPath
+
+
+def given_rows(system: ContactSystem, path: LoadPath) -> Array:
+    """Rows (N, m + 2 d - 1) of a path: modal forces of the loads, driven ends, travel.
+
+    Raises
+    ------
+    InputError
+        For another number of forces than the system has, motions in space of a plane body, and a
+        travel that could be that of several sides.
+    """
+    arrays, forces = system.arrays, system.load.forces
+    d = system.basis.dimension
+    scale = path.at_points(path.load_scale)
+    loads = np.outer(scale, arrays.constant_load)
+    if path.forces is not None and len(path.forces) != len(forces):
+        raise InputError(f"LoadPath: forces has {len(path.forces)} entries, but the system has "
+                         f"{len(forces)} in load.forces; give one for each.")
+    for k, signal in enumerate(system.load.signals.values()):
+        value = (scale * _constant(signal) if path.forces is None or k >= len(forces)
+                 else path.at_points(path.forces[k]))
+        loads += np.outer(value, arrays.load_shapes[k])
+    if d == 2:
+        for name in ("motion_z", "travel_y"):
+            if getattr(path, name) is not None:
+                raise InputError(f"LoadPath: {name} is for solids, but the body is plane; leave "
+                                 f"it out.")
+    ends = [scale * _constant(motion) if own is None else path.at_points(own)
+            for own, motion in zip((path.motion_x, path.motion_y, path.motion_z)[:d],
+                                   system.drive.motions[:d], strict=True)]
+    travel = [path.at_points(path.travel), path.at_points(path.travel_y or 0.0)][: d - 1]
+    _require_one_side(system, path, travel)
+    return np.ascontiguousarray(np.column_stack([loads, *ends, *travel]))
+
+
+def actions_of(dimension: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the motions of driven ends, and of the travels, in the plane or in space."""
+    return (tuple(f"motion_{axis}" for axis in AXES[:dimension]),
+            ("travel", "travel_y")[: dimension - 1])
+
+
+def travelling(system: ContactSystem) -> SystemArrays:
+    """Arrays of a system of which the travel of paths is the motion of the other sides.
+
+    In space the first motion is that of the ground along x, or of the one interface that slides
+    along its velocity; the second one is that of the ground along y.
+    """
+    basis = system.basis
+    if basis.dimension == 2:
+        return system.arrays
+    factors = np.zeros((2, basis.contact_nodes, 2))
+    ground, sliding = _sides(system)
+    if not sliding:
+        for by, source in zip(factors, ground, strict=False):
+            by[source.nodes] = source.along
+    elif not ground and len(sliding) == 1:
+        factors[0, sliding[0].nodes] = sliding[0].along
+    return with_motions(system.arrays, factors)
+
+
+def travelled(system: ContactSystem, travel: Array) -> Array:
+    """How far (n,), in space (n, 2), the other side of each node has travelled [m]."""
+    arrays = travelling(system)
+    along = travel[0] * arrays.sliding
+    if len(travel) == 1:
+        return np.asarray(along)
+    across = arrays.sliding_across
+    return np.column_stack([along + travel[1] * across[1],
+                            travel[0] * across[0] + travel[1] * across[2]])
+
+
+def travel_forces(system: ContactSystem, forces: Array) -> Array:
+    """Forces (..., k) on the body along the travels, of nodes (..., n, k) against tangents [N]."""
+    arrays = travelling(system)
+    if forces.shape[-1] == 1:
+        return np.asarray(-forces[..., 0] @ arrays.sliding)[..., None]
+    across = arrays.sliding_across
+    return -np.stack([forces[..., 0] @ arrays.sliding + forces[..., 1] @ across[0],
+                      forces[..., 0] @ across[1] + forces[..., 1] @ across[2]], axis=-1)
+
+
+def _sides(system: ContactSystem) -> tuple[list[MotionSource], list[MotionSource]]:
+    """What moves the ground, and interfaces that slide."""
+    sources = motion_sources(system.basis, system.ground, system.sliding)
+    count = len(sources) - len(system.sliding)
+    return sources[:count], sources[count:]
+
+
+def _require_one_side(system: ContactSystem, path: LoadPath, travel: list[Array]) -> None:
+    ground, sliding = _sides(system)
+    sides = [source.what for source in (*ground[:1], *sliding)]
+    if any(one.any() for one in travel) and len(sides) > 1:
+        raise InputError(f"load_history: travel moves one side, but the system has "
+                         f"{listed(sides)}; leave out the sliding of interfaces that rest.")
+    if path.travel_y is not None and sliding:
+        raise InputError(f"LoadPath: travel_y is that of the ground, but {sides[0]} goes along its "
+                         f"own direction; give travel, and that direction to the interface.")
+
+
+def _constant(source: Any) -> float:
+    """Constant part of a signal."""
+    return float(source.value) if isinstance(source, Constant) else 0.0
