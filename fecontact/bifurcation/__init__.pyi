@@ -29,6 +29,7 @@ from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range
+from .response_options import ResponseSettings
 
 __all__ = [
     "Attractor",
@@ -54,6 +55,7 @@ __all__ = [
     "PeriodDoublingPoint",
     "PeriodicMotion",
     "PoincareScan",
+    "ResponseSettings",
     "Shooting",
     "StabilityMap",
     "UnresolvedPoint",

@@ -164,8 +164,13 @@ def frequency_response(
     found = []
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
-        branch = _branch(field, given, field.index(name), level_name, first,
-                         method or HarmonicBalance(), chosen, both=low < first < high)
+        try:
+            branch = _branch(field, given, field.index(name), level_name, first,
+                             method or HarmonicBalance(), chosen, both=low < first < high)
+        except KeyboardInterrupt:
+            if not found:
+                raise
+            break
         found.append(_with_observed(branch, row, observed, level_name, float(value)))
         if branch.status is BranchStatus.INTERRUPTED:
             break
@@ -301,6 +306,8 @@ def _raised(
     problem, u = _from_rest(field, low, level, plain, replace(options, bounds=bounds))
     branch = branches.follow(problem, u, None, plain, replace(
         options, bounds=bounds, locate=False, progress=None), direction=np.sign(wanted))
+    if branch.status is BranchStatus.INTERRUPTED:
+        raise KeyboardInterrupt
     last = branch.points[-1]
     if last.parameter != wanted:
         raise AnalysisError(f"No orbit was found at the level {wanted:g}: raised from a thousandth "
@@ -354,6 +361,22 @@ def _with_observed(
     attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
                                   "level_name": level_name or ""}
     return replace(branch, points=tuple(points), attributes=attributes)
+
+
+def continued(
+    system: ContactSystem, branch: Branch, row: Array, options: ContinuationOptions
+) -> Branch:
+    """An interrupted branch of a response followed to its end; ``row`` (d,) of what is observed."""
+    known, name = branch.attributes, branch.parameter_name
+    level_name = str(known["level_name"])
+    field = contact_field(system, dict.fromkeys([name, level_name] if level_name else [name]))
+    rest = branches.goes_on(
+        field, branch.points[-1], None,
+        replace(options, points=max(2, options.points - len(branch) + 1)), None, None, 1.0, False)
+    more = _with_observed(rest, row, str(known["observed"]), level_name or None,
+                          float(known["level"]))
+    return replace(branch, points=(*branch.points[:-1], *more.points), status=more.status,
+                   message=more.message)
 
 
 def response_of(branches_by_name: Mapping[str, Branch]) -> FrequencyResponse:

@@ -13,7 +13,7 @@ from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import UNITS, count, round_125, suitable_unit
-from fecontact.output.files.case import library_versions
+from fecontact.output.files.stored_system import library_versions
 from fecontact.output.plots.bifurcation_diagram import LETTERS, stable_pieces
 from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.plots.style import distinct_colours
