@@ -16,7 +16,7 @@ Changes = Annotated[list[str] | None, Parameter(
 Folder = Annotated[Path | None, Parameter(
     name=["--output", "-o"], help="Folder of the results; by default that of the study.")]
 Branches = Annotated[str | None, Parameter(
-    name="--branch", help="Of a file of branches: name or number, from 0, of the branch, or level.")]
+    name="--branch", help="Of a file of branches: name of one, or its number from 0; of a level.")]
 At = Annotated[float | None, Parameter(
     help="Of a file of branches: the orbit at this value of the parameter; by default that of the "
     "largest observed amplitude.")]

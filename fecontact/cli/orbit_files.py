@@ -2,22 +2,25 @@
 
 import tomllib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fecontact.cli.run_files import StoredRun
 from fecontact.core.errors import FecontactError, InputError, choices
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.branch import Branch
     from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
-    from fecontact.integrate.trajectory import Trajectory
     from fecontact.output.files.stored_system import StoredModel
+    from fecontact.study.sections import RenderSettings
 
+DIAGRAMS = ("branches", "response")  # plots of whole files
 _TURN = 2.0 * np.pi
+_OUTPUTS = 1001  # of an orbit
 
 
 @dataclass(frozen=True)
@@ -39,34 +42,30 @@ class OrbitChoice:
     at_hz: float | None = None
     which: int = 0
 
-    @property
-    def given(self) -> bool:
-        """Whether anything is chosen."""
-        return self != OrbitChoice()
-
 
 def holds_branches(file: Path) -> bool:
     """Whether a file is one of branches, by its name."""
     return file.suffix.lower() in (".h5", ".hdf5")
 
 
-def require_no_choice(file: Path, choice: OrbitChoice) -> None:
-    """InputError where an orbit is chosen of what is no file of branches."""
-    if choice.given:
-        raise InputError(f"--branch, --at, --at-hz and --which choose an orbit of a file of "
-                         f"branches, NAME-branch.h5 or NAME-response.h5, but {file} is none.")
-
-
-def read_orbit(
-    file: Path, choice: OrbitChoice, outputs: int, trust: bool
-) -> "tuple[Trajectory, StoredModel, str]":
-    """An orbit of a file as a trajectory, the model of the file, and words for a title.
+def stored_orbit_or_run(
+    file: Path, trust: bool, changes: Iterable[str] | None, choice: OrbitChoice
+) -> "StoredRun":
+    """The chosen orbit of a file of branches as a run over one period, or a stored run.
 
     Raises
     ------
     InputError
-        If the file has no such branch or orbit.
+        If the file has no such branch or orbit, or an orbit is chosen of what has none.
     """
+    from fecontact.cli.run_files import require_stored, stored_run
+
+    if not holds_branches(file):
+        if choice != OrbitChoice():
+            raise InputError(f"--branch, --at, --at-hz and --which choose an orbit of a file of "
+                             f"branches, NAME-branch.h5 or NAME-response.h5, but {file} is none.")
+        return stored_run(file, trust, changes)
+    require_stored(file, changes)
     from fecontact.output.files.branches import read_branches
     from fecontact.output.files.stored_system import read_model
 
@@ -74,9 +73,12 @@ def read_orbit(
     name, branch = _branch(file, named, choice.branch)
     field = field_of(branch, model)
     point = _point(file, branch, field, choice)
-    period = float(point.values["period"])
-    words = f"{branch.parameter_name} = {point.parameter:.5g}, {1.0 / period:.5g} Hz"
-    return point.trajectory(field, outputs), model, words if len(named) == 1 else f"{name}: {words}"
+    settings = _settings(model)
+    if settings.title is None:
+        words = f"{_called(name, branch)}{branch.parameter_name} = {point.parameter:.5g}"
+        settings = replace(settings, title=f"{words}, {1.0 / float(point.values['period']):.5g} Hz")
+    return StoredRun(file, point.trajectory(field, _OUTPUTS), settings, True, model.study,
+                     model.versions)
 
 
 def field_of(branch: "Branch", model: "StoredModel") -> "ContactField":
@@ -105,12 +107,16 @@ def _branch(file: Path, named: "dict[str, Branch]", wanted: str | None) -> "tupl
 
 def _numbered(named: "dict[str, Branch]") -> list[str]:
     """Numbers and names of branches, of responses with their level."""
-    found = []
-    for number, (name, branch) in enumerate(named.items()):
-        level_name = str(branch.attributes.get("level_name", ""))
-        level = f"{level_name} = {float(branch.attributes['level']):g}" if level_name else name
-        found.append(f"{number} ({level})")
-    return found
+    return [f"{number} ({_called(name, branch).removesuffix(', ') or name})"
+            for number, (name, branch) in enumerate(named.items())]
+
+
+def _called(name: str, branch: "Branch") -> str:
+    """What a branch is called before the place of a point on it."""
+    if "level" not in branch.attributes:
+        return f"{name}, "
+    level_name = str(branch.attributes["level_name"])
+    return f"{level_name} = {float(branch.attributes['level']):g}, " if level_name else ""
 
 
 def _point(
@@ -131,13 +137,18 @@ def _point(
     return branch.at(field, value, choice.which)
 
 
-def settings_of(model: "StoredModel") -> dict[str, object]:
-    """The section [render] of the study of a file, as far as this version can read it."""
+def _settings(model: "StoredModel") -> "RenderSettings":
+    """The section [render] of the study of a file, without times, which belong to its run."""
+    from fecontact.core.tables import from_table
+    from fecontact.study.sections import RenderSettings
+
     try:
-        found = tomllib.loads(model.study or "").get("render", {})
-    except (FecontactError, tomllib.TOMLDecodeError):
-        return {}
-    return dict(found)
+        found = from_table(RenderSettings, tomllib.loads(model.study or "").get("render", {}),
+                           "[render]")
+    except FecontactError:
+        # An orbit can be drawn even if this version cannot read its study.
+        return RenderSettings()
+    return replace(found, t_start=None, t_end=None)
 
 
 def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
@@ -152,9 +163,9 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
     first = next(iter(named.values()))
     title = file.stem.removesuffix("-branch").removesuffix("-response")
     if "level" in first.attributes:
-        point, _, component = str(first.attributes["observed"]).rpartition(" ")
+        seen, _, component = str(first.attributes["observed"]).rpartition(" ")
         return report_response(response_of(named), model.system, target, title=title,
-                               observe=(int(point) if point.isdigit() else point, component),
+                               observe=(int(seen) if seen.isdigit() else seen, component),
                                study=model.study)
     settings = tomllib.loads(model.study or "").get("branch", {})
     basis, point = model.system.basis, settings.get("point")
@@ -165,7 +176,7 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
                            y=f"observed_{settings.get('show', 'maximum')}")
 
 
-def plotted(file: Path, kind: str, target: Path) -> Iterable[Path]:
+def plotted(file: Path, kind: str, target: Path) -> Path:
     """Draw the diagram of a file of branches, or amplitude and phase of a response."""
     from fecontact.output.files.branches import read_branches, read_response
     from fecontact.output.plots.bifurcation_diagram import plot_branches
@@ -176,4 +187,4 @@ def plotted(file: Path, kind: str, target: Path) -> Iterable[Path]:
     else:
         named = read_branches(file)
         plot_branches(list(named.values()), "observed_amplitude", names=list(named), path=target)
-    return [target]
+    return target

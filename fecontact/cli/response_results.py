@@ -79,17 +79,23 @@ def _third(response: FrequencyResponse, level: int) -> list[str]:
 def response_table(response: FrequencyResponse) -> Any:
     """Table of peaks and special points of all levels."""
     from fecontact.cli.tables import table
+    from fecontact.core.units import quantity
 
+    unit = "rad" if response.observed.rpartition(" ")[2].startswith("phi") else "m"
+    # An angular frequency is told in Hz; the frequency of the response is then the same.
+    over_frequency = response.parameter_name.endswith("angular_frequency")
     rows = []
     for level, branch in enumerate(response.branches):
         amplitude, peak = response.amplitude(level), response.peak(level)
-        value = "" if response.level_name is None else f"{response.levels[level]:.6g}"
         for place, point in enumerate(branch.points):
             if point is not peak and point.kind is None:
                 continue
             words = ", ".join(filter(None, ("peak" if point is peak else "", point.kind)))
-            rows.append((value, words, f"{point.parameter:.7g}",
-                         f"{1.0 / float(point.values['period']):.6g}", f"{amplitude[place]:.5g}",
+            rows.append((*([f"{response.levels[level]:.6g}"] if response.level_name else []), words,
+                         *([] if over_frequency else [f"{point.parameter:.7g}"]),
+                         f"{1.0 / float(point.values['period']):.7g}",
+                         quantity(float(amplitude[place]), unit, 5),
                          "stable" if point.values["stable"] else "unstable"))
-    return table(response.level_name or "", "point", response.parameter_name, "frequency [Hz]",
+    return table(*([response.level_name] if response.level_name else []), "point",
+                 *([] if over_frequency else [response.parameter_name]), "frequency [Hz]",
                  f"amplitude of {response.observed}", "", rows=rows, left=2)

@@ -161,7 +161,7 @@ def frequency_response(
     row, observed = _observed(field, observe)
     low, high = chosen.bounds
     first = inside(low if start is None else float(start), chosen)
-    found = []
+    found: list[Branch] = []
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:

@@ -41,7 +41,7 @@ def response(
     resume: Annotated[bool, Parameter(
         negative=(), help="Go on with an interrupted response.")] = False,
 ) -> int:
-    """Steady vibration over the frequency of the excitation, at several levels, by harmonic balance.
+    """Steady vibration over the frequency of the excitation, by harmonic balance.
 
     The section [response] of the study gives range, levels and harmonics. Writes the responses
     (NAME-response.h5, NAME-response.csv), a picture of amplitude and phase, and a page whose
@@ -55,7 +55,7 @@ def response(
     from fecontact.core.tables import located
 
     described = read_study(study, set_)
-    with located(f"{described.title}: [response]:", "ResponseSettings:"):
+    with located(f"{described.title}: [response]:", "ResponseSettings"):
         wanted = _wanted(described.response, parameter, hz, bounds, levels, harmonics, samples,
                          tolerance)
     with located(f"{described.title}:"):
