@@ -162,7 +162,7 @@ def frequency_response(
     found = []
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
-        branch = _branch(field, given, field.index(name), level_name, first,
+        branch = branch_of_response(field, given, field.index(name), level_name, first,
                          method or HarmonicBalance(), chosen, both=low < first < high)
         found.append(_with_observed(branch, row, observed, level_name, float(value)))
         if branch.status is BranchStatus.INTERRUPTED:
@@ -185,7 +185,7 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
     return name, values
 
 
-def _branch(
+def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
     method: HarmonicBalance, options: ContinuationOptions, both: bool,
 ) -> Branch:
