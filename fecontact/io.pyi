@@ -1,9 +1,11 @@
 from .output.files.branches import (
     read_branch,
     read_branches,
+    read_mode,
     read_response,
     write_branch,
     write_branches,
+    write_mode,
     write_response,
 )
 from .output.files.case import Case
@@ -36,6 +38,7 @@ __all__ = [
     "read_branch",
     "read_branches",
     "read_matrix",
+    "read_mode",
     "read_response",
     "read_system",
     "read_table",
@@ -52,6 +55,7 @@ __all__ = [
     "write_basis",
     "write_branch",
     "write_branches",
+    "write_mode",
     "write_response",
     "write_wear",
 ]

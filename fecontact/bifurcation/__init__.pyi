@@ -25,6 +25,7 @@ from .fields.function_field import vector_field
 from .fields.vector_field import VectorField
 from .harmonic.method import HarmonicBalance
 from .harmonic.response import FrequencyResponse, frequency_response
+from .nonlinear_modes.nonlinear_mode import NonlinearMode, nonlinear_mode
 from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
@@ -52,6 +53,7 @@ __all__ = [
     "HopfPoint",
     "LyapunovExponents",
     "NeimarkSackerPoint",
+    "NonlinearMode",
     "PeriodDoublingPoint",
     "PeriodicMotion",
     "PoincareScan",
@@ -69,6 +71,7 @@ __all__ = [
     "find_equilibrium",
     "frequency_response",
     "lyapunov_exponents",
+    "nonlinear_mode",
     "observe",
     "orbit_branch",
     "periodic_motion",

@@ -1,6 +1,6 @@
 """Nonlinear frequency responses: branches of forced orbits at several levels."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,10 +18,10 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import branches, starts
-from fecontact.bifurcation.harmonic.layout import all_coefficients, layout_from
+from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.problem import HarmonicProblem, peaks
-from fecontact.bifurcation.harmonic.series import uniform_basis
+from fecontact.bifurcation.harmonic.observed import observed_row, observed_values
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
@@ -30,8 +30,6 @@ from fecontact.core.units import Summarised, listed, span
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.statics import equilibrium
 
-# Samples a period of what is observed, and harmonics of it that are stored.
-_SAMPLES, _HARMONICS = 512, 15
 # Points of a branch at most, and largest step, unless options say so.
 _POINTS, _LARGEST = 2000, 0.03
 _FREQUENCY = "drive.angular_frequency"
@@ -151,22 +149,23 @@ def frequency_response(
     require_kind("frequency_response", (HarmonicBalance, type(None)), method=method)
     chosen = options_of(
         options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
-    level_name, values = _levels(levels)
+    level_name, values = levels_of(levels)
     if isinstance(system, ContactSystem):
         name = parameter or _FREQUENCY
         names = dict.fromkeys([name] + ([level_name] if level_name else []))
         field: VectorField = contact_field(system, names)
     else:
         field, name = system, system.parameter_or_only(parameter)
-    row, observed = _observed(field, observe)
+    row, observed = observed_row(field, observe)
     low, high = chosen.bounds
     first = inside(low if start is None else float(start), chosen)
     found: list[Branch] = []
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:
-            branch = _branch(field, given, field.index(name), level_name, first,
-                             method or HarmonicBalance(), chosen, both=low < first < high)
+            branch = branch_of_response(field, given, field.index(name), level_name, first,
+                                        method or HarmonicBalance(), chosen,
+                                        both=low < first < high)
         except KeyboardInterrupt:
             if not found:
                 raise
@@ -177,7 +176,8 @@ def frequency_response(
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
 
 
-def _levels(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array]:
+def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array]:
+    """Name of the parameter that differs between levels, and its values."""
     if levels is None:
         return None, np.array([np.nan])
     require_kind("frequency_response", Mapping, levels=levels)
@@ -191,27 +191,7 @@ def _levels(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array]:
     return name, values
 
 
-def _observed(
-    field: VectorField, observe: tuple[str | int, str] | ArrayLike
-) -> tuple[Array, str]:
-    """Row (d,) of the observed quantity, and its name."""
-    if isinstance(field, ContactField):
-        if not (isinstance(observe, Sequence) and len(observe) == 2
-                and isinstance(observe[1], str)):
-            raise InputError(f"observe = {observe!r} must be a point and a component, such as "
-                             f"('B', 'x').")
-        point, component = observe[0], observe[1]
-        return field.displacement_row(point, component), f"{point} {component}"
-    if isinstance(observe, tuple) and observe == ("B", "x"):
-        return np.eye(field.dimension)[0], field.state_names[0]
-    row = as_floats(observe, "observe")
-    if row.shape != (field.dimension,):
-        raise InputError(f"observe must hold {field.dimension} numbers, one for each state.")
-    states = np.flatnonzero(row)
-    return row, field.state_names[states[0]] if len(states) == 1 else "observed"
-
-
-def _branch(
+def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
     method: HarmonicBalance, options: ContinuationOptions, both: bool,
 ) -> Branch:
@@ -266,13 +246,13 @@ def _from_rest(
     """The orbit that Newton's method finds from rest, and scales of its size."""
     state = np.zeros(field.dimension) if initial is None else initial
     if isinstance(field, ContactField) and initial is None:
-        state = _rest(field, values)
+        state = rest_state(field, values)
     problem = _problem(field, values, free, method, options, np.ones(field.dimension))
     u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
     return _scaled(*starts.corrected(problem, u))
 
 
-def _rest(field: ContactField, values: Array) -> Array:
+def rest_state(field: ContactField, values: Array) -> Array:
     """State (d,) of rest under the loads' means, of the normal problem alone."""
     state = np.zeros(field.dimension)
     try:
@@ -345,19 +325,10 @@ def _with_observed(
     if row[layout.states - layout.memory :].any():
         raise InputError("Internal variables of friction cannot be observed; choose a displacement "
                          "or a velocity.")
-    basis = uniform_basis(_SAMPLES, H)
     for point in branch.points:
         X = point.u[: (2 * H + 1) * layout.harmonic].reshape(-1, layout.harmonic)
-        whole = all_coefficients(layout, X, float(point.values["period"]))
-        observes = whole @ row[: whole.shape[1]]
-        low, high = (float(one[0]) for one in peaks((basis @ observes)[:, None]))
-        harmonics = np.zeros(max(H, _HARMONICS) + 1, dtype=complex)
-        harmonics[0] = observes[0]
-        harmonics[1 : H + 1] = observes[1::2] - 1j * observes[2::2]
-        points.append(replace(point, values={
-            **point.values, "observed_minimum": low, "observed_maximum": high,
-            "observed_amplitude": (high - low) / 2.0,
-            "observed_harmonics": harmonics[: _HARMONICS + 1]}))
+        points.append(replace(point, values={**point.values, **observed_values(
+            layout, X, float(point.values["period"]), row)}))
     attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
                                   "level_name": level_name or ""}
     return replace(branch, points=tuple(points), attributes=attributes)

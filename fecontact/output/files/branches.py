@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.points import details_of, special_point
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, response_of
+from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode, mode_of
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.stored import (
@@ -138,6 +139,31 @@ def read_response(path: str | Path) -> FrequencyResponse:
         If there is no such file, it is damaged, or it holds no response.
     """
     return response_of(read_branches(path))
+
+
+def write_mode(path: str | Path, mode: NonlinearMode) -> Path:
+    """Write a nonlinear mode into an HDF5 file, whole or not at all.
+
+    Its branch is stored as by :func:`write_branch`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    require_kind("write_mode", NonlinearMode, mode=mode)
+    return write_branch(path, mode.branch)
+
+
+def read_mode(path: str | Path) -> NonlinearMode:
+    """Read a nonlinear mode written by :func:`write_mode`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is damaged, or it holds no mode.
+    """
+    return mode_of(read_branch(path))
 
 
 def _store(group: Any, branch: Branch) -> None:
