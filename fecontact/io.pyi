@@ -16,6 +16,7 @@ from .output.files.pvd import export_pvd
 from .output.files.stored_system import read_system
 from .output.files.wear import read_wear, write_wear
 from .output.report.branch_report import report_branches
+from .output.report.mode_report import report_modes
 from .output.report.notebook import ReportFrame, report_frame, report_widget
 from .output.report.response_report import report_response
 from .output.report.run_report import report
@@ -47,6 +48,7 @@ __all__ = [
     "report",
     "report_branches",
     "report_frame",
+    "report_modes",
     "report_response",
     "report_sweep",
     "report_widget",

@@ -13,7 +13,7 @@ from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import Solver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.powers import NODE_POWERS, POWERS, powers
+from fecontact.system.powers import BRISTLES, FRICTION, NODE_POWERS, POWERS, powers
 
 # Relative tolerance of the runs that sample an orbit by shooting.
 _RTOL = 1e-7
@@ -118,15 +118,40 @@ def of_runs(runs: list[Trajectory], period: float) -> PeriodicMotion:
 
 
 def sampled_run(system: ContactSystem, motion: PeriodicMotion) -> Trajectory:
-    """A motion in samples as a trajectory; work by the trapezoidal rule."""
+    """A motion in samples as a trajectory; work by the trapezoidal rule.
+
+    What bristles store follows from their deflections, as their rates jump where they begin to
+    slide.
+    """
     m, states = system.basis.modes, np.ascontiguousarray(motion.states)
     run = Trajectory(system, motion.times, states[:, :m], states[:, m : 2 * m],
                      np.zeros((len(states), len(POWERS))),
                      memory=states[:, 2 * m :] if system.memory else None)
-    power = _powers(system, motion.times, states)
-    middle = 0.5 * (power[1:] + power[:-1]) * np.diff(motion.times)[:, None]
-    return replace(run, work=np.concatenate([np.zeros((1, len(POWERS))),
-                                             np.cumsum(middle, axis=0)]))
+    steps = np.diff(motion.times)[:, None]
+    work = _summed(_powers(system, motion.times, states), steps)
+    if not system.memory:
+        return replace(run, work=work)
+    stored = _stored(run)
+    lost = _summed(run.slip_power, steps) - stored
+    work[:, BRISTLES], work[:, FRICTION] = stored.sum(axis=1), lost.sum(axis=1)
+    return replace(run, work=work, node_friction_work=lost)
+
+
+def _summed(power: Array, steps: Array) -> Array:
+    """Integral (N, p) of powers (N, p) over steps (N - 1, 1) of time."""
+    middle = 0.5 * (power[1:] + power[:-1]) * steps
+    return np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(middle, axis=0)])
+
+
+def _stored(run: Trajectory) -> Array:
+    """Energy (N, n) that has gone into the bristles of each node at constant normal force [J]."""
+    assert run.memory is not None
+    fixed, with_force = run.system.arrays.bristle_stiffness
+    n, count = fixed.shape
+    squares = run.memory.reshape(-1, n, count) ** 2
+    stiffness = fixed + with_force * np.abs(run.normal_force)[:, :, None]
+    changes = 0.25 * ((stiffness[1:] + stiffness[:-1]) * np.diff(squares, axis=0)).sum(axis=2)
+    return np.concatenate([np.zeros((1, n)), np.cumsum(changes, axis=0)])
 
 
 def _powers(system: ContactSystem, times: Array, states: Array) -> Array:

@@ -141,10 +141,13 @@ def read_response(path: str | Path) -> FrequencyResponse:
     return response_of(read_branches(path))
 
 
-def write_mode(path: str | Path, mode: NonlinearMode) -> Path:
+def write_mode(
+    path: str | Path, mode: NonlinearMode, *, system: ContactSystem | None = None,
+    study: str | None = None, root: str | Path | None = None,
+) -> Path:
     """Write a nonlinear mode into an HDF5 file, whole or not at all.
 
-    Its branch is stored as by :func:`write_branch`.
+    Its branch is stored as by :func:`write_branches`, which describes the other arguments.
 
     Raises
     ------
@@ -152,7 +155,8 @@ def write_mode(path: str | Path, mode: NonlinearMode) -> Path:
         If the file cannot be written.
     """
     require_kind("write_mode", NonlinearMode, mode=mode)
-    return write_branch(path, mode.branch)
+    return write_branches(path, {f"mode {mode.number}": mode.branch}, system=system, study=study,
+                          root=root)
 
 
 def read_mode(path: str | Path) -> NonlinearMode:

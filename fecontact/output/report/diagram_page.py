@@ -33,13 +33,17 @@ Motion = tuple[float, Array]  # period [s], and states (SAMPLES, d) at equal dis
 
 @dataclass(frozen=True, eq=False)
 class Diagram:
-    """What is drawn of all branches: x (N,) and y (N, ...) of each, in the units of the labels."""
+    """What is drawn of all branches: x (N,) and y (N, ...) of each, in the units of the labels.
+
+    With ``decades`` x are common logarithms, which the axis shows as the numbers themselves.
+    """
 
     x_label: str
     y_label: str
     x: Sequence[Array]
     y: Sequence[Array]
     height: int = 440
+    decades: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +93,8 @@ def write_diagrams(
         "status": _status(named),
         "good": all(branch.status.name != "STALLED" for branch in named.values()),
         "notes": [f"{name}: {branch.message}" for name, branch in named.items() if branch.message],
-        "diagrams": [{"xLabel": one.x_label, "yLabel": one.y_label, "height": one.height}
+        "diagrams": [{"xLabel": one.x_label, "yLabel": one.y_label, "height": one.height,
+                      "decades": one.decades}
                      for one in diagrams],
         "columns": shown.columns,
         "branches": _branch_tables(named, diagrams, kept, shown.texts, payload),

@@ -7,9 +7,23 @@ class Diagram extends Chart {
       return Array.from({ length: columns }, (_, k) => ({
         ...branch, branch, x, stable: branch.stable.values, y: values.filter((_, at) => at % columns === k) }));
     });
-    const longest = max(...lines.map(({ x }) => x.length)) - 1, { xLabel, yLabel, height } = data.diagrams[which];
+    const longest = max(...lines.map(({ x }) => x.length)) - 1, { xLabel, yLabel, height, decades } = data.diagrams[which];
     super({ window: () => [0, longest], set: pick }, { title: yLabel, xLabel, lines,
       legend: which ? [] : data.branches, height, kind: "diagram" });
+    this.decades = decades;
+  }
+
+  // On a logarithmic axis 1, 2, 5 in each decade where there is room, else powers of ten.
+  marks(low, high, most) {
+    if (!this.decades) return super.marks(low, high, most);
+    const digits = high - low < most / 4 ? [1, 2, 5] : [1], found = [];
+    for (let k = floor(low); k <= high; k++) {
+      for (const digit of digits) {
+        const at = k + Math.log10(digit);
+        if (at >= low && at <= high) found.push([at, `${+(digit * 10 ** k).toPrecision(1)}`]);
+      }
+    }
+    return found.length > 1 ? found : super.marks(low, high, most).map(([at]) => [at, `${+(10 ** at).toPrecision(3)}`]);
   }
 
   // The point that was picked in this diagram or in another one.
