@@ -18,8 +18,8 @@ Folder = Annotated[Path | None, Parameter(
 Branches = Annotated[str | None, Parameter(
     name="--branch", help="Of a file of branches: name of one, or its number from 0; of a level.")]
 At = Annotated[float | None, Parameter(
-    help="Of a file of branches: the orbit at this value of the parameter; by default that of the "
-    "largest observed amplitude.")]
+    help="Of a file of branches: the orbit at this value of the parameter, of a nonlinear mode "
+    "that of this amplitude [m]; by default that of the largest observed amplitude.")]
 AtHz = Annotated[float | None, Parameter(
     name="--at-hz", help="The same of an angular frequency, in Hz.")]
 Which = Annotated[int, Parameter(

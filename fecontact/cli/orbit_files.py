@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,11 +15,12 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.branch import Branch
     from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
+    from fecontact.integrate.trajectory import Trajectory
     from fecontact.output.files.stored_system import StoredModel
     from fecontact.study.sections import RenderSettings
 
-DIAGRAMS = ("branches", "response")  # plots of whole files
-_TURN = 2.0 * np.pi
+DIAGRAMS = ("branches", "response", "mode")  # plots of whole files
+_TURN, _FREQUENCY = 2.0 * np.pi, "angular_frequency"
 _OUTPUTS = 1001  # of an orbit
 
 
@@ -71,14 +72,36 @@ def stored_orbit_or_run(
 
     named, model = read_branches(file), read_model(file, trust)
     name, branch = _branch(file, named, choice.branch)
-    field = field_of(branch, model)
-    point = _point(file, branch, field, choice)
+    point, run = _motion(file, branch, model, choice)
     settings = _settings(model)
     if settings.title is None:
-        words = f"{_called(name, branch)}{branch.parameter_name} = {point.parameter:.5g}"
-        settings = replace(settings, title=f"{words}, {1.0 / float(point.values['period']):.5g} Hz")
-    return StoredRun(file, point.trajectory(field, _OUTPUTS), settings, True, model.study,
-                     model.versions)
+        period = float(point.values["period"])
+        place = ("" if branch.parameter_name.endswith((_FREQUENCY, "xi"))
+                 else f"{branch.parameter_name} = {point.parameter:.5g}, ")
+        settings = replace(settings, title=f"{_called(name, branch)}{place}{1.0 / period:.5g} Hz")
+    return StoredRun(file, run, settings, True, model.study, model.versions)
+
+
+def _motion(
+    file: Path, branch: "Branch", model: "StoredModel", choice: OrbitChoice
+) -> "tuple[BranchPoint, Trajectory]":
+    """The chosen point of a branch or a nonlinear mode, and its motion."""
+    if "mode_number" not in branch.attributes:
+        field = field_of(branch, model)
+        point = _point(file, branch, field, choice)
+        return point, point.trajectory(field, _OUTPUTS)
+    from fecontact.bifurcation.nonlinear_modes.linear_start import unforced, with_mass_damping
+    from fecontact.bifurcation.orbits.motions import sampled_run
+
+    if choice.at_hz is not None:
+        raise InputError(f"--at-hz = {choice.at_hz:g} is for branches over an angular frequency, "
+                         f"but {file} holds a nonlinear mode; give its amplitude by --at.")
+    amplitudes = np.asarray(branch.column("observed_amplitude"))
+    wanted = amplitudes.max() if choice.at is None else choice.at
+    point = branch.points[int(np.argmin(np.abs(amplitudes - wanted)))]
+    # What makes the motion periodic is a damping of the sign reversed.
+    system = with_mass_damping(unforced(model.system), point.parameter)
+    return point, sampled_run(system, point.orbit(samples=_OUTPUTS))
 
 
 def field_of(branch: "Branch", model: "StoredModel") -> "ContactField":
@@ -126,7 +149,7 @@ def _point(
     name = branch.parameter_name
     if choice.at is not None and choice.at_hz is not None:
         raise InputError("--at and --at-hz mean the same; give one of them.")
-    if choice.at_hz is not None and not name.endswith("angular_frequency"):
+    if choice.at_hz is not None and not name.endswith(_FREQUENCY):
         raise InputError(f"--at-hz = {choice.at_hz:g} is for branches over an angular frequency, "
                          f"but those of {file} are over {name}; give --at.")
     value = choice.at if choice.at_hz is None else _TURN * choice.at_hz
@@ -154,19 +177,24 @@ def _settings(model: "StoredModel") -> "RenderSettings":
 def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
     """Write the page of a file of branches or responses."""
     from fecontact.bifurcation.harmonic.response import response_of
+    from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import mode_of
     from fecontact.output.files.branches import read_branches
     from fecontact.output.files.stored_system import read_model
     from fecontact.output.report.branch_report import report_branches
+    from fecontact.output.report.mode_report import report_modes
     from fecontact.output.report.response_report import report_response
 
     named, model = read_branches(file), read_model(file, trust)
     first = next(iter(named.values()))
     title = file.stem.removesuffix("-branch").removesuffix("-response")
-    if "level" in first.attributes:
+    if "observed" in first.attributes:
         seen, _, component = str(first.attributes["observed"]).rpartition(" ")
-        return report_response(response_of(named), model.system, target, title=title,
-                               observe=(int(seen) if seen.isdigit() else seen, component),
-                               study=model.study)
+        place = int(seen) if seen.isdigit() else seen
+        write: Any = report_response if "level" in first.attributes else report_modes
+        shown: Any = (response_of(named) if "level" in first.attributes
+                      else [mode_of(one) for one in named.values()])
+        return Path(write(shown, model.system, target, title=title, observe=(place, component),
+                          study=model.study))
     settings = tomllib.loads(model.study or "").get("branch", {})
     basis, point = model.system.basis, settings.get("point")
     if point is None:
@@ -177,13 +205,16 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
 
 
 def plotted(file: Path, kind: str, target: Path) -> Path:
-    """Draw the diagram of a file of branches, or amplitude and phase of a response."""
-    from fecontact.output.files.branches import read_branches, read_response
+    """Draw branches, amplitude and phase of a response, or frequency and damping of a mode."""
+    from fecontact.output.files.branches import read_branches, read_mode, read_response
     from fecontact.output.plots.bifurcation_diagram import plot_branches
+    from fecontact.output.plots.nonlinear_modes import plot_nonlinear_mode
     from fecontact.output.plots.response import plot_response
 
     if kind == "response":
         plot_response(read_response(file), path=target)
+    elif kind == "mode":
+        plot_nonlinear_mode(read_mode(file), path=target)
     else:
         named = read_branches(file)
         plot_branches(list(named.values()), "observed_amplitude", names=list(named), path=target)

@@ -162,8 +162,8 @@ def plot(
     file: RunFile,
     kind: Annotated[str, Parameter(
         help="history, phase, contact_map, energies, modes, spectrum, density, spectrogram, "
-        "poincare, friction_work or receptance; of a file of branches also branches, of a "
-        "response also response.")],
+        "poincare, friction_work or receptance; of files NAME.h5 also branches, response or "
+        "mode.")],
     /,
     *,
     set_: Changes = None,

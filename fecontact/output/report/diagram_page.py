@@ -63,6 +63,8 @@ class Shown:
         Headings of what is told of a point.
     texts : callable
         That, in the same order.
+    alike : bool
+        Whether all motions are magnified to the same size, as shapes of modes are.
     """
 
     basis: ModalBasis
@@ -71,6 +73,7 @@ class Shown:
     motion: Callable[[BranchPoint], Motion]
     columns: tuple[str, ...]
     texts: Callable[[BranchPoint], list[str]]
+    alike: bool = False
 
 
 def write_diagrams(
@@ -111,8 +114,18 @@ def write_diagrams(
         scale = max(1.0, round_125(_VISIBLE * seen.bodies.extent / largest)) if largest else 1.0
         header |= {"bodies": bodies_table(seen, payload), "scale": scale, "maps": colour_maps(),
                    "box": seen.box(scale)}
+        if shown.alike:
+            header["orbits"]["scales"] = _scales(seen, len(motions))
         header["orbits"]["coordinates"] = payload.add(q, seen.coordinate_steps())
     return write_page(path, title, payload.block(header), "branches")
+
+
+def _scales(seen: Motions, count: int) -> list[float]:
+    """Factor of each of the motions, with which its largest is as well visible."""
+    found = [Motions(seen.bodies, q).largest_displacement
+             for q in np.split(seen.coordinates, count)]
+    return [max(1.0, round_125(_VISIBLE * seen.bodies.extent / one)) if one else 1.0
+            for one in found]
 
 
 def _status(named: Mapping[str, Branch]) -> str:

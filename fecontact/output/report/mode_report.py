@@ -74,7 +74,7 @@ def report_modes(
     shown = Shown(system.basis, system.basis.point_row(point, component),
                   f"displacement {component} of {point}", _motion,
                   ("point", "amplitude", "frequency", "damping ratio", "stability"),
-                  lambda one: _texts(one, unit, lossless))
+                  lambda one: _texts(one, unit, lossless), alike=True)
     return write_diagrams(path, path.stem if title is None else title,
                           {name: mode.branch for name, mode in named.items()}, diagrams, shown,
                           study)

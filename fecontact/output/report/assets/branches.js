@@ -116,6 +116,7 @@ async function build(host, data, told) {
     facts.replaceChildren(table([], [["branch", branch.name], ...data.columns.map((name, k) =>
       [name, branch.rows[place][k]]).filter(([, text]) => text)]));
     told.orbit = number;
+    if (orbits.scales) player.magnify(orbits.scales[number]);
     for (const diagram of diagrams) diagram.mark(chosen);
     player?.draw();
     history.resize();
