@@ -84,9 +84,9 @@ def follow_responses(
     failed: FecontactError | None = None
     for value in next(iter(wanted.levels.values()), (np.nan,)):
         title = "Response" if wanted.level_name is None else f"{wanted.level_name} = {value:g}"
-        options = _settings(wanted, title, progress)
         known = _level_of(earlier, value)
         try:
+            options = _settings(wanted, title, progress)
             if known is not None and _goes_on(known, wanted):
                 found = _with_rest(system, known, observe, options)
             elif known is not None and known.branches[0].status is not BranchStatus.INTERRUPTED:

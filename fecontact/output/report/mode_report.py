@@ -52,6 +52,7 @@ def report_modes(
         Without modes, for modes of different displacements, another suffix, or a file that cannot
         be written.
     """
+    require_kind("report_modes", (NonlinearMode, Sequence), modes=modes)
     given = [modes] if isinstance(modes, NonlinearMode) else list(modes)
     for mode in given:
         require_kind("report_modes", NonlinearMode, mode=mode)
