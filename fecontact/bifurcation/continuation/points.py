@@ -203,8 +203,7 @@ class BranchPoint:
 
     def _runs(self, field: VectorField, samples: int) -> "list[Trajectory]":
         """Runs of the segments of an orbit by shooting."""
-        from fecontact.bifurcation.orbits.motions import run_again
-        from fecontact.bifurcation.orbits.restored import solver_of
+        from fecontact.bifurcation.orbits.motions import run_again, solver_of
 
         # Shooting is for contact fields alone, the only ones with a system.
         system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]

@@ -1,6 +1,8 @@
 """Sampled periodic motions, from runs and from orbits of branches."""
 
-from dataclasses import dataclass, replace
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import Solver
+from fecontact.integrate.solvers import RODAS5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import BRISTLES, FRICTION, NODE_POWERS, POWERS, powers
@@ -94,6 +96,16 @@ def collocated(u: Array, mesh: Array, states: int, period: float, samples: int) 
     nodes, _ = nodes_on_mesh(u, mesh, states)
     phases = np.linspace(0.0, 1.0, samples)
     return PeriodicMotion(phases * period, interpolate(mesh, nodes, phases), period)
+
+
+def solver_text(solver: Solver) -> str | None:
+    """Options of a set-valued solver as text for a branch's attributes; None for the default."""
+    return json.dumps(asdict(solver)) if isinstance(solver, SetValued) else None
+
+
+def solver_of(known: Mapping[str, Any]) -> Solver:
+    """The solver of a branch by shooting, from its attributes."""
+    return SetValued(**json.loads(known["solver"])) if "solver" in known else RODAS5P
 
 
 def run_again(
