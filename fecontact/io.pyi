@@ -2,10 +2,12 @@ from .output.files.branches import (
     read_branch,
     read_branches,
     read_mode,
+    read_resonance_curve,
     read_response,
     write_branch,
     write_branches,
     write_mode,
+    write_resonance_curve,
     write_response,
 )
 from .output.files.case import Case
@@ -37,6 +39,7 @@ __all__ = [
     "read_branches",
     "read_matrix",
     "read_mode",
+    "read_resonance_curve",
     "read_response",
     "read_table",
     "read_uff",
@@ -52,6 +55,7 @@ __all__ = [
     "write_branch",
     "write_branches",
     "write_mode",
+    "write_resonance_curve",
     "write_response",
     "write_wear",
 ]

@@ -164,7 +164,7 @@ def frequency_response(
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         branch = branch_of_response(field, given, field.index(name), level_name, first,
                          method or HarmonicBalance(), chosen, both=low < first < high)
-        found.append(_with_observed(branch, row, observed, level_name, float(value)))
+        found.append(with_observed(branch, row, observed, level_name, float(value)))
         if branch.status is BranchStatus.INTERRUPTED:
             break
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
@@ -308,7 +308,7 @@ def _taken(
     return _scaled(*starts.corrected(problem, starts.unknowns(problem, sampled, 0.0)))
 
 
-def _with_observed(
+def with_observed(
     branch: Branch, row: Array, observed: str, level_name: str | None, level: float
 ) -> Branch:
     """The branch with what is observed at its points, and its level as attributes."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.harmonic.response import levels_of, rest_state
-from fecontact.bifurcation.nonlinear_modes.given_force import given_force
+from fecontact.bifurcation.nonlinear_modes.given_force import given_force, require_excitation
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -184,7 +184,7 @@ class _Along:
         for each in w:
             values = values.copy()
             values[free] = each
-            forces.append(given_force(field, values, state))
+            forces.append(given_force(field, values, state, require_excitation(field, values)))
         P: ComplexArray = np.array(forces)
         C = field.arrays(values).damping
         lost, damped = np.zeros(len(w)), np.zeros(len(w))
@@ -218,13 +218,12 @@ class _Along:
         """Places s of the resonances."""
         from scipy.optimize import brentq
 
-        off = self.balance(self.known)
-        found = []
-        for k in np.flatnonzero(off[:-1] * off[1:] < 0.0):
-            found.append(float(brentq(
-                lambda s: float(np.tanh(self.balance(self.at(np.array([s])))[0])),
-                self.chord[k], self.chord[k + 1], xtol=1e-14)))
-        return found
+        def off(s: float) -> float:
+            return float(np.tanh(self.balance(self.at(np.array([s])))[0]))
+
+        known = self.balance(self.known)
+        return [float(brentq(off, self.chord[k], self.chord[k + 1], xtol=1e-14))
+                for k in np.flatnonzero(known[:-1] * known[1:] < 0.0)]
 
     def resonances(self) -> tuple[Resonance, ...]:
         """All of them, in their order."""
