@@ -213,7 +213,7 @@ def test_backbone_of_a_bolted_joint():
     arm = beta + (chi + 1.0) / (chi + 2.0)
     reach = (1.0 + beta) / (0.5 * arm)
     r = (chi + 1.0) / (reach ** (chi + 2.0) * arm)
-    micro = (X > 0.1 * reach) & (X < 0.9 * reach)
+    micro = (0.1 * reach < X) & (0.9 * reach > X)
     slope, _ = np.polyfit(np.log(X[micro]), np.log(mode.loss[micro]), 1)
     assert slope == pytest.approx(chi + 3.0, abs=0.015)
     assert mode.loss[micro] == pytest.approx(

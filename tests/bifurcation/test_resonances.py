@@ -57,7 +57,7 @@ def test_response_of_a_mode_that_sticks_is_linear():
     assert w[0] < 0.5
     assert w[-1] > 3.0
     peak = found.peak()
-    assert peak.amplitude == pytest.approx(0.02 / (0.02 * np.sqrt(1.5)), rel=1e-6)
+    assert peak.amplitude == pytest.approx(0.02 / (0.02 * np.sqrt(1.5)), rel=1e-5)
     assert peak.angular_frequency == pytest.approx(np.sqrt(1.5), rel=1e-7)
     assert peak.damping_ratio == pytest.approx(0.01 / np.sqrt(1.5), rel=1e-5)
 
@@ -73,7 +73,7 @@ def test_response_of_a_mode_obeys_the_describing_function():
         w, X = found.angular_frequency(level), found.amplitude(level)
         elastic, lost = describing(X)
         off = ((1.0 - w**2) * X + elastic, 0.02 * w * X + lost)
-        near = X > 0.3 * X.max()
+        near = 0.3 * X.max() < X
         assert np.count_nonzero(near) > 50
         assert np.hypot(*off)[near] == pytest.approx(force, rel=3e-3)
         assert np.exp(1j * found.phase(level)[near]) == pytest.approx(
@@ -159,7 +159,7 @@ def test_peaks_of_one_harmonic_of_a_hardening_spring():
                             method=HarmonicBalance(1))
     A, W = found.amplitude, found.angular_frequency
     assert found.parameter[[0, -1]] == pytest.approx([0.02, 0.5], rel=1e-12)
-    assert W**2 == pytest.approx(1.0 + 0.075 * A**2 - 0.00125, rel=1e-8)
+    assert pytest.approx(1.0 + 0.075 * A**2 - 0.00125, rel=1e-8) == W**2
     assert found.parameter == pytest.approx(A * np.hypot(0.00125, 0.05 * W), rel=3e-8)
     assert np.ptp(W) > 0.4
 
