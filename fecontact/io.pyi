@@ -2,10 +2,12 @@ from .output.files.branches import (
     read_branch,
     read_branches,
     read_mode,
+    read_resonance_curve,
     read_response,
     write_branch,
     write_branches,
     write_mode,
+    write_resonance_curve,
     write_response,
 )
 from .output.files.case import Case
@@ -40,6 +42,7 @@ __all__ = [
     "read_branches",
     "read_matrix",
     "read_mode",
+    "read_resonance_curve",
     "read_response",
     "read_system",
     "read_table",
@@ -58,6 +61,7 @@ __all__ = [
     "write_branch",
     "write_branches",
     "write_mode",
+    "write_resonance_curve",
     "write_response",
     "write_wear",
 ]

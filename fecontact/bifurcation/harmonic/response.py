@@ -170,7 +170,7 @@ def frequency_response(
             if not found:
                 raise
             break
-        found.append(_with_observed(branch, row, observed, level_name, float(value)))
+        found.append(with_observed(branch, row, observed, level_name, float(value)))
         if branch.status is BranchStatus.INTERRUPTED:
             break
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
@@ -316,7 +316,7 @@ def _taken(
     return _scaled(*starts.corrected(problem, starts.unknowns(problem, sampled, 0.0)))
 
 
-def _with_observed(
+def with_observed(
     branch: Branch, row: Array, observed: str, level_name: str | None, level: float
 ) -> Branch:
     """The branch with what is observed at its points, and its level as attributes."""
@@ -344,7 +344,7 @@ def continued(
     rest = branches.goes_on(
         field, branch.points[-1], None,
         replace(options, points=max(2, options.points - len(branch) + 1)), None, None, 1.0, False)
-    more = _with_observed(rest, row, str(known["observed"]), level_name or None,
+    more = with_observed(rest, row, str(known["observed"]), level_name or None,
                           float(known["level"]))
     return replace(branch, points=(*branch.points[:-1], *more.points), status=more.status,
                    message=more.message)

@@ -1,6 +1,8 @@
 """Where a nonlinear mode begins: the system without excitation, and its linear mode at rest."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +23,8 @@ _ZERO = 1e-7
 _ITERATIONS = 60
 # Relative change of xi at which the search for the undamped motion ends.
 _SETTLED = 1e-13
+
+_Part = TypeVar("_Part", BoundaryLoad, Drive, Load)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,20 +57,20 @@ def unforced(system: ContactSystem) -> ContactSystem:
             for axis, motion in zip("xyz", (drive.motion_x, drive.motion_y, drive.motion_z),
                                     strict=True)}
     none = {f"amplitude_{axis}": 0.0 for axis in "xyz"}
-    boundaries = [replace(one, **{name: _constant(getattr(one, name))
-                                  for name in BOUNDARY_STRESSES})
+    boundaries = [_changed(one, {name: _constant(getattr(one, name))
+                                 for name in BOUNDARY_STRESSES})
                   for one in load.boundaries if _remains(one)]
+    forces = [one for one in load.forces if isinstance(one.signal, Constant)]
+    accelerations = {f"base_acceleration_{axis}": signal if isinstance(signal, Constant) else None
+                     for axis, signal in zip("xyz", load.base_accelerations, strict=True)}
     return system.with_(
-        drive=_drive(drive, {**none, **kept}),
-        load=replace(
-            load, forces=tuple(one for one in load.forces if isinstance(one.signal, Constant)),
-            boundaries=tuple(boundaries),
-            **{name: None for name, signal in _accelerations(load).items()
-               if not isinstance(signal, Constant)}))
+        drive=_changed(drive, {"angular_frequency": 0.0, **none, **kept}),
+        load=_changed(load, {"forces": tuple(forces), "boundaries": tuple(boundaries),
+                             **accelerations}))
 
 
-def _drive(drive: Drive, changes: dict[str, object]) -> Drive:
-    return replace(drive, angular_frequency=0.0, **changes)  # type: ignore[arg-type]
+def _changed(part: _Part, changes: Mapping[str, Any]) -> _Part:
+    return replace(part, **changes)
 
 
 def _constant(given: float | Signal) -> float | Signal:
@@ -77,11 +81,6 @@ def _remains(load: BoundaryLoad) -> bool:
     """Whether a constant part of a boundary load is left."""
     return any(isinstance(value, Constant) or bool(value)
                for value in (_constant(getattr(load, name)) for name in BOUNDARY_STRESSES))
-
-
-def _accelerations(load: Load) -> dict[str, Signal | None]:
-    names = [f"base_acceleration_{axis}" for axis in "xyz"]
-    return dict(zip(names, load.base_accelerations, strict=True))
 
 
 def with_mass_damping(system: ContactSystem, xi: float) -> ContactSystem:

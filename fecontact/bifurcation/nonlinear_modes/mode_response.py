@@ -7,7 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.harmonic.response import levels_of, rest_state
-from fecontact.bifurcation.nonlinear_modes.given_force import given_force
+from fecontact.bifurcation.nonlinear_modes.given_force import given_force, require_excitation
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -168,9 +168,10 @@ def mode_response(
 class _Along:
     """What the response needs, along a mode, over the chord s (N,).
 
-    Rows of ``known`` (9, N): frequency, damping ratio, amplitude, X_1^H X_1, the sums of the
-    equation with C and with xi (see :func:`mode_response`), X_1^H P by magnitude and phase, phase
-    of the observed displacement.
+    Rows of ``known`` (9, N): frequency, damping ratio, logarithm of the amplitude a; X_1^H X_1 and
+    the sums of the equation with C and with xi (see :func:`mode_response`), all over a^2; X_1^H P
+    over a by magnitude and phase; phase of the observed displacement. Of a linear mode they are
+    constant but for a.
     """
 
     chord: Array
@@ -184,7 +185,7 @@ class _Along:
         for each in w:
             values = values.copy()
             values[free] = each
-            forces.append(given_force(field, values, state))
+            forces.append(given_force(field, values, state, require_excitation(field, values)))
         P: ComplexArray = np.array(forces)
         C = field.arrays(values).damping
         lost, damped = np.zeros(len(w)), np.zeros(len(w))
@@ -193,20 +194,21 @@ class _Along:
             lost += w * mode.xi * (np.abs(each) ** 2).sum(axis=1)
             damped += np.einsum("ni,ij,nj->n", each.conj(), C, each).real
         work = (X.conj() * P).sum(axis=1)
-        known = np.array([w, mode.damping_ratio, mode.amplitude, (np.abs(X) ** 2).sum(axis=1),
-                          damped, lost, np.abs(work), np.unwrap(np.angle(work)),
-                          np.unwrap(np.angle(mode.harmonic()))])
+        a = mode.amplitude
+        known = np.array([w, mode.damping_ratio, np.log(a), (np.abs(X) ** 2).sum(axis=1) / a**2,
+                          damped / a**2, lost / a**2, np.abs(work) / a,
+                          np.unwrap(np.angle(work)), np.unwrap(np.angle(mode.harmonic()))])
         # Steps relative to amplitude, frequency and damping.
-        steps = np.diff(np.array([np.log(known[2]), 5.0 * np.log(w), 10.0 * known[1]]), axis=1)
+        steps = np.diff(np.array([known[2], 5.0 * np.log(w), 10.0 * known[1]]), axis=1)
         kept = np.append(True, np.linalg.norm(steps, axis=0) > 1e-12)
         chord = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=0)))
         return cls(chord[kept], known[:, kept])
 
     def at(self, s: Array) -> Array:
-        """The rows (9, k) at places s (k,), by monotone cubics."""
+        """Quantities (9, k) at places s (k,), by monotone cubics: as the rows, but not over a."""
         from scipy.interpolate import PchipInterpolator
 
-        return np.asarray(PchipInterpolator(self.chord, self.known, axis=1)(s))
+        return _whole(np.asarray(PchipInterpolator(self.chord, self.known, axis=1)(s)))
 
     @staticmethod
     def balance(known: Array) -> Array:
@@ -218,13 +220,12 @@ class _Along:
         """Places s of the resonances."""
         from scipy.optimize import brentq
 
-        off = self.balance(self.known)
-        found = []
-        for k in np.flatnonzero(off[:-1] * off[1:] < 0.0):
-            found.append(float(brentq(
-                lambda s: float(np.tanh(self.balance(self.at(np.array([s])))[0])),
-                self.chord[k], self.chord[k + 1], xtol=1e-14)))
-        return found
+        def off(s: float) -> float:
+            return float(np.tanh(self.balance(self.at(np.array([s])))[0]))
+
+        known = self.balance(_whole(self.known))
+        return [float(brentq(off, self.chord[k], self.chord[k + 1], xtol=1e-14))
+                for k in np.flatnonzero(known[:-1] * known[1:] < 0.0)]
 
     def resonances(self) -> tuple[Resonance, ...]:
         """All of them, in their order."""
@@ -255,6 +256,15 @@ class _Along:
             pieces += [np.full((3, 1), np.nan)] * bool(pieces)
             pieces.append(whole)
         return np.concatenate(pieces, axis=1) if pieces else np.empty((3, 0))
+
+
+def _whole(known: Array) -> Array:
+    """Quantities (9, k) from rows that are over amplitudes."""
+    found = known.copy()
+    found[2] = np.exp(known[2])
+    found[3:6] *= found[2] ** 2
+    found[6] *= found[2]
+    return found
 
 
 def _frequencies(known: Array) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_row
-from fecontact.bifurcation.nonlinear_modes.linear_start import XI, LinearStart, linear_start
+from fecontact.bifurcation.nonlinear_modes.linear_start import LinearStart, linear_start
 from fecontact.bifurcation.nonlinear_modes.mode_problem import ModeProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
@@ -29,7 +29,7 @@ from fecontact.system.contact_system import ContactSystem
 
 # Points at most and steps, unless options say so: a step of one is the amplitude itself, and the
 # parts of frequency and damping below.
-_POINTS, _STEP, _LARGEST = 2000, 0.02, 0.1
+_POINTS, _STEP, _LARGEST = 2000, 0.02, 0.06
 _PERIOD_SCALE, _XI_SCALE = 0.2, 0.2
 # Largest |xi| of a conservative system, relative to the frequency.
 _CONSERVATIVE = 1e-8
@@ -90,7 +90,7 @@ class NonlinearMode(Summarised):
 
     @property
     def damping_ratio(self) -> Array:
-        """xi / (2 Omega) (N,)."""
+        """Damping ratio (N,), xi / (2 Omega)."""
         return np.asarray(self.xi / (2.0 * self.angular_frequency))
 
     @property
@@ -197,7 +197,7 @@ def nonlinear_mode(
     method : HarmonicBalance, optional
         Harmonics, samples; kinks need many samples.
     options : ContinuationOptions, optional
-        By default up to 2000 points, step 0.02, largest_step 0.1: relative changes of the
+        By default up to 2000 points, step 0.02, largest_step 0.06: relative changes of the
         amplitude, of a fifth of the frequency and of a damping ratio of 0.1. Bounds are not used.
 
     Raises

@@ -73,7 +73,10 @@ class PeakProblem(Problem):
         """The problem of orbits over the frequency at the parameter in u."""
         values = self.orbit.values.copy()
         values[self.second] = u[-1]
-        return replace(self.orbit, values=values)
+        found = replace(self.orbit, values=values)
+        # As it is known to be forced, the system need not be made to find out.
+        vars(found)["autonomous"] = False
+        return found
 
     def weights(self) -> Array:
         """Those of the orbit, and of the parameter."""
@@ -156,7 +159,8 @@ class PeakLinearised:
         assert isinstance(orbit.field, ContactField)
         values = orbit.values.copy()
         values[orbit.free], values[problem.second] = frequency, parameter
-        P = given_force(orbit.field, values, problem.rest)
+        period = orbit.period(np.append(self.u[:-2], frequency))
+        P = given_force(orbit.field, values, problem.rest, period)
         row = np.zeros(orbit.reference.shape)
         row[1, : len(P)], row[2, : len(P)] = P.real, -P.imag
         return np.asarray(row.reshape(-1))

@@ -14,9 +14,10 @@ from fecontact.bifurcation.fields.contact_field import ContactField, contact_fie
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.branches import attributes_of
+from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.observed import observed_row, observed_values
-from fecontact.bifurcation.harmonic.response import branch_of_response, rest_state
+from fecontact.bifurcation.harmonic.observed import observed_row
+from fecontact.bifurcation.harmonic.response import branch_of_response, rest_state, with_observed
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice
@@ -154,6 +155,9 @@ def resonance_curve(
     if condition == "phase" and not isinstance(field, ContactField):
         raise InputError("resonance_curve: condition = 'phase' needs a contact system, whose given "
                          "forces are known; take 'amplitude'.")
+    if condition == "amplitude" and layout_of(field).memory:
+        raise InputError("resonance_curve: friction with memory has kinks, at which the condition "
+                         "of the largest amplitude is not smooth; take condition = 'phase'.")
     row, observed = observed_row(field, observe)
     low, high = chosen.bounds
     values = field.values
@@ -192,11 +196,7 @@ def _first(
                        frequencies)
     branch = branch_of_response(field, values, free, None, given.bounds[0],
                                 replace(method, tolerance=None), given, both=False)
-    sizes: list[float] = []
-    for point in branch.points:
-        orbit, u, _ = starts.restored(field, point)
-        sizes.append(observed_values(orbit.layout, orbit.coefficients(u), orbit.period(u), row)
-                     ["observed_amplitude"])
+    sizes = with_observed(branch, row, "", None, np.nan).column("observed_amplitude")
     place = int(np.argmax(sizes))
     if place in (0, len(sizes) - 1):
         raise AnalysisError(f"The response has no peak between the frequencies "
@@ -207,7 +207,7 @@ def _first(
             else np.zeros(field.dimension))
     width = width_of(None, options, float(values[second]))
     problem = PeakProblem(orbit, second, width, row, condition, orbit.weights() * tangent, rest,
-                          sizes[place])
+                          float(sizes[place]))
     start = np.append(u, values[second])
     if condition == "phase":
         problem = replace(problem, size=_work(problem, start))

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
+from fecontact.bifurcation.nonlinear_modes.resonance_curve import ResonanceCurve
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.output.plots.bifurcation_diagram import SPECIAL, runs_of, stable_pieces
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis
+from fecontact.output.plots.parameter_labels import name_axis, parameter_label
 from fecontact.output.plots.style import DASHES, distinct_colours
 
 if TYPE_CHECKING:
@@ -53,24 +56,10 @@ def plot_nonlinear_mode(
     lossless = all(mode.conservative for mode in given)
     with new_figure(9.0, 6.4, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
-        marked: dict[str, None] = {}
-        dashed = False
         colours = distinct_colours(len(given))
-        for mode, colour in zip(given, colours, strict=True):
-            stable = stable_pieces(mode.branch)
-            dashed |= not stable.all()
-            curves = (mode.frequency, _below(mode, lossless))
-            for panel, curve in zip((upper, lower), curves, strict=True):
-                for first, last in runs_of(stable):
-                    panel.plot(mode.amplitude[first : last + 1], curve[first : last + 1],
-                               color=colour, linewidth=1.8 if stable[first] else 1.2,
-                               linestyle="-" if stable[first] else DASHES)
-            for place, point in enumerate(mode.branch.points):
-                if point.kind is not None:
-                    marked.setdefault(point.kind)
-                    upper.plot(mode.amplitude[place], curves[0][place],
-                               SPECIAL.get(point.kind, ("", "."))[1], color=_DARK,
-                               markerfacecolor="white", markersize=6.0, zorder=4)
+        drawn = [_drawn((upper, lower), mode.branch, mode.amplitude,
+                        (mode.frequency, _below(mode, lossless)), colour)
+                 for mode, colour in zip(given, colours, strict=True)]
         if logarithmic:
             lower.set_xscale("log")
         upper.margins(x=0.02)
@@ -83,11 +72,88 @@ def plot_nonlinear_mode(
             lower.set_ylabel("damping ratio")
             if all((mode.damping_ratio >= 0.0).all() for mode in given):
                 lower.set_ylim(bottom=0.0)
-        unit = "rad" if given[0].observed.split()[-1].startswith("phi") else "m"
-        name_axis(lower, "x", f"amplitude of {given[0].observed} [{unit}]",
+        name_axis(lower, "x", f"amplitude of {given[0].observed} [{_unit(given[0].observed)}]",
                   np.concatenate([mode.amplitude for mode in given]))
-        _legend(upper, labels, colours, list(marked), dashed)
+        _legend(upper, labels, colours, drawn)
     return figure
+
+
+def plot_resonance_curve(
+    curves: ResonanceCurve | Sequence[ResonanceCurve], *, names: Sequence[str] = (),
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot resonances over a parameter: amplitude above, frequency below.
+
+    Resonances that are unstable are dashed; extrema of the amplitude and folds are marked.
+
+    Parameters
+    ----------
+    curves : ResonanceCurve or sequence of ResonanceCurve
+        What :func:`fecontact.bifurcation.resonance_curve` found, over the same parameter.
+    names : sequence of str, optional
+        For the legend, one for each curve.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        Without curves, for curves over different parameters, another number of names, another
+        suffix, or a file that cannot be written.
+    """
+    given = [curves] if isinstance(curves, ResonanceCurve) else list(curves)
+    for curve in given:
+        require_kind("plot_resonance_curve", ResonanceCurve, curve=curve)
+    if not given:
+        raise InputError("plot_resonance_curve: there are no curves; give at least one.")
+    over = dict.fromkeys(curve.parameter_name for curve in given)
+    if len(over) > 1:
+        raise InputError(f"plot_resonance_curve: the curves run over {', '.join(over)}; give "
+                         f"curves over the same parameter.")
+    if names and len(names) != len(given):
+        raise InputError(f"plot_resonance_curve: {len(names)} names do not go with {len(given)} "
+                         f"curves; give one for each.")
+    with new_figure(9.0, 6.4, path) as figure:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
+        colours = distinct_colours(len(given))
+        drawn = [_drawn((upper, lower), curve.branch, curve.parameter,
+                        (curve.amplitude, curve.frequency), colour)
+                 for curve, colour in zip(given, colours, strict=True)]
+        upper.set_ylim(bottom=0.0)
+        upper.margins(x=0.02)
+        name_axis(upper, "y", f"amplitude of {given[0].observed} [{_unit(given[0].observed)}]",
+                  np.concatenate([curve.amplitude for curve in given]))
+        name_axis(lower, "y", "frequency [Hz]",
+                  np.concatenate([curve.frequency for curve in given]))
+        name_axis(lower, "x", parameter_label(next(iter(over))),
+                  np.concatenate([curve.parameter for curve in given]))
+        _legend(upper, list(names), colours, drawn)
+    return figure
+
+
+def _drawn(
+    panels: tuple[Any, Any], branch: Branch, x: Array, curves: tuple[Any, Any], colour: str
+) -> tuple[dict[str, None], bool]:
+    """Draw a branch into both panels; kinds of its points, and whether a part is unstable."""
+    stable = stable_pieces(branch)
+    for panel, curve in zip(panels, curves, strict=True):
+        for first, last in runs_of(stable):
+            panel.plot(x[first : last + 1], curve[first : last + 1], color=colour,
+                       linewidth=1.8 if stable[first] else 1.2,
+                       linestyle="-" if stable[first] else DASHES)
+    special = {place: point.kind for place, point in enumerate(branch.points) if point.kind}
+    for place, kind in special.items():
+        panels[0].plot(x[place], curves[0][place], _marker(kind), color=_DARK,
+                       markerfacecolor="white", markersize=6.0, zorder=4)
+    return dict.fromkeys(special.values()), not stable.all()
+
+
+def _marker(kind: str) -> str:
+    return "o" if kind == "extremum" else SPECIAL.get(kind, ("", "."))[1]
+
+
+def _unit(observed: str) -> str:
+    return "rad" if observed.split()[-1].startswith("phi") else "m"
 
 
 def _below(mode: NonlinearMode, lossless: bool) -> Any:
@@ -111,18 +177,18 @@ def _labels(modes: list[NonlinearMode], names: Sequence[str]) -> list[str]:
 
 
 def _legend(
-    axis: Any, labels: list[str], colours: list[str], kinds: list[str], dashed: bool
+    axis: Any, labels: list[str], colours: list[str], drawn: list[tuple[dict[str, None], bool]]
 ) -> None:
     from matplotlib.lines import Line2D
 
     handles: list[Any] = [Line2D([], [], color=colour, linewidth=1.8, label=label)
                           for label, colour in zip(labels, colours, strict=False)]
-    if dashed:
+    if any(dashed for _, dashed in drawn):
         handles += [Line2D([], [], color=_DARK, linewidth=1.8, label="stable"),
                     Line2D([], [], color=_DARK, linewidth=1.2, linestyle=DASHES,
                            label="unstable")]
-    handles += [Line2D([], [], color=_DARK, marker=SPECIAL.get(kind, ("", "."))[1],
-                       markerfacecolor="white", linestyle="none", markersize=6.0, label=kind)
-                for kind in kinds]
+    handles += [Line2D([], [], color=_DARK, marker=_marker(kind), markerfacecolor="white",
+                       linestyle="none", markersize=6.0, label=kind)
+                for kind in dict.fromkeys(kind for kinds, _ in drawn for kind in kinds)]
     if handles:
         axis.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0))
