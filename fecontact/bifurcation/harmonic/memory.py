@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
@@ -29,7 +29,7 @@ _nodes = types.Array(f8, 4, "C")
 
 LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
-_ROUNDS, _STEPS = 40, 40
+_ROUNDS, _STEPS = 60, 40
 _REPEATS, _SOLVED = 1e-12, 1e-14
 
 
@@ -118,6 +118,45 @@ def solve_around(slopes, T, x):
                     x[place, node * s + i, c] = value
 
 
+@helper
+def _bracket(turn, start, off, brackets):
+    """Narrow the brackets of starts between which Newton's method goes to and fro.
+
+    An element that leaks towards its limit sticks with one start and slips much with the next; the
+    start that repeats lies between them, where it slips as much as it has leaked. ``brackets``
+    (5, 2 k) hold the last starts and how far off they were, lower and upper ends, and whether there
+    are any.
+    """
+    k = len(start) // 2
+    for i in range(k):
+        gap = max(abs(off[i]), abs(off[k + i]))
+        if brackets[4, i] > 0.0:
+            ahead = 0.0
+            for entry in (i, k + i):
+                ahead += off[entry] * (brackets[3, entry] - brackets[2, entry])
+            side = 2 if ahead > 0.0 else 3
+            for entry in (i, k + i):
+                brackets[side, entry] = start[entry]
+        elif turn > 1 and gap > brackets[1, i]:
+            for entry in (i, k + i):
+                brackets[2, entry], brackets[3, entry] = brackets[0, entry], start[entry]
+            brackets[4, i] = 1.0
+        for entry in (i, k + i):
+            brackets[0, entry] = start[entry]
+        brackets[1, i] = gap
+
+
+@helper
+def _keep_within(start, brackets):
+    """Halve the brackets that starts have left."""
+    k = len(start) // 2
+    for i in range(k):
+        low, high = brackets[2, i], brackets[3, i]
+        if brackets[4, i] > 0.0 and not min(low, high) < start[i] < max(low, high):
+            for entry in (i, k + i):
+                start[entry] = 0.5 * (brackets[2, entry] + brackets[3, entry])
+
+
 @kernel(i8(vector, matrix, SYSTEM, f8, matrix, matrix))
 def march(t, y, s, T, target, z):
     """Fill z (N, c) with the internal variables that repeat; c = n nodes times their number.
@@ -145,6 +184,7 @@ def march(t, y, s, T, target, z):
         start, off, step = np.zeros(2 * k), np.empty(2 * k), np.empty(k)
         last_round = np.empty(k)
         repeats, largest = False, 0.0
+        brackets = np.zeros((5, 2 * k))
         for turn in range(_ROUNDS):
             alike = 0
             for place in range(N):
@@ -201,10 +241,12 @@ def march(t, y, s, T, target, z):
             if repeats:
                 break
             if turn > 0:
+                _bracket(turn, start, off, brackets)
                 factorise(ring, 2 * k, ring_pivots)
                 solve(ring, ring_pivots, off)
             for i in range(2 * k):
                 start[i] += off[i]
+            _keep_within(start, brackets)
         if not repeats:
             done = 0
         for place in range(N):
