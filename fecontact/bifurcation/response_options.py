@@ -45,6 +45,12 @@ class ResponseSettings:
         Largest truncation error, relative to the orbit, for which harmonics are added.
     most_harmonics : int
         Limit for that.
+    stability : 'transitions', 'Koopman-Hill' or 'none'
+        How it is told whether orbits are stable; without it points take a fraction of the time and
+        folds alone are found.
+    preload : bool
+        Whether friction elements that never slide keep what ``[preload]`` has left in them;
+        otherwise they have no deflection at rest.
     step, largest_step : float
         First and largest step, in parts of the diagram.
     points : int
@@ -65,6 +71,8 @@ class ResponseSettings:
     samples: int | None = None
     tolerance: float | None = None
     most_harmonics: int = 100
+    stability: Literal["transitions", "Koopman-Hill", "none"] = "transitions"
+    preload: bool = False
     step: float = 0.01
     largest_step: float = 0.03
     points: int = 2000
@@ -154,7 +162,8 @@ class ResponseSettings:
         from fecontact.bifurcation.harmonic.method import HarmonicBalance
 
         return HarmonicBalance(self.harmonics, self.samples, self.tolerance,
-                               max(self.harmonics, self.most_harmonics))
+                               max(self.harmonics, self.most_harmonics),
+                               None if self.stability == "none" else self.stability)
 
     def options(self) -> "ContinuationOptions":
         """How responses are followed."""

@@ -20,6 +20,7 @@ from fecontact.core.errors import FecontactError
 if TYPE_CHECKING:
     from fecontact.bifurcation.response_options import ResponseSettings
     from fecontact.system.contact_system import ContactSystem
+    from fecontact.system.quasistatic.history import LoadHistory
 
 
 @dataclass
@@ -58,6 +59,7 @@ def follow_responses(
     progress: Callable[[str, float], None] | None = None,
     earlier: FrequencyResponse | None = None,
     keep: Callable[[FrequencyResponse], object] | None = None,
+    preload: "LoadHistory | None" = None,
 ) -> Responses:
     """Follow the responses at all levels, one after the other.
 
@@ -74,6 +76,8 @@ def follow_responses(
         one that was interrupted goes on at its last point.
     keep : callable, optional
         Given what there is after each level.
+    preload : LoadHistory, optional
+        Whose end elements that never slide keep.
 
     Raises
     ------
@@ -96,7 +100,7 @@ def follow_responses(
                     system, wanted.checked_bounds, wanted.parameter, observe=observe,
                     levels=None if wanted.level_name is None else {wanted.level_name: [value]},
                     method=wanted.method(), options=options,
-                    start=None if wanted.start is None else wanted.first)
+                    start=None if wanted.start is None else wanted.first, preload=preload)
         except KeyboardInterrupt:
             if result.response is None:
                 raise

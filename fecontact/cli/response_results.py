@@ -13,6 +13,7 @@ from fecontact.core.files.atomic_write import write_text
 from fecontact.output.files.branches import write_response
 
 if TYPE_CHECKING:
+    from fecontact.bifurcation.continuation.points import BranchPoint
     from fecontact.study.study import Study
 
 _COLUMNS = ("level", "kind", "parameter", "frequency_hz", "stable", "amplitude", "minimum",
@@ -61,12 +62,18 @@ def response_csv(response: FrequencyResponse) -> str:
             writer.writerow([
                 "" if response.level_name is None else repr(float(response.levels[level])),
                 point.kind or "", repr(point.parameter), repr(1.0 / float(values["period"])),
-                int(values["stable"]), repr(float(values["observed_amplitude"])),
+                int(values["stable"]) if "stable" in values else "", repr(float(values["observed_amplitude"])),
                 repr(float(values["observed_minimum"])), repr(float(values["observed_maximum"])),
                 repr(float(first[place])), repr(float(phase[place])), third[place],
                 repr(float(values["truncation_error"])),
                 "" if math.isnan(point.parameter_error) else repr(point.parameter_error)])
     return text.getvalue()
+
+
+def _stability(point: "BranchPoint") -> str:
+    """Empty where the stability was left out."""
+    stable = point.values.get("stable")
+    return "" if stable is None else "stable" if stable else "unstable"
 
 
 def _third(response: FrequencyResponse, level: int) -> list[str]:
@@ -95,7 +102,7 @@ def response_table(response: FrequencyResponse) -> Any:
                          *([] if over_frequency else [f"{point.parameter:.7g}"]),
                          f"{1.0 / float(point.values['period']):.7g}",
                          quantity(float(amplitude[place]), unit, 5),
-                         "stable" if point.values["stable"] else "unstable"))
+                         _stability(point)))
     return table(*([response.level_name] if response.level_name else []), "point",
                  *([] if over_frequency else [response.parameter_name]), "frequency [Hz]",
                  f"amplitude of {response.observed}", "", rows=rows, left=2)

@@ -16,6 +16,7 @@ from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.series import differentiated
 from fecontact.bifurcation.harmonic.stability import along_orbits
 from fecontact.bifurcation.orbits.floquet import Floquet
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
 if TYPE_CHECKING:
@@ -169,7 +170,10 @@ class Strides:
         """
         unit = np.zeros(len(u))
         unit[-1] = 1.0
-        exact = problem.linearise(u).solve(weights * tangent, unit)
+        try:
+            exact = problem.linearise(u).solve(weights * tangent, unit)
+        except AnalysisError:
+            return False
         exact = exact / np.sqrt(weights @ exact**2)
         if not np.isfinite(exact).all() or exact[-1] * tangent[-1] <= 0.0:
             return False

@@ -79,8 +79,10 @@ def response(
             observe = observed_point(system, wanted)
         earlier = _earlier(described, response_file(described, folder)) if resume else None
         with titled_bar() as progress:
-            found = follow_responses(system, wanted, progress, earlier,
-                                     lambda part: keep_response(described, part, folder))
+            found = follow_responses(
+                system, wanted, progress, earlier,
+                lambda part: keep_response(described, part, folder),
+                described.load_history() if wanted.preload else None)
         assert found.response is not None
         with waiting("Writing"):
             files = write_response_results(described, found.response, observe, folder)

@@ -208,9 +208,10 @@ def _curve(x: Array, y: Array, payload: Payload) -> tuple[Any, Any]:
 def point_texts(point: BranchPoint) -> list[str]:
     """What is told of a point of a branch: kind, parameter, period, frequency, stability."""
     period = point.period if isinstance(point, HopfPoint) else point.values.get("period")
-    unstable = int(point.values.get("unstable", 0))
+    unstable = point.values.get("unstable")
     kind = point.kind or ("orbit" if point.is_orbit else "steady sliding")
     return [kind + (f", {point.criticality}" if point.criticality else ""),
             f"{point.parameter:.7g}", "" if period is None else f"{float(period):.6g} s",
             "" if period is None else f"{1.0 / float(period):.6g} Hz",
-            count(unstable, "unstable direction") if unstable else "stable"]
+            "" if unstable is None
+            else count(int(unstable), "unstable direction") if unstable else "stable"]
