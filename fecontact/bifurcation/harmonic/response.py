@@ -291,13 +291,13 @@ def rest_state(field: ContactField, values: Array) -> Array:
 
 
 def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
-    """The problem with scales of the size of an orbit."""
+    """The problem with scales of the size of an orbit, which is found again to their precision."""
     low, high = problem.extremes(u, problem.linearise(u).memory)
     sizes = (high - low) / 2.0
     largest = float(sizes.max()) or 1.0
     sizes = np.maximum(sizes, 1e-3 * largest)
     scales = np.concatenate([sizes, problem.scales[-2:]])
-    return replace(problem, scales=scales, limits=1e4 * sizes), u
+    return starts.corrected(replace(problem, scales=scales, limits=1e4 * sizes), u)
 
 
 def _raised(

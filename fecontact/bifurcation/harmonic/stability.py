@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+from scipy.linalg import eigvals, expm
 
 from fecontact.bifurcation.harmonic import compiled_steps
 from fecontact.bifurcation.harmonic.balance import Balance
@@ -12,6 +12,7 @@ from fecontact.bifurcation.harmonic.layout import around
 from fecontact.bifurcation.harmonic.memory import LEAK
 from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
@@ -19,6 +20,10 @@ from fecontact.core.types import Array
 # Collocation of the linearised equations: degree, intervals per harmonic, at least, and samples for
 # each: who takes more samples, for kinks, gets more intervals too.
 _DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE = 4, 3, 20, 4
+# From so many states on multipliers are those of the product of all transitions, which takes a
+# fraction of the time, unless it has had entries of this size: smaller multipliers than 1e-12 of
+# it are then rounding.
+_MANY, _LARGEST = 16, 1e4
 # Largest size of the derivatives of several orbits that are made at once.
 _NUMBERS = 1_000_000
 
@@ -99,7 +104,18 @@ def _floquet(problem: Balance, T: float, f: Array, J: Array) -> Floquet:
         J[:, k, k] -= LEAK / T
     factors, nothing, widths = _room(N, len(points), layout.states)
     condensation.condense(J, f, nothing, widths, T, basis, slopes, 0, factors)
-    return floquet_of(factors, problem.autonomous)
+    if problem.autonomous or layout.states < _MANY:
+        return floquet_of(factors, problem.autonomous)
+    M = np.empty((N, layout.states, layout.states))
+    transitions(factors, M)
+    product, largest = M[0], 0.0
+    for step in M[1:]:
+        product = step @ product
+        largest = max(largest, float(np.abs(product).max()))
+    if not largest < _LARGEST:
+        return floquet_of(factors, False)
+    found = np.asarray(eigvals(product), dtype=np.complex128)
+    return Floquet(found[np.argsort(-np.abs(found))], None)
 
 
 @cache
