@@ -100,9 +100,7 @@ def goes_on(
 
 def method_of(point: BranchPoint) -> HarmonicBalance:
     """Harmonic balance as the branch of a point has it."""
-    known = point.branch.attributes
-    return HarmonicBalance(int(known["harmonics"]), int(known["samples"]),
-                           stability=str(known["stability"]))
+    return starts.method_of(point.branch.attributes)
 
 
 def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
@@ -122,16 +120,18 @@ def _rescaled(
     return replace(problem, scales=changed, limits=limits)
 
 
-def _attributes(problem: HarmonicProblem) -> dict[str, Any]:
+def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
+    """What a branch stores of its problem, so that its points can be restored."""
     field, layout = problem.field, problem.layout
     found = {} if problem.limits is None else {"limits": problem.limits}
     return {**found, "state_names": list(field.state_names),
             "parameter_names": list(field.parameters),
             "parameter_values": problem.values, "scales": problem.scales,
             "harmonics": problem.harmonics, "samples": problem.samples,
-            "stability": problem.stability, "periods": problem.periods,
+            "stability": problem.stability or "none", "periods": problem.periods,
             "displacements": layout.displacements, "memory": layout.memory,
-            "memory_nodes": layout.nodes}
+            "memory_nodes": layout.nodes,
+            **({"kept_deflections": problem.kept.offsets} if layout.memory else {})}
 
 
 def follow(
@@ -150,7 +150,7 @@ def follow(
     ended = replace(options, stop_at=[*stops, HALVING])
     while True:
         branch = continue_branch(problem, u, ended, name=name, tangent=tangent,
-                                 attributes=_attributes(problem), **how)
+                                 attributes=attributes_of(problem), **how)
         if branch.points[-1].kind == HALVING and HALVING not in stops:
             branch = replace(branch, status=BranchStatus.CLOSED)
         if method.tolerance is None or branch.status is BranchStatus.INTERRUPTED:

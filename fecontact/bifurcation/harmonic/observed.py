@@ -1,0 +1,74 @@
+"""What is observed of orbits by harmonic balance: range and harmonics of one displacement."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.estimates import peaks
+from fecontact.bifurcation.harmonic.series import differentiated, uniform_basis
+from fecontact.core.checks import as_floats
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, ArrayLike
+
+# Samples a period of what is observed, and harmonics of it that are stored.
+_SAMPLES, _HARMONICS = 512, 15
+
+
+def observed_row(
+    field: VectorField, observe: tuple[str | int, str] | ArrayLike
+) -> tuple[Array, str]:
+    """Row (d,) of the observed quantity, and its name.
+
+    Raises
+    ------
+    InputError
+        For a point that does not exist, a row of wrong size, or internal variables.
+    """
+    if isinstance(field, ContactField):
+        if not (isinstance(observe, Sequence) and len(observe) == 2
+                and isinstance(observe[1], str)):
+            raise InputError(f"observe = {observe!r} must be a point and a component, such as "
+                             f"('B', 'x').")
+        point, component = observe[0], observe[1]
+        return field.displacement_row(point, component), f"{point} {component}"
+    if isinstance(observe, tuple) and observe == ("B", "x"):
+        return np.eye(field.dimension)[0], field.state_names[0]
+    row = as_floats(observe, "observe")
+    if row.shape != (field.dimension,):
+        raise InputError(f"observe must hold {field.dimension} numbers, one for each state.")
+    states = np.flatnonzero(row)
+    return row, field.state_names[states[0]] if len(states) == 1 else "observed"
+
+
+def observed_values(
+    layout: Layout, X: Array, period: float, row: Array
+) -> dict[str, Any]:
+    """Values to store of an orbit with the coefficients X (2 H + 1, b) of q and y.
+
+    'observed_minimum', 'observed_maximum', half their difference as 'observed_amplitude', and
+    'observed_harmonics' (16,), complex.
+    """
+    return observed_of_orbits(layout, X[None], np.array([period]), row)[0]
+
+
+def observed_of_orbits(
+    layout: Layout, X: Array, periods: Array, row: Array
+) -> list[dict[str, Any]]:
+    """Those of K orbits with coefficients X (K, 2 H + 1, b) and periods (K,)."""
+    K, H, m = len(X), X.shape[1] // 2, layout.displacements
+    moved = np.moveaxis(X, 1, 0)
+    observes = moved[..., :m] @ row[:m] + moved[..., m:] @ row[2 * m : m + layout.harmonic]
+    if m and row[m : 2 * m].any():
+        observes = observes + differentiated(moved[..., :m]) @ row[m : 2 * m] / periods
+    low, high = peaks(uniform_basis(_SAMPLES, H) @ observes)
+    harmonics = np.zeros((K, max(H, _HARMONICS) + 1), dtype=complex)
+    harmonics[:, 0] = observes[0]
+    harmonics[:, 1 : H + 1] = (observes[1::2] - 1j * observes[2::2]).T
+    return [{"observed_minimum": least, "observed_maximum": most,
+             "observed_amplitude": (most - least) / 2.0, "observed_harmonics": each}
+            for least, most, each in zip(low.tolist(), high.tolist(),
+                                         harmonics[:, : _HARMONICS + 1], strict=True)]

@@ -1,0 +1,154 @@
+"""Where a nonlinear mode begins: the system without excitation, and its linear mode at rest."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fecontact.bifurcation.equilibria.equilibrium import steady_sliding
+from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.harmonic.response import rest_state
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array, ComplexArray
+from fecontact.laws.excitation import BOUNDARY_STRESSES, BoundaryLoad, Drive, Load
+from fecontact.laws.signals.base import Signal
+from fecontact.laws.signals.harmonic import Constant
+from fecontact.system.complex_modes import ComplexModes
+from fecontact.system.contact_system import ContactSystem
+
+XI = "xi"
+# Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
+_ZERO = 1e-7
+_ITERATIONS = 60
+# Relative change of xi at which the search for the undamped motion ends.
+_SETTLED = 1e-13
+
+_Part = TypeVar("_Part", BoundaryLoad, Drive, Load)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearStart:
+    """An undamped motion state + Re(shape exp(i w t)) of the linearised system with -xi M q'.
+
+    Attributes
+    ----------
+    field : ContactField
+        The system without excitation, over xi.
+    state : (d,) array
+        Rest, or steady sliding.
+    shape : (d,) complex array
+        Of the state, of length one.
+    angular_frequency, xi : float
+        w [rad/s] and xi [1/s], which may be below zero.
+    """
+
+    field: ContactField
+    state: Array
+    shape: ComplexArray
+    angular_frequency: float
+    xi: float
+
+
+def unforced(system: ContactSystem) -> ContactSystem:
+    """The system without the parts of drive and loads that depend on time; constant ones stay."""
+    drive, load = system.drive, system.load
+    kept = {f"motion_{axis}": motion if isinstance(motion, Constant) else None
+            for axis, motion in zip("xyz", (drive.motion_x, drive.motion_y, drive.motion_z),
+                                    strict=True)}
+    none = {f"amplitude_{axis}": 0.0 for axis in "xyz"}
+    boundaries = [_changed(one, {name: _constant(getattr(one, name))
+                                 for name in BOUNDARY_STRESSES})
+                  for one in load.boundaries if _remains(one)]
+    forces = [one for one in load.forces if isinstance(one.signal, Constant)]
+    accelerations = {f"base_acceleration_{axis}": signal if isinstance(signal, Constant) else None
+                     for axis, signal in zip("xyz", load.base_accelerations, strict=True)}
+    return system.with_(
+        drive=_changed(drive, {"angular_frequency": 0.0, **none, **kept}),
+        load=_changed(load, {"forces": tuple(forces), "boundaries": tuple(boundaries),
+                             **accelerations}))
+
+
+def _changed(part: _Part, changes: Mapping[str, Any]) -> _Part:
+    return replace(part, **changes)
+
+
+def _constant(given: float | Signal) -> float | Signal:
+    return 0.0 if isinstance(given, Signal) and not isinstance(given, Constant) else given
+
+
+def _remains(load: BoundaryLoad) -> bool:
+    """Whether a constant part of a boundary load is left."""
+    return any(isinstance(value, Constant) or bool(value)
+               for value in (_constant(getattr(load, name)) for name in BOUNDARY_STRESSES))
+
+
+def with_mass_damping(system: ContactSystem, xi: float) -> ContactSystem:
+    """The system with the forces xi M q' added: modal damping D - xi I."""
+    basis = system.basis
+    return system.with_(basis=replace(basis, damping=basis.damping - xi * np.eye(basis.modes)))
+
+
+def linear_start(system: ContactSystem, number: int) -> LinearStart:
+    """The linear mode ``number``, from 1, of the system at rest under its constant loads.
+
+    Friction with memory sticks in it. Modes are counted by their damped frequencies at xi = 0; xi
+    is then the negative damping under which the mode neither grows nor decays.
+
+    Raises
+    ------
+    InputError
+        If there is no such mode, or the ground shakes the system.
+    """
+    free = unforced(system)
+    field = contact_field(free, {XI: (0.0, with_mass_damping)})
+    if field.forcing_period(field.values) is not None:
+        raise InputError("Waves of the moving ground excite the system; nonlinear modes need flat "
+                         "ground, or ground at rest.")
+    moves = free.prescribed_motion.largest_speed(0.0, 1.0) > 0.0
+    state = (steady_sliding if moves else rest_state)(field, field.values)
+    A = field.derivatives(np.zeros(1), state[None], field.values)[1][0]
+    modes = ComplexModes.of(A, zero=_ZERO)
+    count = len(modes.eigenvalues)
+    if not (isinstance(number, int | np.integer) and not isinstance(number, bool)
+            and 1 <= number <= count):
+        found = listed_frequencies(modes) if count else "none"
+        raise InputError(f"mode = {number!r} must be the number of an oscillating mode, from 1 to "
+                         f"{count}; the frequencies at rest are: {found}.")
+    value, shape, xi = _undamped(A, free.basis.modes, complex(modes.eigenvalues[number - 1]))
+    # The parameter's own scale is that of the mode.
+    field = contact_field(free, {XI: (xi, with_mass_damping)})
+    return LinearStart(field, state, shape, value, xi)
+
+
+def listed_frequencies(modes: ComplexModes) -> str:
+    """Frequencies of modes in words, for messages."""
+    shown = [f"{value:.5g}" for value in modes.frequencies_hz[:8]]
+    return ", ".join(shown) + (" ..." if len(modes.frequencies_hz) > 8 else "") + " Hz"
+
+
+def _undamped(A: Array, m: int, value: complex) -> tuple[float, ComplexArray, float]:
+    """Frequency, shape and xi for which the eigenvalue followed from ``value`` is i w.
+
+    With the state [q, q', z] the matrix is A + xi E, E = diag(0, I, 0); Newton's method for the
+    real part, with the slope ``s^T E r / s^T r`` of left and right eigenvectors.
+    """
+    from scipy.linalg import eig
+
+    E = np.zeros(len(A))
+    E[m : 2 * m] = 1.0
+    xi = 0.0
+    for _ in range(_ITERATIONS):
+        eigenvalues, left, right = eig(A + xi * np.diag(E), left=True)
+        at = int(np.argmin(np.abs(eigenvalues - value)))
+        value, s, r = complex(eigenvalues[at]), left[:, at].conj(), right[:, at]
+        if not value.imag > 0.0:
+            break
+        slope = complex((s * E) @ r / (s @ r))
+        change = -value.real / slope.real
+        xi, value = xi + change, value + change * slope
+        if abs(change) <= _SETTLED * abs(value):
+            return float(value.imag), np.asarray(r / np.linalg.norm(r)), float(xi)
+    raise AnalysisError(f"The linear mode at {value.imag / (2.0 * np.pi):.5g} Hz is damped too "
+                        f"strongly to be followed: with less damping it does not become an "
+                        f"oscillation of its own.")

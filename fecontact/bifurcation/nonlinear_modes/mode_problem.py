@@ -1,0 +1,86 @@
+"""Continuation problem of a nonlinear mode: periodic motion under negative damping."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from fecontact.bifurcation.harmonic.observed import observed_values
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.core.types import Array, ComplexArray
+
+# Distance of a multiplier from the unit circle beyond which a perturbation grows.
+_GROWS = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class ModeProblem(HarmonicProblem):
+    """Orbits of an autonomous system over xi, with what is observed and without stability.
+
+    Multipliers of a damped system with -xi M q' say nothing of its own motion; those of a
+    conservative one are stored.
+
+    Attributes
+    ----------
+    row : (d,) array
+        What is observed.
+    conservative : bool
+        Whether xi is zero but for rounding where the mode begins, and no friction has memory.
+    """
+
+    row: Array = field(default_factory=lambda: np.zeros(0))
+    conservative: bool = False
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Period, velocities, truncation errors, and what is observed."""
+        T, X = self.period(u), self.coefficients(u)
+        error, residual = linearisation.neglected
+        k = np.repeat(np.arange(1, self.harmonics + 1), 2)[:, None]
+        m = self.layout.displacements
+        # Of mass-normalised modes: twice the mean kinetic energy.
+        square = 0.5 * float(((2.0 * np.pi / T * k * X[1:, :m]) ** 2).sum())
+        found = {"period": T, "mean_square_velocity": square, "truncation_error": error,
+                 "residual": residual, **observed_values(self.layout, X, T, self.row)}
+        if self.conservative:
+            floquet = linearisation.floquet
+            found |= {"multipliers": floquet.multipliers, "stable": _none_grows(
+                floquet.multipliers), "trivial_error": floquet.trivial_error}
+        if self.layout.memory:
+            found["memory"] = linearisation.memory
+        return found
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """A function that is zero at branch points, 1 / |M^-1 b| with the sign of det M.
+
+        M are the equations with the tangent as last row, in the scales of the unknowns, b is a
+        fixed vector. The sign stays the same along a branch, and differs on the branch beyond an
+        internal resonance that a step has left out; such steps are refused.
+        """
+        weights = self.weights()
+        square = np.vstack([linearisation.condensed, weights * tangent]) * weights**-0.5
+        square /= np.abs(square).max(axis=1)[:, None]
+        factors, pivots = lu_factor(square, check_finite=False)
+        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
+        sign = np.prod(np.sign(np.diag(factors))) * (-1.0) ** swaps
+        size = np.linalg.norm(lu_solve((factors, pivots), np.cos(np.arange(len(square)))))
+        return {"branch point": float(sign / size)}
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of xi are no folds of the mode."""
+        return {"fold"}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """Points are told by their test functions alone."""
+        return {}
+
+
+def _none_grows(multipliers: ComplexArray) -> bool:
+    """Whether no multiplier (d,) lies outside the unit circle, but for the double one at one.
+
+    It belongs to the phase and to the amplitude, and rounding parts it.
+    """
+    rest = multipliers[np.argsort(np.abs(multipliers - 1.0))[2:]]
+    return bool(np.abs(rest).max(initial=0.0) <= 1.0 + _GROWS)

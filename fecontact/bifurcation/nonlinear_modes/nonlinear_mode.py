@@ -1,0 +1,318 @@
+"""Nonlinear modes: frequency, damping and shape of a system's own motion over its amplitude."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    options_of,
+)
+from fecontact.bifurcation.harmonic import branches, starts
+from fecontact.bifurcation.harmonic.layout import layout_from
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.observed import observed_row
+from fecontact.bifurcation.nonlinear_modes.linear_start import LinearStart, linear_start
+from fecontact.bifurcation.nonlinear_modes.mode_problem import ModeProblem
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, ComplexArray
+from fecontact.core.units import Summarised, listed, span
+from fecontact.system.contact_system import ContactSystem
+
+# Points at most and steps, unless options say so: a step of one is the amplitude itself, and the
+# parts of frequency and damping below.
+_POINTS, _STEP, _LARGEST = 2000, 0.02, 0.06
+_PERIOD_SCALE, _XI_SCALE = 0.2, 0.2
+# Largest |xi| of a conservative system, relative to the frequency.
+_CONSERVATIVE = 1e-8
+# Smallest scale of a coordinate relative to the largest one, and part of the linear mode that the
+# observed point must have.
+_LEAST_SCALE, _LEAST_SEEN = 1e-3, 1e-9
+# Part of the smallest amplitude below which the mode ends.
+_BELOW = 0.99
+_ENDS = ("largest amplitude", "smallest amplitude")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NonlinearMode(Summarised):
+    """A periodic motion of a system without excitation, over its amplitude.
+
+    The points of its branch run over xi; they store 'period', 'mean_square_velocity',
+    'observed_amplitude' and 'observed_harmonics' as those of a
+    :class:`~fecontact.bifurcation.FrequencyResponse`, 'truncation_error' and 'residual', and if
+    nothing is lost 'multipliers' and 'stable'. A point of kind 'branch point' is where a mode meets
+    another one.
+
+    Attributes
+    ----------
+    branch : Branch
+        The motions, in their order along the mode.
+    number : int
+        Which mode of the system at rest it begins with, from 1.
+    observed : str
+        Whose amplitude it is, such as 'B x'.
+    """
+
+    branch: Branch
+    number: int
+    observed: str
+
+    def __len__(self) -> int:
+        return len(self.branch)
+
+    @property
+    def amplitude(self) -> Array:
+        """Half the range (N,) of the observed displacement over a period."""
+        return np.asarray(self.branch.column("observed_amplitude"))
+
+    @property
+    def angular_frequency(self) -> Array:
+        """Omega (N,) [rad/s]."""
+        return np.asarray(2.0 * np.pi / self.branch.column("period"))
+
+    @property
+    def frequency(self) -> Array:
+        """Frequency (N,) [Hz]."""
+        return np.asarray(1.0 / self.branch.column("period"))
+
+    @property
+    def xi(self) -> Array:
+        """Negative damping xi (N,) [1/s] that makes the motion periodic."""
+        return self.branch.parameter
+
+    @property
+    def damping_ratio(self) -> Array:
+        """Damping ratio (N,), xi / (2 Omega)."""
+        return np.asarray(self.xi / (2.0 * self.angular_frequency))
+
+    @property
+    def conservative(self) -> bool:
+        """Whether nothing is lost: xi is zero but for rounding throughout."""
+        return bool((np.abs(self.xi) <= _CONSERVATIVE * self.angular_frequency).all())
+
+    @property
+    def loss(self) -> Array:
+        """Energy (N,) lost in one period, xi times the integral of q'^T q' [J]."""
+        return np.asarray(self.xi * self.branch.column("period") * self._square)
+
+    @property
+    def energy(self) -> Array | None:
+        """Energy (N,) of the motion above that of rest [J]; None unless conservative.
+
+        The integral of Omega dJ along the mode over its action ``J = int q'^T q' dt / (2 pi)``.
+        """
+        if not self.conservative:
+            return None
+        w = self.angular_frequency
+        return _integral(w, np.asarray(self._square / w))
+
+    @property
+    def stable(self) -> NDArray[np.bool_] | None:
+        """Whether the motion (N,) is stable; None unless conservative.
+
+        Perturbations of a conservative motion do not decay; those of a stable one do not grow.
+        """
+        if not (self.conservative and "stable" in self.branch.points[0].values):
+            return None
+        return np.asarray(self.branch.column("stable")).astype(bool)
+
+    def harmonic(self, k: int = 1) -> ComplexArray:
+        """Complex harmonic X_k (N,) of the observed displacement, x_k = Re(X_k exp(i k w t))."""
+        return np.asarray(self.branch.column("observed_harmonics")[:, k])
+
+    def coordinates(self, k: int = 1) -> ComplexArray:
+        """Complex harmonic (N, m) of the modal coordinates q: the shape of the mode.
+
+        Raises
+        ------
+        InputError
+            If the motion has fewer harmonics.
+        """
+        known = self.branch.attributes
+        H, m, b = int(known["harmonics"]), int(known["displacements"]), layout_from(known).harmonic
+        if not (isinstance(k, int | np.integer) and 0 <= k <= H):
+            raise InputError(f"coordinates: k = {k!r} must be a whole number from 0 to {H}, the "
+                             f"number of harmonics.")
+        X = np.array([point.u[: (2 * H + 1) * b].reshape(-1, b)[:, :m]
+                      for point in self.branch.points])
+        return np.asarray(X[:, 0] + 0j if k == 0 else X[:, 2 * k - 1] - 1j * X[:, 2 * k])
+
+    def orbit(self, index: int, samples: int = 1000) -> PeriodicMotion:
+        """The motion at one of the points over a period, both ends included."""
+        return self.branch.points[index].orbit(samples=samples)
+
+    @property
+    def _square(self) -> Array:
+        return np.asarray(self.branch.column("mean_square_velocity"))
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Amplitudes, frequencies, damping, points where modes meet, and how it ended."""
+        special = [f"{point.kind} at {point.values['observed_amplitude']:.5g}"
+                   for point in self.branch.special]
+        stable = self.stable
+        return [
+            ("mode", f"{self.number}"), ("observed", self.observed),
+            ("amplitude", span(self.amplitude)), ("frequency", span(self.frequency, "Hz")),
+            ("damping ratio", "none" if self.conservative else span(self.damping_ratio)),
+            ("points", f"{len(self)}"),
+            *([("special", listed(special, 5))] if special else []),
+            *([("stable", f"{int(stable.sum())} of {len(self)} points")]
+              if stable is not None else []),
+            ("end", self.branch.status.name.lower())]
+
+
+def nonlinear_mode(
+    system: ContactSystem, bounds: tuple[float, float], mode: int = 1, *,
+    observe: tuple[str | int, str] = ("B", "x"), method: HarmonicBalance | None = None,
+    options: ContinuationOptions | None = None,
+) -> NonlinearMode:
+    r"""A nonlinear mode by harmonic balance: frequency, damping and shape over the amplitude.
+
+    Extended periodic motion concept: a negative damping makes the motion periodic,
+
+    .. math:: M x'' + C x' + K x + f(x, x') - \xi M x' = f_{static},
+
+    with :math:`\Omega` and :math:`\xi` unknown; :math:`\xi / (2 \Omega)` is the damping ratio.
+    Without losses xi is zero. The branch starts with the linear mode at rest, friction with memory
+    sticking, and follows internal resonances. Drives and loads in time are left out.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        With smoothed laws.
+    bounds : (float, float)
+        Amplitudes at which the mode begins and ends [m, rad for a rotation].
+    mode : int
+        Number of the linear mode, from 1, in the order of frequencies.
+    observe : (point, component)
+        Displacement, half the range of which is the amplitude.
+    method : HarmonicBalance, optional
+        Harmonics, samples; kinks need many samples.
+    options : ContinuationOptions, optional
+        By default up to 2000 points, step 0.02, largest_step 0.06: relative changes of the
+        amplitude, of a fifth of the frequency and of a damping ratio of 0.1. Bounds are not used.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        For a mode or point that does not exist, that does not move in the mode, or no motion found.
+
+    References
+    ----------
+    M. Krack, Nonlinear modal analysis of nonconservative systems: extension of the periodic motion
+    concept, Computers and Structures 154 (2015).
+    """
+    require_kind("nonlinear_mode", ContactSystem, system=system)
+    require_kind("nonlinear_mode", (HarmonicBalance, type(None)), method=method)
+    low, high = _amplitudes(bounds)
+    given = options_of(options or ContinuationOptions(points=_POINTS, step=_STEP,
+                                                      largest_step=_LARGEST), None)
+    start = linear_start(system, mode)
+    row, observed = observed_row(start.field, observe)
+    chosen = method or HarmonicBalance()
+    problem, u, leaving = _leaving(start, row, observed, low, chosen)
+    branch = branches.follow(problem, u, leaving, chosen, replace(
+        given, bounds=(-np.inf, np.inf), locate=True,
+        stop_at=[*([given.stop_at] if isinstance(given.stop_at, str) else given.stop_at), *_ENDS],
+        events={**given.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)}))
+    return NonlinearMode(_ended(branch, observed, mode), mode, observed)
+
+
+def mode_of(branch: Branch) -> NonlinearMode:
+    """A nonlinear mode from its branch, such as that of a file.
+
+    Raises
+    ------
+    InputError
+        If it is not that of a mode.
+    """
+    known = branch.attributes
+    if not {"mode_number", "observed", "displacements"} <= set(known) or not len(branch):
+        raise InputError("The branch is not that of a nonlinear mode; make one with "
+                         "nonlinear_mode.")
+    return NonlinearMode(branch, int(known["mode_number"]), str(known["observed"]))
+
+
+def _amplitudes(bounds: tuple[float, float]) -> tuple[float, float]:
+    found = as_floats(bounds, "nonlinear_mode: bounds")
+    if found.shape != (2,) or not 0.0 < found[0] < found[1] < np.inf:
+        raise InputError(f"nonlinear_mode: bounds = {bounds!r} must be two amplitudes above zero, "
+                         f"the smaller one first.")
+    return float(found[0]), float(found[1])
+
+
+def _leaving(
+    start: LinearStart, row: Array, observed: str, amplitude: float, method: HarmonicBalance
+) -> tuple[ModeProblem, Array, Array]:
+    """Problem, unknowns and direction of the linear mode at a small amplitude."""
+    field, d, w = start.field, start.field.dimension, start.angular_frequency
+    seen = complex(row @ start.shape)
+    m = field.system().basis.modes
+    if abs(seen) <= _LEAST_SEEN * np.linalg.norm(np.abs(row[:m]) * np.abs(start.shape[:m])):
+        raise InputError(f"{observed} does not move in this mode; observe another displacement.")
+    # The observed displacement begins at its largest value.
+    shape = start.shape * amplitude / seen
+    sizes = np.abs(shape)
+    sizes = np.maximum(sizes, _LEAST_SCALE * sizes[:m].max())
+    T = 2.0 * np.pi / w
+    scales = np.concatenate([sizes, [_PERIOD_SCALE * T, _XI_SCALE * w]])
+    plain = starts.problem_for(field, field.values, 0, method, scales)
+    waves = np.exp(2.0j * np.pi * plain.series.times)[:, None]
+    leaving = starts.unknowns(plain, (waves * shape).real, 0.0)
+    leaving[-2:] = 0.0
+    u = starts.unknowns(plain, np.tile(start.state, (plain.samples, 1)), T) + leaving
+    lossless = abs(start.xi) <= _CONSERVATIVE * w and not plain.layout.memory
+    known = {entry.name: getattr(plain, entry.name) for entry in fields(plain)}
+    problem = ModeProblem(**{
+        **known, "reference": plain.coefficients(leaving).copy(), "limits": np.full(d, np.inf),
+        "row": row, "conservative": lossless})
+    return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
+
+
+def _beyond(amplitude: float) -> Any:
+    def off(values: Mapping[str, Any]) -> float:
+        return float(values["observed_amplitude"]) / amplitude - 1.0
+
+    return off
+
+
+def _ended(branch: Branch, observed: str, mode: int) -> Branch:
+    """The branch with its last point a regular one, where it ends at an amplitude."""
+    last = branch.points[-1]
+    points, status = branch.points, branch.status
+    if last.kind in _ENDS:
+        points = (*points[:-1], BranchPoint(last.u, last.tangent, last.values))
+        status = BranchStatus.BOUND
+    return replace(branch, points=points, status=status, attributes={
+        **branch.attributes, "observed": observed, "mode_number": int(mode)})
+
+
+def _integral(rate: Array, over: Array) -> Array:
+    """Integral (N,) of a rate along a curve from zero, by splines through its points.
+
+    Up to the first point the rate is constant.
+    """
+    from scipy.interpolate import CubicSpline
+
+    first = rate[0] * over[0]
+    chord = np.hypot(np.diff(rate) / rate[0], np.diff(over) / np.maximum(over[1:], over[:-1]))
+    kept = np.append(True, chord > 1e-12)
+    if np.count_nonzero(kept) < 2:
+        return np.full(len(rate), first)
+    s = np.append(0.0, np.cumsum(chord[kept[1:]]))
+    rates, overs = CubicSpline(s, rate[kept]), CubicSpline(s, over[kept])
+    # Three Gauss points integrate the product of both cubics exactly.
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    middle, half = 0.5 * (s[1:] + s[:-1]), 0.5 * np.diff(s)
+    places = middle[:, None] + half[:, None] * nodes
+    parts = half * ((rates(places) * overs(places, 1)) @ weights)
+    whole = np.append(0.0, np.cumsum(parts))
+    return np.asarray(first + whole[np.cumsum(kept) - 1])
