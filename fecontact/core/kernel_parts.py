@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
+from llvmlite.binding import Linkage, parse_assembly
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
@@ -47,6 +48,37 @@ class _PartLibrary(JITCodeLibrary):
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
         self._finalized = True
+
+
+class _KernelLibrary(JITCodeLibrary):
+    """Code of a kernel, which is seen from outside by its entries only."""
+
+    constants = ""
+
+    def _optimize_final_module(self) -> None:
+        if self.constants:
+            module = parse_assembly(self.constants)
+            module.data_layout = self._final_module.data_layout
+            module.triple = self._final_module.triple
+            self._final_module.link_in(module)
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._optimize_final_module()
+
+
+def kernel_compiler(constants: str) -> Any:
+    """A compiler whose kernels have fixed values by :func:`fecontact.core.references.constants`."""
+
+    class KernelCompiler(Compiler):
+        def define_pipelines(self) -> Any:
+            state = self.state
+            state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.constants = constants
+            state.library.enable_object_caching()
+            return super().define_pipelines()
+
+    return KernelCompiler
 
 
 class _PartCompiler(Compiler):

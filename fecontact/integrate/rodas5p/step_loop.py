@@ -51,6 +51,7 @@ from fecontact.laws.signatures import signal_at
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
+ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, VARY, WATCH, i8)
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
@@ -345,8 +346,7 @@ def _next_length(step, error, factor, longest, numbers):
     return min(h * factor, longest)
 
 
-@kernel(types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, VARY, WATCH, i8),
-        nogil=True)
+@kernel(ADVANCE, nogil=True)
 def advance(held_problem, held_progress, held_room, held_output, held_vary, held_watch, most):
     """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
 
