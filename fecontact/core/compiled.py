@@ -203,8 +203,9 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def routine(function: Callable[..., Any]) -> Any:
-    """As :func:`helper`, for long functions that are called seldom: they are not copied."""
-    return part(function, error_model="numpy", fastmath=_FASTMATH)
+    """As :func:`helper`, for long functions: they are not copied, and optimised by themselves."""
+    # Said, lest it be as in the function for which it is compiled first.
+    return part(function, error_model="numpy", fastmath=_FASTMATH, forceinline=False)
 
 
 @dataclass(frozen=True, eq=False)

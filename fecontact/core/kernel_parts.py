@@ -51,19 +51,27 @@ class _PartLibrary(JITCodeLibrary):
 
 
 class _KernelLibrary(JITCodeLibrary):
-    """Code of a kernel, which is seen from outside by its entries only."""
+    """Code of a kernel, which is seen from outside by its entries only.
+
+    Its routines stay functions of their own, unless ``constants`` make them short.
+    """
 
     constants = ""
 
     def _optimize_final_module(self) -> None:
+        entries = {function.name for function in self._final_module.functions
+                   if function.linkage == Linkage.external}
         if self.constants:
             module = parse_assembly(self.constants)
-            module.data_layout = self._final_module.data_layout
             module.triple = self._final_module.triple
+            module.data_layout = self._final_module.data_layout
             self._final_module.link_in(module)
         for function in self._final_module.functions:
-            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+            if not function.is_declaration and function.name not in entries:
                 function.linkage = Linkage.internal
+                inlined = b"alwaysinline" in b" ".join(function.attributes)
+                if not (self.constants or inlined) and function.name.startswith("_ZN9fecontact"):
+                    function.add_function_attribute("noinline")
         super()._optimize_final_module()
 
 

@@ -19,7 +19,6 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
 
-
 _I32, _I64 = ir.IntType(32), ir.IntType(64)
 
 
@@ -106,7 +105,8 @@ def _array(context: Any, builder: Any, field: Any, name: str, value: Any, index:
              for axis in range(field.ndim)]
     item = context.get_constant(
         types.intp, context.get_abi_sizeof(context.get_data_type(field.dtype)))
-    strides, count = [], context.get_constant(types.intp, 1)
+    strides: list[Any] = []
+    count = context.get_constant(types.intp, 1)
     for length in reversed(shape):
         strides.insert(0, builder.mul(count, item))
         count = builder.mul(count, length)

@@ -1,8 +1,8 @@
 """The step loop for systems of one or two contact nodes that few modes move.
 
-Their steps take a microsecond, most of it for loops over so few numbers that to begin and end them
-costs more than they do. Each size here has a step loop of its own, compiled for arrays of that
-size, in which loops are written out. It gives the same numbers up to rounding.
+Their steps take a microsecond, most of it to begin and end loops over one or two numbers. Each size
+here has a step loop of its own, compiled for arrays of that size, in which loops are written out.
+It gives the same numbers up to rounding.
 """
 
 from functools import cache
@@ -19,14 +19,14 @@ from fecontact.system.nodes import SYSTEM
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Modes and nodes.
-SIZES = ((1, 1), (2, 1), (3, 1), (2, 2))
+SIZES = tuple((modes, nodes) for modes in (1, 2, 3, 4) for nodes in (1, 2))
 
 
 def advance_for(problem: state.Problem, vary: Vary) -> Any:
     """The step loop of a system: that of its size, or :func:`step_loop.advance`.
 
-    Those of small systems are for plane systems of one block and one motion of the ground, without
-    internal variables and without derivatives.
+    Step loops of small systems are for plane ones of one block, with one motion of the ground,
+    without internal variables and without derivatives.
     """
     s = problem.system
     n, m = s.Tx.shape
