@@ -19,14 +19,15 @@ from typing import Any
 
 import numpy as np
 from numba import njit, types
-from numba.core import cgutils, sigutils
+from numba.core import sigutils
 from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
+from numba.core.datamodel.models import PrimitiveModel
 from numba.core.errors import NumbaError
-from numba.extending import intrinsic
+from numba.extending import intrinsic, lower_builtin, register_model
 
 from fecontact.core.errors import InputError
-from fecontact.core.kernel_parts import part
+from fecontact.core.kernel_parts import kernel_compiler, part
 
 f8 = types.float64
 i8 = types.int64
@@ -162,29 +163,33 @@ def _remove(path: str) -> None:
         Path(path).unlink()
 
 
-def _stamp(compiled: Any, function: Any, module: str = "") -> None:
+def _stamp(compiled: Any, function: Any, module: str = "", variant: str = "") -> None:
     """Key stored code by the sources it is made from, and by the module name it refers to."""
     stored: Any = getattr(compiled, "_cache", None)
     if isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
-        stored._cache_file = _StoredCode(stored.cache_path, stored._impl.filename_base,
+        mark = f".{hashlib.sha256(variant.encode()).hexdigest()[:16]}" if variant else ""
+        stored._cache_file = _StoredCode(stored.cache_path, stored._impl.filename_base + mark,
                                          (source_digest(function), module))
 
 
-def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def kernel(
+    signature: Any, *, constants: str = "", **options: Any,
+) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function for one signature and keep the result on disk.
 
     Floating-point sums may be reordered (so that they vectorise), but NaN and infinity keep
     their meaning. The stored code is renewed when the function changes, or anything that it is
-    compiled from, see :func:`source_digest`.
+    compiled from, see :func:`source_digest`. With ``constants`` of
+    :func:`fecontact.core.references.constants` it serves for tuples with these values only.
     """
 
     def compile_(function: Callable[..., Any]) -> Any:
         settings: dict[str, Any] = {
             "cache": True, "error_model": "numpy",
-            "fastmath": _FASTMATH, **options,
+            "fastmath": _FASTMATH, "pipeline_class": kernel_compiler(constants), **options,
         }
         dispatcher = njit(**settings)(function)
-        _stamp(dispatcher, dispatcher)
+        _stamp(dispatcher, dispatcher, variant=constants)
         dispatcher.compile(signature)
         dispatcher.disable_compile()
         return dispatcher
@@ -198,8 +203,9 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def routine(function: Callable[..., Any]) -> Any:
-    """As :func:`helper`, for long functions that are called seldom: they are not copied."""
-    return part(function, error_model="numpy", fastmath=_FASTMATH)
+    """As :func:`helper`, for long functions: they are not copied, and optimised by themselves."""
+    # Said, lest it be as in the function for which it is compiled first.
+    return part(function, error_model="numpy", fastmath=_FASTMATH, forceinline=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,20 +287,53 @@ def _raising(function: Callable[..., Any], seen: set[Any] | None = None) -> str 
     return None
 
 
-def function_at(signature: Any) -> Any:
-    """A function for kernels that turns an address into a callable of this signature."""
-    function_type = types.FunctionType(signature)
+class _FunctionAt(types.Callable):
+    """Numba's type of an address of a function in C that takes and returns numba's values."""
+
+    def __init__(self, signature: Any, only_reads: bool) -> None:
+        self.prototype, self.only_reads = types.FunctionType(signature), only_reads
+        super().__init__(name=f"FunctionAt({signature}, {only_reads})")
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """Its signature, for as many arguments."""
+        wanted = self.prototype.signature
+        return wanted.replace(recvr=self) if len(args) == len(wanted.args) else None
+
+    def get_call_signatures(self) -> Any:
+        """Its signature."""
+        return [self.prototype.signature], False
+
+    def get_impl_key(self, sig: Any) -> Any:
+        """All such functions are called in the same way."""
+        return type(self)
+
+
+@register_model(_FunctionAt)
+class _FunctionAtModel(PrimitiveModel):
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(dmm, fe_type, dmm.lookup(types.int64).get_value_type())
+
+
+@lower_builtin(_FunctionAt, _FunctionAt, types.VarArg(types.Any))
+def _call_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kind = signature.args[0]
+    pointer = builder.inttoptr(args[0], context.get_value_type(kind.prototype.ftype))
+    attributes = ("nounwind", "readonly") if kind.only_reads else ("nounwind",)
+    return builder.call(pointer, args[1:], attrs=attributes)
+
+
+def function_at(signature: Any, *, only_reads: bool = False) -> Any:
+    """A function for kernels that turns an address into a callable of this signature.
+
+    Functions that store nothing, ``only_reads``, leave what kernels have read as it was.
+    """
+    kind = _FunctionAt(signature, only_reads)
 
     @intrinsic
     def at(typingctx: Any, address: Any) -> Any:
         def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            pointer = context.get_value_type(types.voidptr)
-            value = cgutils.create_struct_proxy(function_type)(context, builder)
-            value.c_addr = builder.inttoptr(args[0], pointer)
-            value.py_addr = cgutils.get_null_value(pointer)
-            value.jit_addr = cgutils.get_null_value(pointer)
-            return value._getvalue()
+            return args[0]
 
-        return function_type(types.int64), codegen
+        return kind(types.int64), codegen
 
     return at

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
+from llvmlite.binding import Linkage, parse_assembly
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
@@ -47,6 +48,45 @@ class _PartLibrary(JITCodeLibrary):
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
         self._finalized = True
+
+
+class _KernelLibrary(JITCodeLibrary):
+    """Code of a kernel, which is seen from outside by its entries only.
+
+    Its routines stay functions of their own, unless ``constants`` make them short.
+    """
+
+    constants = ""
+
+    def _optimize_final_module(self) -> None:
+        entries = {function.name for function in self._final_module.functions
+                   if function.linkage == Linkage.external}
+        if self.constants:
+            module = parse_assembly(self.constants)
+            module.triple = self._final_module.triple
+            module.data_layout = self._final_module.data_layout
+            self._final_module.link_in(module)
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.name not in entries:
+                function.linkage = Linkage.internal
+                inlined = b"alwaysinline" in b" ".join(function.attributes)
+                if not (self.constants or inlined) and function.name.startswith("_ZN9fecontact"):
+                    function.add_function_attribute("noinline")
+        super()._optimize_final_module()
+
+
+def kernel_compiler(constants: str) -> Any:
+    """A compiler whose kernels have fixed values by :func:`fecontact.core.references.constants`."""
+
+    class KernelCompiler(Compiler):
+        def define_pipelines(self) -> Any:
+            state = self.state
+            state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.constants = constants
+            state.library.enable_object_caching()
+            return super().define_pipelines()
+
+    return KernelCompiler
 
 
 class _PartCompiler(Compiler):

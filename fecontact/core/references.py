@@ -6,8 +6,10 @@ when they are named, so that functions are written as if they had the tuple itse
 """
 
 import hashlib
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -16,6 +18,8 @@ from numba.core.imputils import lower_cast
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
+
+_I32, _I64 = ir.IntType(32), ir.IntType(64)
 
 
 class Reference(types.Type):
@@ -66,32 +70,104 @@ class _Fields(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
-    index = kind.tuple_type.fields.index(name)
-    place = cgutils.gep_inbounds(builder, value, 0, index)
-    field = _field_type(kind.tuple_type, index)
-    if isinstance(field, types.BaseNamedTuple):
-        return place
-    return without_owner(context, builder, field, _read(builder, place))
+    return _read(context, builder, kind, value, kind.tuple_type.fields.index(name))
 
 
 @lower_cast(Reference, types.BaseTuple)
 def _value(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
-    return without_owner(context, builder, wanted, _read(builder, value))
+    items = []
+    for index, field in enumerate(wanted):
+        item = _read(context, builder, given, value, index)
+        if isinstance(field, types.BaseNamedTuple):
+            item = _value(context, builder, Reference(field), field, item)
+        items.append(item)
+    return context.make_tuple(builder, wanted, items)
 
 
-def _read(builder: Any, place: Any) -> Any:
-    """The value at a place."""
-    kind = place.type.pointee
-    if isinstance(kind, ir.Aggregate):
-        value = ir.Constant(kind, ir.Undefined)
-        for index in range(len(kind)):
-            part = _read(builder, cgutils.gep_inbounds(builder, place, 0, index))
-            value = builder.insert_value(value, part, index)
-        return value
-    value = builder.load(place)
-    # Loops need not read it again after each number that they store.
-    value.set_metadata("invariant.load", builder.module.add_metadata([]))
-    return value
+def _read(context: Any, builder: Any, kind: Any, value: Any, index: int) -> Any:
+    """A field; of a tuple within, a reference."""
+    field = _field_type(kind.tuple_type, index)
+    if isinstance(field, types.BaseNamedTuple):
+        return cgutils.gep_inbounds(builder, value, 0, index)
+    name = f"{kind.name}.{kind.tuple_type.fields[index]}"
+    if isinstance(field, types.Array):
+        return _array(context, builder, field, name, value, index)
+    if isinstance(context.get_value_type(field), ir.Aggregate):
+        raise NotImplementedError(f"{name} is neither a number nor an array")
+    return _asked(builder, name, value, index)
+
+
+def _array(context: Any, builder: Any, field: Any, name: str, value: Any, index: int) -> Any:
+    """An array without reference counts; all else follows from its shape."""
+    array = context.make_array(field)(context, builder)
+    members = array._datamodel._fields
+    shape = [_asked(builder, f"{name}.{axis}", value, index, members.index("shape"), axis)
+             for axis in range(field.ndim)]
+    item = context.get_constant(
+        types.intp, context.get_abi_sizeof(context.get_data_type(field.dtype)))
+    strides: list[Any] = []
+    count = context.get_constant(types.intp, 1)
+    for length in reversed(shape):
+        strides.insert(0, builder.mul(count, item))
+        count = builder.mul(count, length)
+    array.meminfo = cgutils.get_null_value(array.meminfo.type)
+    array.parent = cgutils.get_null_value(array.parent.type)
+    array.nitems, array.itemsize = count, item
+    array.data = _asked(builder, f"{name}.data", value, index, members.index("data"))
+    array.shape = cgutils.pack_array(builder, shape)
+    array.strides = cgutils.pack_array(builder, strides)
+    return array._getvalue()
+
+
+def _asked(builder: Any, name: str, value: Any, *place: int) -> Any:
+    """A number or an address of a tuple, by a function that :func:`constants` may replace."""
+    # What is read does not change: loops need not read it again after each number they store.
+    kind = builder.gep(value, [_I32(0), *map(_I32, place)]).type.pointee
+    function = builder.module.globals.get(name)
+    if function is None:
+        function = ir.Function(builder.module, ir.FunctionType(kind, [cgutils.voidptr_t]), name)
+        function.linkage = "linkonce_odr"
+        for attribute in ("alwaysinline", "nounwind", "readnone"):
+            function.attributes.add(attribute)
+        inside = ir.IRBuilder(function.append_basic_block())
+        pointer = inside.bitcast(function.args[0], value.type)
+        found = inside.load(cgutils.gep_inbounds(inside, pointer, 0, *place))
+        found.set_metadata("invariant.load", builder.module.add_metadata([]))
+        inside.ret(found)
+    return builder.call(function, [builder.bitcast(value, cgutils.voidptr_t)])
+
+
+def constants(given: Mapping[Any, Mapping[str, Any]]) -> str:
+    """Intermediate code that gives fields of tuples fixed values in a kernel.
+
+    Parameters
+    ----------
+    given : mapping
+        For each tuple type its fields: a shape, whose entries may be None, of an array; an integer
+        array for that and its entries; an integer for a number.
+    """
+    module = ir.Module("constants")
+    for tuple_type, fields in given.items():
+        for field, value in fields.items():
+            name = f"{Reference(tuple_type).name}.{field}"
+            if not isinstance(value, np.ndarray | tuple):
+                _define(module, name, _I64(value))
+                continue
+            shape = value.shape if isinstance(value, np.ndarray) else value
+            for axis, length in enumerate(shape):
+                if length is not None:
+                    _define(module, f"{name}.{axis}", _I64(length))
+            if isinstance(value, np.ndarray):
+                entries = ir.Constant(ir.ArrayType(_I64, value.size), value.ravel().tolist())
+                table = cgutils.global_constant(module, f"{name}.entries", entries)
+                _define(module, f"{name}.data", table.bitcast(_I64.as_pointer()))
+    return str(module)
+
+
+def _define(module: Any, name: str, value: Any) -> None:
+    function = ir.Function(module, ir.FunctionType(value.type, [cgutils.voidptr_t]), name)
+    function.attributes.add("alwaysinline")
+    ir.IRBuilder(function.append_basic_block()).ret(value)
 
 
 def _write(builder: Any, value: Any, place: Any) -> None:

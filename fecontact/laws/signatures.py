@@ -69,13 +69,13 @@ GROUND = types.UniTuple(f8, 3)(f8, vector)
 SURFACE = types.UniTuple(f8, 6)(f8, f8, vector)
 SIGNAL = types.UniTuple(f8, 2)(f8, vector)
 
-normal_at = function_at(NORMAL)
-friction_at = function_at(FRICTION)
+normal_at = function_at(NORMAL, only_reads=True)
+friction_at = function_at(FRICTION, only_reads=True)
 memory_at = function_at(MEMORY)
 planar_at = function_at(PLANAR)
-ground_at = function_at(GROUND)
-surface_at = function_at(SURFACE)
-signal_at = function_at(SIGNAL)
+ground_at = function_at(GROUND, only_reads=True)
+surface_at = function_at(SURFACE, only_reads=True)
+signal_at = function_at(SIGNAL, only_reads=True)
 
 NORMAL_FORM = "f(u, v, p) -> F, dF/du, dF/dv"
 FRICTION_FORM = "f(v, F, p) -> R, dR/dv, dR/dF"

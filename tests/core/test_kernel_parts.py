@@ -12,12 +12,13 @@ from fecontact.core.compiled import (
     function_at,
     helper,
     i8,
+    integers,
     kernel,
     matrix,
     routine,
     vector,
 )
-from fecontact.core.references import Reference, borrowed
+from fecontact.core.references import Reference, borrowed, constants
 
 
 class Inner(NamedTuple):
@@ -109,3 +110,37 @@ def test_a_part_of_kernels_can_be_called_from_python():
     add_product(p, y)
     assert y == pytest.approx(2.5 * p.inner.rows @ p.x, rel=1e-14)
     assert first_of(p.inner) == pytest.approx(first_by_value(p.inner), rel=1e-15)
+
+
+class Table(NamedTuple):
+    places: Any
+    weights: Any
+    inner: Inner
+    factor: int
+
+
+TABLE = types.NamedTuple([integers, vector, INNER, i8], Table)
+_SUM = f8(TABLE)
+
+
+@kernel(_SUM)
+def weighted(held):
+    p = borrowed(held)
+    total = 0.0
+    for k in range(len(p.places)):
+        total += p.weights[p.places[k]]
+    for i in range(p.inner.rows.shape[0]):
+        total += p.inner.rows[i, 1]
+    return p.factor * total
+
+
+def test_constants_stand_for_what_a_tuple_says():
+    rows = np.arange(12.0).reshape(3, 4)
+    p = Table(np.array([0, 1, 2]), np.array([1.0, 10.0, 100.0, 1000.0]), Inner(rows, 2.5), 2)
+    assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)
+    said = constants({TABLE: {"places": np.array([3, 2]), "factor": 5}, INNER: {"rows": (2, None)}})
+    assert kernel(_SUM, constants=said)(weighted.py_func)(p) == 5.0 * (1100.0 + 1.0 + 5.0)
+    # What numbers stand beside one another follows from the shape alone.
+    narrow = constants({INNER: {"rows": (None, 2)}})
+    assert kernel(_SUM, constants=narrow)(weighted.py_func)(p) == 2.0 * (111.0 + 1.0 + 3.0 + 5.0)
+    assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)

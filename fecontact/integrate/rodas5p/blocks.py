@@ -86,20 +86,34 @@ def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
                      for k in modes] for i in modes])
     own |= np.eye(len(modes), dtype=bool)
     coupled = own | own.T | (moved.T.astype(int) @ moved.astype(int) > 0)
+    shapes = np.vstack([arrays.Tx, arrays.Ty, arrays.T2.reshape(-1, m)]).T.copy()
     if coupled.all():
-        modes, nodes = [(0, m)], [(0, n)]
-        moved = own = coupled = np.ones((1, 1), dtype=bool)
+        return one_block(shapes, n)
+    return _blocks(shapes, modes, nodes, moved, own, coupled)
+
+
+def one_block(shapes: Array, nodes: int) -> Blocks:
+    """The blocks of a system that is one block, with rows ``shapes`` (m, 2 n) or (m, 3 n)."""
+    whole = np.ones((1, 1), dtype=bool)
+    return _blocks(shapes, [(0, len(shapes))], [(0, nodes)], whole, whole, whole)
+
+
+def _blocks(
+    shapes: Array, modes: list[tuple[int, int]], nodes: list[tuple[int, int]], moved: Array,
+    own: Array, coupled: Array,
+) -> Blocks:
+    """The blocks of ranges of modes and nodes, by which of them are not zero."""
+    m, n = len(shapes), nodes[-1][1]
+    tangents = shapes.shape[1] // n
     parts = [(*modes[a], *nodes[b]) for b, a in np.argwhere(moved)]
     position, starts, reach = _elimination(modes, coupled)
     most = int(moved.sum(axis=1).max())
-    shapes = np.vstack([arrays.Tx, arrays.Ty, arrays.T2.reshape(-1, m)])
-    tangents = len(shapes) // n
     spans = np.zeros((n, most, 2), dtype=np.int64)
     for b, (first, last) in enumerate(nodes):
         for place, a in enumerate(np.flatnonzero(moved[b])):
             spans[first:last, place] = modes[a]
     return Blocks(
-        shapes=shapes.T.copy(),
+        shapes=shapes,
         parts=_table(parts, 4),
         tiles=_table([(*part[:2], *columns) for part in parts
                       for columns in _each(part[2:], n, tangents)], 4),

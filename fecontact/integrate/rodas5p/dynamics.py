@@ -137,7 +137,7 @@ def gather(y, s, blocks, load, forces, rate):
     push(blocks, forces, rate[m : 2 * m])
 
 
-@routine
+@helper
 def set_rate(y, s, blocks, given, load, w, scratch, rate):
     """Fill ``rate`` (size,) with y'. ``w`` (3, d n) and ``scratch`` are room to work in."""
     m, n = len(load), len(s.gap)

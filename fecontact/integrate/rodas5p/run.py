@@ -1,14 +1,17 @@
 """A run of the compiled integrator: what it goes on from, and what it has found."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.events import Events
-from fecontact.integrate.rodas5p import state, step_loop
+from fecontact.integrate.rodas5p import state
 from fecontact.integrate.rodas5p.event_kernels import FOUND, Watch
+from fecontact.integrate.rodas5p.small_systems import advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.variational import Vary
 
@@ -91,10 +94,14 @@ class Run:
                 "right_hand_sides": int(counts[state.RATES]),
                 "jacobians": int(counts[state.STEPS]) + 1}
 
+    @cached_property
+    def _advance(self) -> Any:
+        return advance_for(self.problem, self.variation)
+
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""
-        status = step_loop.advance(self.problem, self.progress, self.room, self.output,
-                                   self.variation, self.watch, steps)
+        status = self._advance(self.problem, self.progress, self.room, self.output,
+                               self.variation, self.watch, steps)
         found = int(self.watch.counts[FOUND])
         if found:
             self.found.append((self.watch.found[:found].copy(), self.watch.states[:found].copy()))

@@ -240,7 +240,7 @@ def factorise_step(G, blocks, w):
     factorise_within(w.factors, blocks.reach, w.starts, w.pivots)
 
 
-@routine
+@helper
 def solve_stage(G, s, blocks, g, w, r, motion, out):
     """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, d n) is room to work in."""
     shapes = blocks.shapes

@@ -46,11 +46,13 @@ from fecontact.integrate.rodas5p.variational import (
     friction_length,
     keep,
     propagate_at,
+    write_columns,
 )
 from fecontact.laws.signatures import signal_at
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
+ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, VARY, WATCH, i8)
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
@@ -275,7 +277,7 @@ def _write(step, reached, problem, progress, room, output, vary):
     if output.times[row] > reached:
         return
     if len(vary.variation.columns):
-        vary.transitions[row] = vary.variation.columns
+        write_columns(vary.variation, vary.transitions[row])
         begin_anew(vary.variation)
     while row < len(output.times) and output.times[row] <= reached:
         part = (output.times[row] - step.t) / step.h
@@ -292,7 +294,8 @@ def _stop_at(part, step, problem, progress, room):
     if problem.control.work:
         work_until(part, step.h, progress.work, room.power, progress.work)
     tableau.interpolated(part, progress.state, room.after, room.dense, room.right)
-    progress.state[:] = room.right
+    for k in range(len(progress.state)):
+        progress.state[k] = room.right[k]
     progress.counts[STEPS] += 1
 
 
@@ -310,7 +313,8 @@ def _go_on(step, problem, progress, room, output):
             if output.times[last] == step.target:
                 output.work[last, DRIVE] += jump
         else:
-            progress.power[:] = room.power[3]
+            for k in range(len(progress.power)):
+                progress.power[k] = room.power[3, k]
     for k in range(len(progress.state)):
         progress.state[k] = room.after[k]
         progress.rate[k] = room.rate_after[k]
@@ -345,20 +349,9 @@ def _next_length(step, error, factor, longest, numbers):
     return min(h * factor, longest)
 
 
-@kernel(types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, VARY, WATCH, i8),
-        nogil=True)
-def advance(held_problem, held_progress, held_room, held_output, held_vary, held_watch, most):
-    """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
-
-    Fills the rows of ``output`` that belong to the output times passed. A run that is continued
-    gives the same numbers as one that was not interrupted.
-
-    If the columns of ``vary.variation`` are not empty, those that belong to each output time are
-    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
-    What is watched for is noted in ``watch``; when that is full, the call returns.
-    """
-    problem, progress, room = borrowed(held_problem), borrowed(held_progress), borrowed(held_room)
-    output, vary, watch = borrowed(held_output), borrowed(held_vary), borrowed(held_watch)
+@helper
+def advance_by(problem, progress, room, output, vary, watch, most):
+    """As :func:`advance`, by references."""
     s, control, numbers, counts = (problem.system, problem.control, progress.numbers,
                                    progress.counts)
     t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
@@ -424,3 +417,18 @@ def advance(held_problem, held_progress, held_room, held_output, held_vary, held
         h = _next_length(step, error, factor, control.longest, numbers)
     numbers[TIME], numbers[STEP] = t, h
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
+
+
+@kernel(ADVANCE, nogil=True)
+def advance(problem, progress, room, output, vary, watch, most):
+    """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
+
+    Fills the rows of ``output`` that belong to the output times passed. A run that is continued
+    gives the same numbers as one that was not interrupted.
+
+    If the columns of ``vary.variation`` are not empty, those that belong to each output time are
+    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
+    What is watched for is noted in ``watch``; when that is full, the call returns.
+    """
+    return advance_by(borrowed(problem), borrowed(progress), borrowed(room), borrowed(output),
+                      borrowed(vary), borrowed(watch), most)

@@ -349,8 +349,18 @@ propagate = compile_law(_PROPAGATE, "propagate(step, problem, progress, room, va
 @helper
 def keep(v):
     """Take the columns at the end of the step for those of the next."""
-    v.columns[:] = v.after
+    for c in range(len(v.columns)):
+        for k in range(v.columns.shape[1]):
+            v.columns[c, k] = v.after[c, k]
     v.norms[0] = v.norms[1]
+
+
+@helper
+def write_columns(v, out):
+    """Fill out (k, size) with the columns."""
+    for c in range(len(v.columns)):
+        for k in range(v.columns.shape[1]):
+            out[c, k] = v.columns[c, k]
 
 
 @helper

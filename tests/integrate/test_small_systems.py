@@ -1,0 +1,86 @@
+"""Step loops of small systems: what they take for granted, and that their results are the same."""
+
+import numpy as np
+import pytest
+from systems import friction_oscillator, two_mass_system
+
+from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
+from fecontact.integrate.rodas5p import driver, small_systems, step_loop
+from fecontact.laws import DahlFriction, ExponentialFriction, RoughSurface
+
+
+def system(modes, nodes, **changes):
+    """A block on a belt, of rigid modes and elastic ones, on one or two nodes."""
+    rng = np.random.default_rng(modes)
+    T = np.zeros((2 + nodes, 3, modes))
+    T[:, 0, 0] = 0.4
+    T[:, 1, 1:2] = 0.4
+    T[:, :2, 2:] = 0.2 * rng.uniform(-1.0, 1.0, (2 + nodes, 2, max(modes - 2, 0)))
+    w = np.array([0.0, 0.0, 200.0, 400.0, 700.0])[:modes]
+    basis = ModalBasis(w, np.diag(0.02 * w), T, np.zeros((2 + nodes, 2)),
+                       np.full(nodes, 1.0 / nodes))
+    return ContactSystem(basis, **{
+        "normal": RoughSurface(10e6, 10e-6, 40.0),
+        "friction": ExponentialFriction(0.8, 0.55, 1000.0, 1e6), "ground": Ground(speed=1e-3),
+        "drive": Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
+                       angular_frequency=13.8),
+        "load": Load(14.0), **changes})
+
+
+def run_of(system, **options):
+    state = np.zeros(2 * system.basis.modes + system.basis.contact_nodes * system.memory)
+    return driver.start(system, state, np.linspace(0.0, 0.5, 101), rtol=1e-6, **options)
+
+
+def assert_as_said(values, kind, said):
+    """That all that is said of a tuple of this type is so, and of those within."""
+    found = 0
+    for field, expected in said.get(kind, {}).items():
+        value = getattr(values, field)
+        if isinstance(expected, tuple):
+            for length, wanted in zip(value.shape, expected, strict=True):
+                assert wanted in (length, None), field
+        elif isinstance(expected, np.ndarray):
+            np.testing.assert_array_equal(value, expected, field)
+        else:
+            assert value == expected, field
+        found += 1
+    for value, inner in zip(values, kind, strict=True):
+        if hasattr(value, "_fields"):
+            found += assert_as_said(value, inner, said)
+    return found
+
+
+@pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
+def test_what_step_loops_take_for_granted(modes, nodes):
+    said = small_systems.fixed_values(modes, nodes)
+    run = run_of(system(modes, nodes))
+    tuples = (run.problem, run.progress, run.room, run.output, run.variation)
+    found = sum(assert_as_said(values, kind, said)
+                for values, kind in zip(tuples, step_loop.ADVANCE.args, strict=False))
+    assert found >= sum(map(len, said.values()))
+
+
+@pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
+def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
+    own, other = run_of(system(modes, nodes)), run_of(system(modes, nodes))
+    loop = small_systems.advance_for(own.problem, own.variation)
+    assert loop is not step_loop.advance
+    assert own.advance(10**9) == step_loop.FINISHED
+    assert step_loop.advance(other.problem, other.progress, other.room, other.output,
+                             other.variation, other.watch, 10**9) == step_loop.FINISHED
+    assert own.statistics == other.statistics
+    for found, expected in ((own.states, other.states), (own.work, other.work)):
+        assert found == pytest.approx(expected, rel=1e-7, abs=1e-9 * np.abs(expected).max())
+
+
+def test_systems_with_more_to_them_have_the_step_loop_of_all():
+    small = friction_oscillator()
+    for other in (system(5, 1), system(2, 3), small.with_(friction=DahlFriction(0.3, 1e6))):
+        run = run_of(other)
+        assert small_systems.advance_for(run.problem, run.variation) is step_loop.advance
+    run = run_of(small, vary=True)
+    assert small_systems.advance_for(run.problem, run.variation) is step_loop.advance
+    for other in (small, two_mass_system()):
+        run = run_of(other)
+        assert small_systems.advance_for(run.problem, run.variation) is not step_loop.advance
