@@ -20,6 +20,8 @@ from fecontact.system.contact_system import ContactSystem
 XI = "xi"
 # Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
 _ZERO = 1e-7
+# Part of the largest stiffness that is rounding.
+_LOOSE = 1e-14
 _ITERATIONS = 60
 # Relative change of xi at which the search for the undamped motion ends.
 _SETTLED = 1e-13
@@ -41,6 +43,8 @@ class LinearStart:
         Of the state, of length one.
     angular_frequency, xi : float
         w [rad/s] and xi [1/s], which may be below zero.
+    loose : (r, m) array
+        Orthonormal directions in which no stiffness holds the displacements.
     """
 
     field: ContactField
@@ -48,6 +52,7 @@ class LinearStart:
     shape: ComplexArray
     angular_frequency: float
     xi: float
+    loose: Array
 
 
 def unforced(system: ContactSystem) -> ContactSystem:
@@ -115,10 +120,13 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
         found = listed_frequencies(modes) if count else "none"
         raise InputError(f"mode = {number!r} must be the number of an oscillating mode, from 1 to "
                          f"{count}; the frequencies at rest are: {found}.")
-    value, shape, xi = _undamped(A, free.basis.modes, complex(modes.eigenvalues[number - 1]))
+    m = free.basis.modes
+    value, shape, xi = _undamped(A, m, complex(modes.eigenvalues[number - 1]))
+    _, sizes, rows = np.linalg.svd(A[m : 2 * m, :m])
+    loose = rows[sizes <= _LOOSE * m * sizes[0]]
     # The parameter's own scale is that of the mode.
     field = contact_field(free, {XI: (xi, with_mass_damping)})
-    return LinearStart(field, state, shape, value, xi)
+    return LinearStart(field, state, shape, value, xi, loose)
 
 
 def listed_frequencies(modes: ComplexModes) -> str:

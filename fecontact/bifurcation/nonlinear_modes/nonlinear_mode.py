@@ -273,7 +273,7 @@ def _leaving(
     known = {entry.name: getattr(plain, entry.name) for entry in fields(plain)}
     problem = ModeProblem(**{
         **known, "reference": plain.coefficients(leaving).copy(), "limits": np.full(d, np.inf),
-        "row": row, "conservative": lossless})
+        "row": row, "conservative": lossless, "loose": start.loose, "home": start.state[:m]})
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
 
 
