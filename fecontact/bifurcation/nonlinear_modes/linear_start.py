@@ -16,6 +16,7 @@ from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import NORMAL_FORCE
 
 XI = "xi"
 # Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
@@ -112,6 +113,7 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
                          "ground, or ground at rest.")
     moves = free.prescribed_motion.largest_speed(0.0, 1.0) > 0.0
     state = (steady_sliding if moves else rest_state)(field, field.values)
+    state = _sliding_where_open(free, state)
     A = field.derivatives(np.zeros(1), state[None], field.values)[1][0]
     modes = ComplexModes.of(A, zero=_ZERO)
     count = len(modes.eigenvalues)
@@ -127,6 +129,19 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
     # The parameter's own scale is that of the mode.
     field = contact_field(free, {XI: (xi, with_mass_damping)})
     return LinearStart(field, state, shape, value, xi, loose)
+
+
+def _sliding_where_open(system: ContactSystem, state: Array) -> Array:
+    """The state with friction that slides at nodes without normal force.
+
+    There the limit of an element is zero, and at zero deflection it would count as stuck.
+    """
+    found, s = state.copy(), system.memory
+    if s:
+        force = system.contact_history(np.zeros(1), state[None])[0, :, NORMAL_FORCE]
+        z = found[2 * system.basis.modes :].reshape(-1, s)
+        z[force == 0.0] = np.finfo(float).tiny
+    return found
 
 
 def listed_frequencies(modes: ComplexModes) -> str:

@@ -19,7 +19,7 @@ _GROWS = 1e-6
 class ModeLinearisation(HarmonicLinearisation):
     """As that of any orbit; means of coordinates that nothing holds stay where they are.
 
-    Their balance has no stiffness and is met by itself, as forces within a free body are in balance.
+    Their balance is without stiffness and met by itself, as the forces within a free body are.
     """
 
     problem: "ModeProblem"

@@ -22,7 +22,7 @@ from fecontact.bifurcation.nonlinear_modes.linear_start import LinearStart, line
 from fecontact.bifurcation.nonlinear_modes.mode_problem import ModeProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.contact_system import ContactSystem
@@ -35,7 +35,7 @@ _PERIOD_SCALE, _XI_SCALE = 0.2, 0.2
 _CONSERVATIVE = 1e-8
 # Smallest scale of a coordinate relative to the largest one, and part of the linear mode that the
 # observed point must have.
-_LEAST_SCALE, _LEAST_SEEN = 1e-3, 1e-9
+_LEAST_SCALE, _LEAST_SEEN = 1e-3, 1e-4
 # Part of the smallest amplitude below which the mode ends.
 _BELOW = 0.99
 _ENDS = ("largest amplitude", "smallest amplitude")
@@ -219,10 +219,17 @@ def nonlinear_mode(
     row, observed = observed_row(start.field, observe)
     chosen = method or HarmonicBalance()
     problem, u, leaving = _leaving(start, row, observed, low, chosen)
-    branch = branches.follow(problem, u, leaving, chosen, replace(
-        given, bounds=(-np.inf, np.inf), locate=True,
-        stop_at=[*([given.stop_at] if isinstance(given.stop_at, str) else given.stop_at), *_ENDS],
-        events={**given.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)}))
+    stops = [given.stop_at] if isinstance(given.stop_at, str) else given.stop_at
+    ended = replace(
+        given, bounds=(-np.inf, np.inf), locate=True, stop_at=[*stops, *_ENDS],
+        events={**given.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)})
+    try:
+        branch = branches.follow(problem, u, leaving, chosen, ended)
+    except FecontactError as error:
+        raise AnalysisError(f"No nonlinear mode was followed from the linear one at "
+                            f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
+                            f"{low:g}; begin at a smaller one, where the motion is linear "
+                            f"({error})") from None
     return NonlinearMode(_ended(branch, observed, mode), mode, observed)
 
 
@@ -256,8 +263,9 @@ def _leaving(
     field, d, w = start.field, start.field.dimension, start.angular_frequency
     seen = complex(row @ start.shape)
     m = field.system().basis.modes
-    if abs(seen) <= _LEAST_SEEN * np.linalg.norm(np.abs(row[:m]) * np.abs(start.shape[:m])):
-        raise InputError(f"{observed} does not move in this mode; observe another displacement.")
+    if abs(seen) <= _LEAST_SEEN * np.linalg.norm(row[:m]) * np.linalg.norm(start.shape[:m]):
+        raise InputError(f"{observed} does not move in this mode, at {w / (2.0 * np.pi):.5g} Hz, or "
+                         f"hardly; observe another displacement.")
     # The observed displacement begins at its largest value.
     shape = start.shape * amplitude / seen
     sizes = np.abs(shape)
