@@ -12,6 +12,9 @@ from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, Harmon
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 
+# Relative size of Newton steps that is rounding where elements stick: only the leak of memory holds
+# their mean deflection, and so the mean of bodies that little else holds.
+_ROUNDING_OF_MEANS = 1e-5
 # Distance of a multiplier from the unit circle beyond which a perturbation grows.
 _GROWS = 1e-6
 
@@ -76,6 +79,11 @@ class ModeProblem(HarmonicProblem):
         if not u[-2] > 0.0:
             raise AnalysisError("The period became negative.")
         return ModeLinearisation(self, u)
+
+    @property
+    def rounding(self) -> float:
+        """See :attr:`Problem.rounding`."""
+        return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, velocities, truncation errors, and what is observed."""

@@ -197,8 +197,8 @@ def nonlinear_mode(
     method : HarmonicBalance, optional
         Harmonics, samples; kinks need many samples.
     options : ContinuationOptions, optional
-        By default up to 2000 points, step 0.02, largest_step 0.06: relative changes of the
-        amplitude, of a fifth of the frequency and of a damping ratio of 0.1. Bounds are not used.
+        By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: relative
+        changes of amplitude, of a fifth of the frequency, of a damping ratio of 0.1. Without bounds.
 
     Raises
     ------
@@ -213,8 +213,10 @@ def nonlinear_mode(
     require_kind("nonlinear_mode", ContactSystem, system=system)
     require_kind("nonlinear_mode", (HarmonicBalance, type(None)), method=method)
     low, high = _amplitudes(bounds)
-    given = options_of(options or ContinuationOptions(points=_POINTS, step=_STEP,
-                                                      largest_step=_LARGEST), None)
+    # Of proportional coordinates each adds to the length of a step.
+    longer = max(1.0, np.sqrt(0.5 * system.basis.modes))
+    given = options_of(options or ContinuationOptions(
+        points=_POINTS, step=_STEP * longer, largest_step=_LARGEST * longer), None)
     start = linear_start(system, mode)
     row, observed = observed_row(start.field, observe)
     chosen = method or HarmonicBalance()
