@@ -11,6 +11,7 @@ import numpy as np
 from fecontact.core.errors import InputError, ModelWarning, choices
 from fecontact.core.types import Array
 from fecontact.laws.base import NormalLaw
+from fecontact.laws.excitation import AXES
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
@@ -110,12 +111,15 @@ def _too_deep(system: ContactSystem, times: Array, states: Array) -> str | None:
 
 def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
     """What moves along modal coordinates (m,), and how: 'the body', 'a rotation'."""
+    d = basis.dimension
     if not basis.parts:
-        x, y, turn = np.abs(basis.contact_T @ direction).max(axis=0)
+        largest = np.abs(basis.contact_T @ direction).max(axis=0)
         size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
-        named = _named(x, y, turn * size)
-        return "the body", {"x": "a translation along the ground (x)", "y":
-                            "a translation away from the ground (y)"}.get(named, named)
+        named = _named(largest[:d], float(largest[d:].max()) * size)
+        if len(named) > 1:
+            return "the body", named
+        way = "away from" if named == AXES[d - 1] else "along"
+        return "the body", f"a translation {way} the ground ({named})"
     found = {}
     for part in basis.parts:
         first, count = part.nodes
@@ -125,21 +129,24 @@ def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
             points = [basis.point_index(name) for name in basis.extra
                       if name.startswith(f"{part.name}.")]
             rows = basis.T[points] @ direction
-            moved, turn = rows[:, :2], float(np.abs(rows[:, 2]).max(initial=0.0))
+            moved, turn = rows[:, :d], float(np.abs(rows[:, d:]).max(initial=0.0))
         if not len(moved):
             continue
-        x, y = np.abs(moved.mean(axis=0))
         # In a rotation displacements differ between the places, or there are none.
         apart = float(np.ptp(moved, axis=0).max())
-        found[part.name] = (x, y, turn if turn > 1e9 * np.abs(moved).max() else apart)
-    largest = max(max(motion) for motion in found.values())
-    who = [name for name, motion in found.items() if max(motion) > 0.01 * largest]
-    named = _named(*found[max(who, key=lambda name: max(found[name]))])
+        found[part.name] = np.append(np.abs(moved.mean(axis=0)),
+                                     turn if turn > 1e9 * np.abs(moved).max() else apart)
+    most = max(float(motion.max()) for motion in found.values())
+    who = [name for name, motion in found.items() if motion.max() > 0.01 * most]
+    *along, turn = found[max(who, key=lambda name: float(found[name].max()))]
+    named = _named(np.array(along), float(turn))
     bodies = f"body '{who[0]}'" if len(who) == 1 else f"the bodies {choices(who)}"
-    return bodies, {"x": "a translation in x", "y": "a translation in y"}.get(named, named)
+    return bodies, f"a translation in {named}" if len(named) == 1 else named
 
 
-def _named(x: float, y: float, turn: float) -> str:
-    if turn > 0.1 * max(x, y):
+def _named(along: Array, turn: float) -> str:
+    """The axis along which all moves but little; else what kind of motion it is."""
+    if turn > 0.1 * along.max():
         return "a rotation"
-    return "x" if x > 10.0 * y else "y" if y > 10.0 * x else "a translation"
+    first, second = np.argsort(-along)[:2]
+    return AXES[first] if along[first] > 10.0 * along[second] else "a translation"

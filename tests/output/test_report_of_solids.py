@@ -217,8 +217,8 @@ def test_ground_that_turns_and_waves_across(browser, tmp_path):
 def test_maps_of_heights_lie_below_the_bodies(browser, tmp_path):
     """Its heights travel with the ground and repeat themselves; the net is bent by them."""
     x, y = np.meshgrid(0.01 * np.arange(8), 0.0075 * np.arange(6), indexing="ij")
-    heights = 4e-5 * np.cos(2.0 * np.pi * x / 0.08) * np.sin(2.0 * np.pi * y / 0.045) + 2e-5 * np.sin(
-        2.0 * np.pi * x / 0.04)
+    along, across = 2.0 * np.pi * x / 0.08, 2.0 * np.pi * y / 0.045
+    heights = 4e-5 * np.cos(along) * np.sin(across) + 2e-5 * np.sin(2.0 * along)
     study = fc.Study.from_toml(template("solid")).with_(**{
         "simulation.t_end": 0.01, "simulation.outputs": 21, "ground": {
             "speed": 0.9, "speed_y": -0.4, "height_map": {
