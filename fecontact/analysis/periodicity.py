@@ -214,7 +214,7 @@ def periodicity(
                          f"eight per period.")
     m = basis.modes
     points = [0, *range(2, 2 + basis.contact_nodes)]
-    rows = basis.T[points, :2].reshape(-1, m)
+    rows = basis.T[points, : basis.dimension].reshape(-1, m)
 
     def observed(states: Array) -> Array:
         return np.hstack([states[:, :m] @ rows.T, states[:, m : 2 * m] @ rows.T])

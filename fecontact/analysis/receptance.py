@@ -109,8 +109,8 @@ def receptance(
     frequency_hz : (F,) array
         Frequencies [Hz], zero or positive.
     excitations, responses : sequences of (point, component)
-        Points by name, contact nodes by number; components 'x', 'y' or 'phi'. By default the
-        responses are those at the excitations.
+        Points by name, contact nodes by number; components 'x', 'y' or 'phi', of solids also 'z',
+        'phi_x', 'phi_y', 'phi_z'. By default the responses are those at the excitations.
     kind : 'receptance', 'mobility' or 'accelerance'
         Displacement, velocity or acceleration per force.
     linearised_at : 'rest', 'sliding' or (2 m + n s,) array, optional

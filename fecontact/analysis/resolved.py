@@ -179,7 +179,7 @@ def _motion(run: Trajectory) -> tuple[Array, Array]:
     n = basis.contact_nodes
     nodes = 2 + np.unique(np.linspace(0, n - 1, min(n, _NODES)).astype(int))
     points = np.concatenate([[0, 1], nodes, np.arange(2 + n, len(basis.T))])
-    rows = basis.T[points, :2].reshape(-1, basis.modes)
+    rows = basis.T[points, : basis.dimension].reshape(-1, basis.modes)
     return run.modal_coordinates @ rows.T, run.modal_velocities @ rows.T
 
 

@@ -52,7 +52,7 @@ class Branches:
     """
 
     contact_field: ContactField
-    observe: tuple[str | int, Literal["x", "y"]]
+    observe: tuple[str | int, Literal["x", "y", "z"]]
     found: dict[str, Branch] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     interrupted: bool = False
@@ -84,7 +84,7 @@ def follow_branches(
     if shown is None:
         shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
     # Check the names before the long computation.
-    basis.point_index(shown)
+    basis.point_row(shown, wanted.component)
     result = Branches(contact_field(system, {wanted.checked_parameter: wanted.first}),
                       (shown, wanted.component))
     tasks = deque(_first_tasks(result.contact_field, wanted, initial))

@@ -57,7 +57,7 @@ class BranchSettings:
     point : str or int, optional
         What the diagram shows: 'B', 'C', a further named point, or a contact node by its number;
         B by default, or the middle of the contact where there is no B.
-    component : 'x' or 'y'
+    component : 'x' or 'y', of solids also 'z'
         Its displacement along the ground or away from it.
     show : 'maximum', 'minimum', 'amplitude' or 'section'
         Of that displacement over the orbit; the amplitude is half of what lies between them, the
@@ -83,7 +83,7 @@ class BranchSettings:
     transient: Annotated[float | None, Unit("s")] = None
     longest_period: Annotated[float | None, Unit("s")] = None
     point: str | int | None = None
-    component: Literal["x", "y"] = "x"
+    component: Literal["x", "y", "z"] = "x"
     show: Literal["maximum", "minimum", "amplitude", "section"] = "maximum"
     poincare_scan: int = 0
 

@@ -10,10 +10,10 @@ from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.event_kernels import EVENT, FIRST_OWN
+from fecontact.reduction.modal_basis import COMPONENTS, Component
 from fecontact.system.contact_system import ContactSystem
 
 CONTACT_EVENTS = ("touch-down", "lift-off", "stick", "slip")
-_AXES = ("x", "y", "phi")
 _SENSES = {"both": 0, "rising": 1, "falling": -1}
 
 
@@ -126,8 +126,8 @@ class Crossing:
     ----------
     point : str or int
         'B', 'C' or a further named point; a contact node by its number from 0.
-    component : 'x', 'y' or 'phi'
-        Along the ground, away from it, or counter-clockwise.
+    component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
+        Along the ground, away from it, or counter-clockwise; of solids along or about the axes.
     value : float
         The value [m], [rad], [m/s] or [rad/s].
     of : 'displacement' or 'velocity'
@@ -146,7 +146,7 @@ class Crossing:
     kernel: ClassVar[CompiledLaw] = _plane
 
     point: str | int
-    component: Literal["x", "y", "phi"]
+    component: Component
     value: float = 0.0
     of: Literal["displacement", "velocity"] = "displacement"
     sense: Literal["both", "rising", "falling"] = "both"
@@ -154,7 +154,7 @@ class Crossing:
 
     def __post_init__(self) -> None:
         _require_sense("Crossing", self.sense)
-        for name, names in (("component", _AXES), ("of", ("displacement", "velocity"))):
+        for name, names in (("component", COMPONENTS), ("of", ("displacement", "velocity"))):
             value = getattr(self, name)
             if value not in names:
                 raise InputError(f"Crossing: {name} = {value!r} must be one of {choices(names)}"
@@ -169,7 +169,7 @@ class Crossing:
         row = np.zeros(1 + system.size)
         row[0] = self.value
         first = 1 if self.of == "displacement" else 1 + m
-        row[first : first + m] = basis.T[basis.point_index(self.point), _AXES.index(self.component)]
+        row[first : first + m] = basis.point_row(self.point, self.component)
         return row
 
 

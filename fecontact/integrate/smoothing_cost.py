@@ -88,12 +88,12 @@ def smoothing_cost(
         if run.status is not Status.FINISHED:
             raise InputError(f"smoothing_cost: the {name} run ended early at t = "
                              f"{run.time[-1]:.6g} s. {run.status.value}")
-    m, half = system.basis.modes, outputs // 2
-    T = system.basis.T[:, :2].reshape(-1, m)
+    m, d, half = system.basis.modes, system.basis.dimension, outputs // 2
+    T = system.basis.T[:, :d].reshape(-1, m)
     ours, theirs = exact.states[half:, :m] @ T.T, smoothed.modal_coordinates[half:] @ T.T
     places = [f"{axis} of {point}" for point in (
         "B", "C", *(f"contact node {j}" for j in range(system.basis.contact_nodes)))
-        for axis in "xy"]
+        for axis in "xyz"[:d]]
     amplitudes = 0.5 * np.ptp(ours, axis=0)[: len(places)]
     row = int(np.argmax(amplitudes))
     largest = float(np.abs(ours - theirs)[:, row].max())

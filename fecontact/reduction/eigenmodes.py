@@ -157,9 +157,7 @@ class FreeSystem:
         assert self.body is not None
         assert self.iterative is not None
         E = self.body.expansion
-        rigid, inertia = E @ self.rigid, E @ self.inertia
-        found, converged = self.iterative.deflections(
-            E @ balanced, lambda x: x - rigid @ (inertia.T @ x), accuracy)
+        found, converged = self.iterative.deflections(E @ balanced, accuracy)
         return self.without_rigid(E.T @ found) if converged else None
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,10 @@ from fecontact.reduction.basis_checks import (
 )
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
+
+# Displacements and rotations of a point: x, y, phi in the plane, all but phi in space.
+Component = Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"]
+COMPONENTS = get_args(Component)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

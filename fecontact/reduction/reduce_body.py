@@ -126,7 +126,8 @@ def modal_basis(
     at_points = sp.csr_array(displacement_rows(restriction, d))
     further_rows = [_given_rows(body, given) for given in rows]
     flexibility = flexibility_of(system, sp.csr_array(
-        sp.vstack([at_points, *further_rows]) @ body.expansion))
+        sp.vstack([at_points, *further_rows]) @ body.expansion),
+        0.0 if reduction == "craig-bampton" else tolerance)
     row = np.arange(len(flexibility.rows.indptr) - 1)
     is_point = row < at_points.shape[0]
     used = (row < d * (2 + len(face.tributary))) | ~is_point

@@ -160,10 +160,22 @@ def amplitude_y(trajectory: Trajectory, point: Point | None = None) -> float:
     return 0.5 * float(np.ptp(_of_point(trajectory, point)[:, 1]))
 
 
+def amplitude_z(trajectory: Trajectory, point: Point | None = None) -> float:
+    """Half the range of the displacement z of a point of a solid."""
+    if trajectory.system.basis.dimension == 2:
+        raise InputError("plane bodies do not move along z; take amplitude_x or amplitude_y.")
+    return 0.5 * float(np.ptp(_of_point(trajectory, point)[:, 2]))
+
+
 def rms_velocity(trajectory: Trajectory, point: Point | None = None) -> float:
-    """Root mean square of the velocity of a point, x and y together."""
-    velocity = trajectory.velocity(usual_point(trajectory) if point is None else point)
-    return float(np.sqrt(_mean(trajectory, (velocity[:, :2] ** 2).sum(axis=1))))
+    """Root mean square of the velocity of a point, of all directions together."""
+    return float(np.sqrt(_mean(trajectory, (_velocity(trajectory, point) ** 2).sum(axis=1))))
+
+
+def _velocity(trajectory: Trajectory, point: Point | None) -> Array:
+    """Velocity (N, d) of a point [m/s]."""
+    found = trajectory.velocity(usual_point(trajectory) if point is None else point)
+    return found[:, : trajectory.system.basis.dimension]
 
 
 def _of_point(trajectory: Trajectory, point: Point | None) -> Array:
@@ -245,7 +257,7 @@ def wear_rate(trajectory: Trajectory, wear: WearLaw, thickness: float) -> float:
 def dominant_frequency(trajectory: Trajectory, point: Point | None = None) -> float:
     """Frequency of the largest peak in the spectrum of a point's velocity (Hann window)."""
     t = trajectory.time
-    velocity = trajectory.velocity(usual_point(trajectory) if point is None else point)[:, :2]
+    velocity = _velocity(trajectory, point)
     if len(t) < 8:
         raise InputError(f"the frequency needs at least 8 output times, not {len(t)}.")
     if not np.allclose(np.diff(t), t[1] - t[0], rtol=1e-6):
@@ -291,7 +303,7 @@ def energy_imbalance(trajectory: Trajectory) -> float:
 
 SUMMARIES: Mapping[str, Summary] = {
     function.__name__: Summary(function, unit) for function, unit in (
-        (largest_displacement, "m"), (amplitude_x, "m"), (amplitude_y, "m"),
+        (largest_displacement, "m"), (amplitude_x, "m"), (amplitude_y, "m"), (amplitude_z, "m"),
         (rms_velocity, "m/s"), (stick_fraction, ""), (slip_fraction, ""), (open_fraction, ""),
         (mean_normal_force, "N"), (peak_normal_force, "N"), (mean_friction_force, "N"),
         (peak_friction_force, "N"), (peak_line_load, "N/m"), (peak_pressure, "Pa"),

@@ -106,14 +106,14 @@ def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
     """What moves along modal coordinates (m,), and how: 'the body', 'a rotation'."""
     d = basis.dimension
     if not basis.parts:
-        rows = np.abs(basis.contact_T @ direction).max(axis=0)
+        largest = np.abs(basis.contact_T @ direction).max(axis=0)
         size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
-        named = _named(rows[:d], rows[d:].max() * size)
-        ways = [f"along the ground ({axis})" for axis in AXES[: d - 1]]
-        ways.append(f"away from the ground ({AXES[d - 1]})")
-        told = {axis: f"a translation {way}" for axis, way in zip(AXES, ways, strict=False)}
-        return "the body", told.get(named, named)
-    found: dict[str, tuple[Array, float]] = {}
+        named = _named(largest[:d], float(largest[d:].max()) * size)
+        if len(named) > 1:
+            return "the body", named
+        way = "away from" if named == AXES[d - 1] else "along"
+        return "the body", f"a translation {way} the ground ({named})"
+    found = {}
     for part in basis.parts:
         first, count = part.nodes
         if count and basis.mode_shapes is not None:
@@ -127,18 +127,19 @@ def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
             continue
         # In a rotation displacements differ between the places, or there are none.
         apart = float(np.ptp(moved, axis=0).max())
-        found[part.name] = (np.abs(moved.mean(axis=0)),
-                            turn if turn > 1e9 * np.abs(moved).max() else apart)
-    sizes = {name: max(float(motion.max()), turn) for name, (motion, turn) in found.items()}
-    who = [name for name, size in sizes.items() if size > 0.01 * max(sizes.values())]
-    named = _named(*found[max(who, key=lambda name: sizes[name])])
+        found[part.name] = np.append(np.abs(moved.mean(axis=0)),
+                                     turn if turn > 1e9 * np.abs(moved).max() else apart)
+    most = max(float(motion.max()) for motion in found.values())
+    who = [name for name, motion in found.items() if motion.max() > 0.01 * most]
+    *along, turn = found[max(who, key=lambda name: float(found[name].max()))]
+    named = _named(np.array(along), float(turn))
     bodies = f"body '{who[0]}'" if len(who) == 1 else f"the bodies {choices(who)}"
-    return bodies, f"a translation in {named}" if named in AXES else named
+    return bodies, f"a translation in {named}" if len(named) == 1 else named
 
 
-def _named(moved: Array, turn: float) -> str:
-    """The axis of a translation, of magnitudes (d,) along the axes, or another motion."""
-    order = np.argsort(moved)
-    if turn > 0.1 * moved[order[-1]]:
+def _named(along: Array, turn: float) -> str:
+    """The axis along which all moves but little; else what kind of motion it is."""
+    if turn > 0.1 * along.max():
         return "a rotation"
-    return AXES[order[-1]] if moved[order[-1]] > 10.0 * moved[order[-2]] else "a translation"
+    first, second = np.argsort(-along)[:2]
+    return AXES[first] if along[first] > 10.0 * along[second] else "a translation"

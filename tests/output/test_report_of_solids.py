@@ -212,3 +212,38 @@ def test_ground_that_turns_and_waves_across(browser, tmp_path):
                 pictures.append(opened.picture())
             assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 10).mean() > 0.003
             assert not opened.complaints
+
+
+def test_maps_of_heights_lie_below_the_bodies(browser, tmp_path):
+    """Its heights travel with the ground and repeat themselves; the net is bent by them."""
+    x, y = np.meshgrid(0.01 * np.arange(8), 0.0075 * np.arange(6), indexing="ij")
+    along, across = 2.0 * np.pi * x / 0.08, 2.0 * np.pi * y / 0.045
+    heights = 4e-5 * np.cos(along) * np.sin(across) + 2e-5 * np.sin(2.0 * along)
+    study = fc.Study.from_toml(template("solid")).with_(**{
+        "simulation.t_end": 0.01, "simulation.outputs": 21, "ground": {
+            "speed": 0.9, "speed_y": -0.4, "height_map": {
+                "heights": heights.tolist(), "spacing_x": 0.01, "spacing_y": 0.0075,
+                "origin_x": 0.004, "origin_y": -0.002}}})
+    run = study.run()
+    path = report(run, tmp_path / "map.html", scale=150.0)
+    shown, ground = Shown(path), Shown(path).header["ground"]
+    assert ground["wavy"]
+    assert shown.header["notes"] == []
+    stored = shown.array("ground", "heights")
+    # Both periods are shorter than what is seen: all of the map is there, once.
+    assert np.array(ground["steps"]) * stored.shape == pytest.approx([0.08, 0.045])
+    with Opened(browser, path) as opened:
+        opened.scrub(0.7)
+        index = opened.of_player("player.clock.index")
+        travel = np.array([0.9, -0.4]) * run.time[index]
+        places = np.random.default_rng(0).uniform(-0.1, 0.2, (40, 2))
+        level = ground["level"] - 150.0 * ground["gap"]
+        expected = level + 150.0 * study.ground.height_map.shape(
+            *(places - travel).T)[..., 0]
+        found = opened.of_player(f"{places.tolist()}.map(p => player.height(...p))")
+        assert found == pytest.approx(expected, abs=0.01 * 150.0 * np.ptp(heights))
+        pictures = [opened.picture()]
+        opened.scrub(0.8)
+        pictures.append(opened.picture())
+        assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 10).mean() > 0.003
+        assert not opened.complaints

@@ -9,6 +9,7 @@ from skfem import MeshHex, MeshTet
 from solid_blocks import block_mesh
 
 import fecontact.reduction.solvers.solid_solver as solid_solver
+import fecontact.reduction.static_modes.residual_vectors as residual_vectors
 from fecontact import ElasticBody, InputError, Material, Mesh, modal_basis
 from fecontact.fem.elements.cell_kinds import CELL_KINDS
 from fecontact.reduction import eigenfrequencies_hz
@@ -201,6 +202,32 @@ def test_modal_bases_agree(nodes):
     assert one.angular_frequencies.shape == other.angular_frequencies.shape
     assert other.angular_frequencies == pytest.approx(one.angular_frequencies, rel=1e-5)
     assert other.quality.compliance == pytest.approx(one.quality.compliance, rel=1e-7)
+
+
+@pytest.mark.parametrize("room", [3e9, 0.0])
+def test_many_rows_of_large_bodies_are_iterated_to_a_part_of_the_tolerance(room, monkeypatch):
+    """No row lacks more than the tolerance of the compliance by factors, and few vectors more."""
+    monkeypatch.setattr(residual_vectors, "_LARGE", 0)
+    monkeypatch.setattr(residual_vectors, "_ROOM", room)
+    mesh = block((7, 6, 5), (1.3, 1.0, 0.8))
+    below = mesh.outline[(mesh.nodes[mesh.outline, 2] < 1e-9).all(axis=1)]
+    mesh = Mesh(mesh.nodes, mesh.cells, {"bottom": below})
+    options = {"contact": "bottom", "contact_nodes": 40, "B": (1.3, 1.0, 0.8),
+               "points": {"side": (0.0, 0.5, 0.4)}, "reduction": "residual"}
+    for tolerance in (0.3, 0.1):
+        one, other = (modal_basis(ElasticBody(mesh, STEEL), 10, tolerance=tolerance,
+                                  eigensolver=way, **options) for way in ("direct", "iterative"))
+        # Without C, which the mesh does not have.
+        there = np.arange(len(one.T)) != 1
+        found, exact = (basis.quality.compliance[there].ravel() for basis in (other, one))
+        # The iterations approach the whole from below.
+        assert (found < exact * (1.0 + 1e-9)).all()
+        assert found == pytest.approx(exact, rel=0.1 * tolerance)
+        assert 1.0 <= other.modes / one.modes < 1.1
+        rows = other.T[there, :3].reshape(len(exact), -1)[:-3, 6:] / other.angular_frequencies[6:]
+        missing = 1.0 - (rows**2).sum(axis=1) / exact[:-3]
+        assert 0.5 * tolerance < missing.max() <= tolerance
+        assert missing.min() > -1e-9
 
 
 def test_nested_dissection():

@@ -403,3 +403,52 @@ def test_meshes_that_are_no_solids(tmp_path):
             fc.Study.read(path).mesh()
         assert str(raised.value).startswith(f"{path}: [geometry]")
         print(raised.value)
+
+
+def test_the_solver_of_the_modes_is_that_of_the_study(monkeypatch):
+    """A small body is not iterated by itself, but where the study says so, to the same numbers."""
+    from fecontact.reduction.solvers.solid_solver import SolidSolver
+
+    called = []
+    modes = SolidSolver.modes
+    monkeypatch.setattr(SolidSolver, "modes", lambda self, *given: (
+        called.append(given[0]), modes(self, *given))[1])
+    study = fc.Study.from_toml(PAD).with_(**{
+        "geometry.element_size": 0.01, "basis.modes": 12})
+    found = {}
+    for solver in ("auto", "direct", "iterative"):
+        changed = study.with_(**{"basis.eigensolver": solver})
+        assert fc.Study.from_toml(changed.to_toml()).basis.eigensolver == solver
+        found[solver] = changed.system().basis.frequencies_hz
+        assert bool(called) == (solver == "iterative")
+    assert (found["auto"] == found["direct"]).all()
+    assert found["iterative"] == pytest.approx(found["direct"], rel=1e-8)
+    refused(PAD, {"basis.eigensolver": "lobpcg"}, r"eigensolver = .*lobpcg.* must be .*iterative")
+    refused(PLANE, {"basis.eigensolver": "iterative"},
+            r"eigensolver = 'iterative' is for solids without hinges")
+
+
+def test_what_nothing_holds_is_named():
+    """A belt drags a pad along it that no spring holds."""
+    for changes, named in (
+            ({"ground.speed": 0.1}, r"against a translation along the ground \(x\)"),
+            ({"ground.speed_y": 0.1, "drive.stiffness_x": 1e5},
+             r"against a translation along the ground \(y\)")):
+        refused(PAD, {"simulation.initial": "sliding", "load.normal": 100.0, **changes},
+                rf"There is no steady sliding: nothing holds the body {named}; give it a spring")
+
+
+def test_summaries_of_one_point_see_all_directions():
+    from fecontact.sweeps.summaries import functions_for, summarise
+
+    run = fc.Study.from_toml(PAD).with_(**{
+        "gap": 1.0, "load.gravity": [0.0, 0.0, -9.81], "simulation.t_end": 0.01,
+        "simulation.initial": {"displacement": [0.0] * 6, "velocity": [0.3, 0.2, 0, 0, 0, 0]}}).run()
+    found = summarise(run, functions_for(["amplitude_x@C", "amplitude_y@C", "amplitude_z@C",
+                                          "rms_velocity@C"]))
+    fall = 9.81 * 0.01
+    assert found == pytest.approx({
+        "amplitude_x@C": 0.0015, "amplitude_y@C": 0.001, "amplitude_z@C": 0.25 * fall * 0.01,
+        "rms_velocity@C": (0.13 + fall**2 / 3.0) ** 0.5}, rel=1e-3)
+    with pytest.raises(fc.InputError, match="plane bodies do not move along z"):
+        summarise(fc.Study.from_toml(PLANE).run(), functions_for(["amplitude_z@0"]))

@@ -13,6 +13,7 @@ from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing
 from fecontact.integrate.solvers import RODAS5P, Solver
+from fecontact.reduction.modal_basis import COMPONENTS, Component
 from fecontact.system.contact_system import ContactSystem
 
 
@@ -24,7 +25,7 @@ class Axis:
     ----------
     point : str or int
         'B', 'C' or a further named point; a contact node by its number from 0.
-    component : 'x', 'y' or 'phi'
+    component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
         Along the ground, away from it, counter-clockwise.
     of : 'displacement' or 'velocity'
         Which of them [m], [rad], [m/s], [rad/s].
@@ -36,11 +37,11 @@ class Axis:
     """
 
     point: str | int
-    component: Literal["x", "y", "phi"]
+    component: Component
     of: Literal["displacement", "velocity"] = "displacement"
 
     def __post_init__(self) -> None:
-        for name, names in (("component", ("x", "y", "phi")), ("of", ("displacement", "velocity"))):
+        for name, names in (("component", COMPONENTS), ("of", ("displacement", "velocity"))):
             value = getattr(self, name)
             if value not in names:
                 raise InputError(f"Axis: {name} = {value!r} must be one of {choices(names)}.")

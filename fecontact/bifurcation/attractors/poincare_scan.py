@@ -9,16 +9,16 @@ from typing import Any, Literal
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError, require_choice
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensemble import strobe
 from fecontact.integrate.solvers import RODAS5P, Solver
+from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.forcing_period import forcing_period
 
 Change = str | Callable[[ContactSystem, float], ContactSystem]
 
-_AXES = ("x", "y", "phi")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +45,13 @@ class PoincareScan:
     down: Array
 
     def observed(
-        self, point: str | int = "B", component: Literal["x", "y", "phi"] = "y",
+        self, point: str | int = "B", component: Component = "y",
         of: Literal["displacement", "velocity"] = "displacement",
     ) -> tuple[Array, Array]:
         """A displacement [m], [rad] or velocity of a point, (V, K) up and down."""
-        if component not in _AXES or of not in ("displacement", "velocity"):
-            raise InputError(f"component = {component!r} must be one of {choices(_AXES)}, "
-                             f"of = {of!r} 'displacement' or 'velocity'.")
+        require_choice("PoincareScan", "of", of, ("displacement", "velocity"))
         basis = self.system.basis
-        row = basis.T[basis.point_index(point), _AXES.index(component)]
+        row = basis.point_row(point, component)
         first = 0 if of == "displacement" else basis.modes
         columns = slice(first, first + basis.modes)
         return self.up[..., columns] @ row, self.down[..., columns] @ row

@@ -124,7 +124,7 @@ class ContactField(VectorField):
         """Row (d,) that gives the displacement of a point [m] from a state.
 
         ``point`` is 'B', 'C', a named point or the number of a contact node, ``component`` 'x',
-        'y' or 'phi' (then in rad).
+        'y' or 'phi' (then in rad), of solids also 'z', 'phi_x', 'phi_y', 'phi_z'.
 
         Raises
         ------

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from fecontact.bifurcation.orbits.motions import nodes_on_mesh
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.reduction.modal_basis import Component
 
 
 def _nodes(point: BranchPoint, states: int) -> tuple[Array, int]:
@@ -69,7 +69,7 @@ _FINE = 501
 
 
 def observe(
-    field: ContactField, branch: Branch, point: str | int = "B", component: Literal["x", "y"] = "x"
+    field: ContactField, branch: Branch, point: str | int = "B", component: Component = "x"
 ) -> Branch:
     """Add the range of a displacement to each point of a branch.
 
@@ -83,7 +83,8 @@ def observe(
     field, branch : ContactField, Branch
         A branch of equilibria or orbits, by collocation or shooting, and its field.
     point, component
-        'B', 'C', a named point or the number of a contact node; 'x' or 'y'.
+        'B', 'C', a named point or the number of a contact node; 'x', 'y' or 'phi', of
+        solids also 'z', 'phi_x', 'phi_y', 'phi_z'.
 
     Raises
     ------

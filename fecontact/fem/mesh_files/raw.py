@@ -162,6 +162,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     number = np.full(len(points), -1, np.int64)
     number[used] = np.arange(len(used))
     number = number[first]
+    _require_one_body(raw, number)
     cells = number[corners]
     _, distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
     ends = number[np.concatenate([np.empty((0, 2), np.int64), *(ends for ends, _ in curves)])]
@@ -255,6 +256,18 @@ def _blocks_of_one_kind(cells: list[tuple[str, Integers]]) -> list[tuple[str, In
         raise MeshError(f"The mesh mixes {first} {names[a]} and {second} {names[b]}; mesh with one "
                         f"kind only (in Gmsh, recombine all {remedy} or none).")
     return chosen
+
+
+def _require_one_body(raw: RawMesh, number: Integers) -> None:
+    """Refuse surface elements beside a solid: those on it are its faces."""
+    if not raw.is_solid:
+        return
+    faces = [block[:, :CORNERS[kind]] for kind, block in raw.cells if kind in PLANE and len(block)]
+    apart = sum(int((number[block] < 0).any(axis=1).sum()) for block in faces)
+    if apart:
+        raise MeshError(f"The mesh mixes dimensions: {apart} of its surface elements have nodes "
+                        f"that belong to no solid element; mesh all of the body with solid "
+                        f"elements, or save without the surfaces beside it.")
 
 
 def _require_plane(points: Array, size: float) -> None:

@@ -151,7 +151,7 @@ def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
     resolve it miss stick. Both are divided by the mode's largest motion at any point. Internal
     variables: ``rtol`` times their scales.
     """
-    T = system.basis.T[:, :2]
+    T = system.basis.T[:, : system.basis.dimension]
     largest = np.abs(T).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
     velocity = min(0.1, 1e5 * rtol) * system.velocity_scale

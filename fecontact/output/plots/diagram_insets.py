@@ -65,7 +65,7 @@ def phase_inset(
         place in the diagram of :func:`fecontact.plot.plot_branches`.
     observe : (point, component)
         Displacement u that is drawn: 'B', 'C', a named point or the number of a contact node; 'x',
-        'y' or 'phi'.
+        'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'.
     title : str, optional
         By default parameter and value.
 

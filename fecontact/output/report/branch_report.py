@@ -29,7 +29,7 @@ COLUMNS = ("point", "parameter", "period", "frequency", "stability")
 
 def report_branches(
     branches: Branch | Mapping[str, Branch], field: ContactField, path: str | Path, *,
-    y: str = "observed_maximum", observe: tuple[str | int, Literal["x", "y"]] = ("B", "x"),
+    y: str = "observed_maximum", observe: tuple[str | int, Literal["x", "y", "z"]] = ("B", "x"),
     title: str | None = None, study: str | None = None,
 ) -> Path:
     """Write branches as one HTML file with a diagram; a click on a point shows its orbit.

@@ -11,6 +11,7 @@ from fecontact.core.types import Array
 from fecontact.fem.faces.frames import tangents_of
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.ground.ground import Ground
+from fecontact.laws.ground.height_map import HeightMap
 from fecontact.output.files.frames import contact_forces
 from fecontact.output.plots.style import STATE_COLOURS, state_names
 from fecontact.output.render.frames_data import Motion
@@ -28,6 +29,8 @@ _FORCE = 0.95e-4  # largest error of a force, of the largest force
 _ROWS = 3e-6  # step of the rows of contact nodes, of their largest value
 _PROFILE = 24  # points of the ground's profile per wave
 _MOST_POINTS = 20_000  # of the profile
+_MAP = 4  # points of a map of heights per measured one, along each axis
+_MOST_OF_MAP = 256
 _ROUND = 0.5  # length of the mean normal below which a face goes around an axis
 _OPEN = "#dddddd"  # of open contact on the faces of solids
 _BESIDE = 0.6  # ground drawn on either side of the bodies, of their width
@@ -150,14 +153,9 @@ def drift_rows(motion: Motion) -> Array:
     basis = motion.trajectory.system.basis
     along = 0 if basis.dimension == 2 else slice(2)
     rows = basis.contact_T[:, along]
-    if not (motion.has_ground and _drawn_wavy(motion.trajectory.system.ground)):
+    if not (motion.has_ground and motion.trajectory.system.ground.wavy):
         return np.zeros(rows.shape[1:])
     return np.asarray(rows[basis.ground_nodes].mean(axis=0))
-
-
-def _drawn_wavy(ground: Ground) -> bool:
-    """Whether waves of the ground are drawn: those along one direction are."""
-    return ground.wavy and ground.height_map is None
 
 
 def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
@@ -177,7 +175,7 @@ def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
         corners = np.array([(x, y) for x in box[:2] for y in box[2:4]]) @ direction
         ends = [float(corners.min()), float(corners.max())]
     profile, first, spacing = np.zeros(1), 0.0, 1.0
-    if _drawn_wavy(ground):
+    if ground.wavy and ground.height_map is None:
         sides = [] if basis.dimension == 2 else [box[1] - box[0], box[3] - box[2]]
         reach = _BESIDE * max([ends[1] - ends[0], *sides])
         first = ends[0] - reach - float(along.max())
@@ -187,8 +185,29 @@ def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
                                                  _MOST_POINTS)))
         profile, spacing = ground.height(x + ground.travel(0.0), 0.0), float(x[1] - x[0])
     places = basis.positions[2 : 2 + basis.contact_nodes]
-    return DrawnGround(float(places[basis.ground_nodes, -1].min()), motion.gap, travel, profile,
-                       first, spacing, drift_rows(motion), ground.wave_direction, ground.centre)
+    found = DrawnGround(float(places[basis.ground_nodes, -1].min()), motion.gap, travel, profile,
+                        first, spacing, drift_rows(motion), ground.wave_direction, ground.centre)
+    if ground.height_map is None or not ground.wavy:
+        return found
+    return _with_map(found, ground.height_map, box)
+
+
+def _with_map(ground: DrawnGround, heights: HeightMap, box: Sequence[float]) -> DrawnGround:
+    """With the part of a map that comes below the bodies, or all of it."""
+    lines = []
+    beside = _BESIDE * max(box[1] - box[0], box[3] - box[2])
+    for axis, count in enumerate(np.shape(heights.heights)):
+        spacing = (heights.spacing_x, heights.spacing_y)[axis]
+        way = ground.travel[:, axis]
+        first = box[2 * axis] - beside - float(way.max())
+        size = box[2 * axis + 1] + beside - float(way.min()) - first
+        # Beyond its period it begins anew.
+        size = min(size, count * spacing)
+        points = int(np.clip(np.ceil(_MAP * size / spacing), 4, _MOST_OF_MAP))
+        lines.append((first, size / points, points))
+    x, y = (first + step * np.arange(points) for first, step, points in lines)
+    return replace(ground, heights=heights.shape(*np.meshgrid(x, y, indexing="ij"))[..., 0],
+                   origin=(lines[0][0], lines[1][0]), steps=(lines[0][1], lines[1][1]))
 
 
 def ground_table(ground: DrawnGround, payload: Payload) -> dict[str, Any]:
@@ -200,5 +219,7 @@ def ground_table(ground: DrawnGround, payload: Payload) -> dict[str, Any]:
         "first": ground.first, "spacing": ground.spacing,
         "travel": payload.add(travel, max(1e-6 * float(np.abs(travel).max()), SMALLEST)),
         "drift": ground.drift.ravel().tolist(), "direction": ground.direction,
-        "centre": ground.centre,
+        "centre": ground.centre, "origin": ground.origin, "steps": ground.steps,
+        "heights": None if ground.heights is None else payload.add(
+            ground.heights, max(1e-4 * float(np.ptp(ground.heights)), SMALLEST)),
     }

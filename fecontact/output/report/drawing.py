@@ -126,7 +126,7 @@ class DrawnContact:
 class DrawnGround:
     """The ground below the bodies: its height is ``profile(x - travel)`` above its level.
 
-    In space x is the distance along ``direction``.
+    In space x is the distance along ``direction``; or a map tells the heights over x and y.
 
     Attributes
     ----------
@@ -147,6 +147,10 @@ class DrawnGround:
         Along which the height varies.
     centre : (float, float)
         About which it turns [m].
+    heights : (k, l) array or None
+        Of a map over x and y, which repeats itself [m].
+    origin, steps : (float, float)
+        Place of the first of these heights, and their distances [m].
     """
 
     level: float
@@ -158,11 +162,14 @@ class DrawnGround:
     drift: Array
     direction: tuple[float, float] = (1.0, 0.0)
     centre: tuple[float, float] = (0.0, 0.0)
+    heights: Array | None = None
+    origin: tuple[float, float] = (0.0, 0.0)
+    steps: tuple[float, float] = (1.0, 1.0)
 
     @property
     def wavy(self) -> bool:
         """Whether it has waves."""
-        return len(self.profile) > 1
+        return len(self.profile) > 1 or self.heights is not None
 
 
 def drawn_bodies(basis: ModalBasis) -> DrawnBodies:

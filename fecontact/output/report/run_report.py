@@ -137,8 +137,6 @@ def run_block(
         if "owners" in header["bodies"]:
             header["bodies"]["ends"] = painted_ends(contact)
             header["maps"][STATE] = state_colours(contact, _SHADES)
-        if motion.has_ground and system.ground.height_map is not None:
-            told.append("The ground is drawn flat: its map of heights is not shown.")
     return payload.block(header)
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import i8, kernel
-from fecontact.core.types import Integers
+from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.types import Array, Integers
 
 _index = types.Array(types.int32, 1, "C")
 
@@ -88,6 +88,21 @@ def _smoothing(first, last, indptr, indices, blocks, inverse, step, factors, res
                 x[i, p, c] += change
 
 
+def _step_on(first, last, step, direction, pushed, x, residual):
+    """Rows first ... last of ``x += step direction`` and ``residual -= step pushed``."""
+    for i in range(first, last):
+        for c in range(len(step)):
+            x[i, c] += step[c] * direction[i, c]
+            residual[i, c] -= step[c] * pushed[i, c]
+
+
+def _turn_to(first, last, ratio, z, direction):
+    """Rows first ... last of ``direction = z + ratio direction``."""
+    for i in range(first, last):
+        for c in range(len(ratio)):
+            direction[i, c] = z[i, c] + ratio[c] * direction[i, c]
+
+
 def _compiled(function: Any, *arrays: tuple[int, bool]) -> dict[Any, Any]:
     """One kernel for single and one for double precision; arrays are (dimensions, whole)."""
     found = {}
@@ -104,6 +119,9 @@ _scalar_products = _compiled(_scalar_product, (1, False), (1, False), (1, True),
 _diagonal_products = _compiled(_diagonal_product, (3, True), (3, True), (3, True))
 _smoothings = _compiled(_smoothing, (1, False), (1, False), (3, True), (3, True), (3, True),
                         (1, True), (3, True), (3, True), (3, True))
+
+_step_on = kernel(types.void(i8, i8, vector, matrix, matrix, matrix, matrix), nogil=True)(_step_on)
+_turn_to = kernel(types.void(i8, i8, vector, matrix, matrix), nogil=True)(_turn_to)
 
 # Rows that one thread does at a time, and fewer than which are not worth threads.
 _ROWS = 4096
@@ -160,3 +178,13 @@ def diagonal_product(blocks: Any, x: Any) -> Any:
     y = np.empty_like(x)
     _in_parts(_diagonal_products[blocks.dtype], len(blocks), blocks, x, y)
     return y
+
+
+def step_on(step: Array, direction: Array, pushed: Array, x: Array, residual: Array) -> None:
+    """``x += step direction`` and ``residual -= step pushed`` of vectors (n, k), step (k,)."""
+    _in_parts(_step_on, len(x), step, direction, pushed, x, residual)
+
+
+def turn_to(ratio: Array, z: Array, direction: Array) -> None:
+    """``direction = z + ratio direction`` of vectors (n, k), ratio (k,)."""
+    _in_parts(_turn_to, len(z), ratio, z, direction)

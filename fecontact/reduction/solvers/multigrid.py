@@ -76,7 +76,7 @@ class Multigrid:
     def cycle(self, right: Array) -> Array:
         """One V-cycle for right-hand sides (n, k): a symmetric positive definite operator."""
         # Single precision has a smaller range than the forces on small and large bodies.
-        scale = np.maximum(right.max(axis=0), -right.min(axis=0))
+        scale = np.sqrt(np.einsum("ij,ij->j", right, right))
         scale[scale == 0.0] = 1.0
         scaled = np.divide(right, scale, dtype=np.float32, casting="unsafe", order="C")
         return np.asarray(self._cycle(0, scaled) * scale)

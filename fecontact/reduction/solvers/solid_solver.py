@@ -7,6 +7,7 @@ norm, is the smallest residual that can be reached.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
 from fecontact.reduction.solid_motions import rigid_motions
-from fecontact.reduction.solvers.block_rows import BlockRows
+from fecontact.reduction.solvers.block_rows import BlockRows, step_on, turn_to
 from fecontact.reduction.solvers.lobpcg import Found, lowest_modes
 from fecontact.reduction.solvers.multigrid import Multigrid, multigrid
 
@@ -119,46 +120,52 @@ class SolidSolver:
                             self._cycle(self._mass(start)), count, rigid, _MODES, np.abs(noise))
 
     def deflections(
-        self, forces: Array, without_rigid: Callable[[Array], Array], tolerance: float,
-        most: int = 100,
+        self, forces: Array, tolerance: float, most: int = 100
     ) -> tuple[Array, bool]:
         """Displacements (3 N, k) under balanced forces (3 N, k), and whether they converged.
 
         Conjugate gradients, until the energy norm of the residual is below the tolerance, relative
-        to that of the displacements; ``without_rigid`` takes rigid modes away.
+        to that of the displacements, which may hold any rigid motion: balanced forces do no work
+        on it.
         """
         found, converged = np.empty(forces.shape), True
         for first in range(0, forces.shape[1], WIDTH):
             part = slice(first, first + WIDTH)
-            found[:, part], reached = self._conjugate_gradients(
-                np.ascontiguousarray(forces[:, part]), without_rigid, tolerance, most)
+            found[:, part], reached = self._conjugate_gradients(forces[:, part], tolerance, most)
             converged &= reached
         return found, converged
 
     def _conjugate_gradients(
-        self, forces: Array, without_rigid: Callable[[Array], Array], tolerance: float, most: int
+        self, forces: Array, tolerance: float, most: int
     ) -> tuple[Array, bool]:
-        x, residual = np.zeros_like(forces), forces * self.moving.reshape(-1, 1)
-        z = without_rigid(self._cycle(residual))
-        direction = z.copy()
-        energy = np.einsum("ij,ij->j", residual, z)
+        x = np.zeros(forces.shape)
+        residual = np.ascontiguousarray(forces * self.moving.reshape(-1, 1))
+        direction = self._cycle(residual)
+        energy = np.einsum("ij,ij->j", residual, direction)
         work = np.zeros(forces.shape[1])
         reached = energy <= 0.0
+        before = np.zeros(forces.shape[1])
         for _ in range(most):
             pushed = self._stiffness(direction)
             curvature = np.einsum("ij,ij->j", direction, pushed)
             step = np.where(reached, 0.0, energy / np.where(curvature > 0.0, curvature, 1.0))
-            x += step * direction
-            residual -= step * pushed
-            work += step * energy
-            z = without_rigid(self._cycle(residual))
+            step_on(step, direction, pushed, x, residual)
+            gain = step * energy
+            work += gain
+            # What later steps will gain, if each gains less by the root of the last factor: the
+            # first steps gain more than their share.
+            factor = np.sqrt(gain / np.maximum(np.maximum(before, gain), np.finfo(float).tiny))
+            reached |= gain * factor <= tolerance**2 * work * (1.0 - factor)
+            if reached.all():
+                break
+            before = gain
+            z = self._cycle(residual)
             following = np.einsum("ij,ij->j", residual, z)
             reached |= following <= tolerance**2 * work
             if reached.all():
                 break
-            ratio = np.where(reached, 0.0, following / np.where(energy > 0.0, energy, 1.0))
-            direction *= ratio
-            direction += z
+            turn_to(np.where(reached, 0.0, following / np.where(energy > 0.0, energy, 1.0)), z,
+                    direction)
             energy = following
         return x, bool(reached.all())
 
@@ -166,14 +173,19 @@ class SolidSolver:
         return self._by_nodes(self.stiffness.product, x)
 
     def _mass(self, x: Array) -> Array:
-        y = self._by_nodes(self.component_mass.product, x)
-        y *= self.moving.reshape(-1, 1)
-        return y
+        return self._held(self._by_nodes(self.component_mass.product, x))
 
     def _cycle(self, x: Array) -> Array:
-        y = self.mesh_cycle.cycle(x)
-        y *= self.moving.reshape(-1, 1)
-        return y
+        return self._held(self.mesh_cycle.cycle(x))
+
+    def _held(self, x: Array) -> Array:
+        if not self._free:
+            x *= self.moving.reshape(-1, 1)
+        return x
+
+    @cached_property
+    def _free(self) -> bool:
+        return bool(self.moving.all())
 
     def _by_nodes(self, product: Callable[[Array], Array], x: Array) -> Array:
         return np.asarray(product(np.ascontiguousarray(x).reshape(len(self.moving), 3, -1))

@@ -22,15 +22,24 @@ from fecontact.reduction.solvers.factorisation import SymmetricFactors
 from fecontact.reduction.solvers.solid_solver import WIDTH
 
 # Rows for which a system that is solved iteratively needs no factors, and unknowns above which
-# there is no memory for them.
+# these cost more than iterations for any number of rows.
 _FEW = 64
-_LARGE = 400_000
-# Energy norm of the residuals of iterated deflections; the error of compliances is its square.
+_LARGE = 80_000
+# Energy norm of the residuals of iterated deflections; the error of compliances is its square. Of
+# many rows that are completed to a tolerance it is this part of the tolerance.
 _ACCURACY = 1e-5
+_PART = 0.05
+# Bytes of deflections that are kept.
+_ROOM = 3e9
 
 
 class Flexibility:
-    """Elastic static response of a free system to unit forces at the rows W (k, f), sparse."""
+    """Elastic static response of a free system to unit forces at the rows W (k, f), sparse.
+
+    ``accuracy`` is that of deflections, in the energy norm and relative.
+    """
+
+    accuracy = 0.0
 
     def __init__(self, system: FreeSystem, rows: Any) -> None:
         self.system = system
@@ -76,43 +85,71 @@ class Flexibility:
 
 
 class IteratedFlexibility(Flexibility):
-    """The same of a system that is solved iteratively."""
+    """The same of a system that is solved iteratively.
 
-    def __init__(self, system: FreeSystem, rows: Any) -> None:
+    ``accuracy`` is the energy norm of the residuals of the deflections under unit forces, relative
+    to theirs; what each of them says of its own row is accurate to the square.
+    """
+
+    def __init__(self, system: FreeSystem, rows: Any, accuracy: float = _ACCURACY) -> None:
         self.system = system
         self.rows = rows.tocsr()
+        self.accuracy = accuracy
+        self._whole: tuple[IteratedFlexibility, NDArray[np.bool_]] | None = None
 
     def of_rows(self, which: NDArray[np.bool_]) -> "IteratedFlexibility":
         """The same for some rows alone."""
-        part = IteratedFlexibility(self.system, self.rows[which])
-        part.__dict__["compliance"] = self.compliance[np.ix_(which, which)]
+        part = IteratedFlexibility(self.system, self.rows[which], self.accuracy)
+        part._whole = self, which
         return part
 
     @cached_property
     def compliance(self) -> Array:
         """W G W^T (k, k): elastic displacements at the rows per unit force there [m/N]."""
-        count = self.rows.shape[0]
+        if self._whole is None:
+            return self._solved[0]
+        whole, which = self._whole
+        return whole.compliance[np.ix_(which, which)]
+
+    @cached_property
+    def _solved(self) -> tuple[Array, Array | None]:
+        """The compliance, and the deflections (f, k) if there is room for them."""
+        count, size = self.rows.shape
         found = np.zeros((count, count))
+        kept = np.zeros((size, count)) if 8.0 * size * count <= _ROOM else None
         loaded = np.flatnonzero(np.diff(self.rows.indptr))
         for first in range(0, len(loaded), WIDTH):
             part = loaded[first : first + WIDTH]
-            forces = self.rows[part].T.toarray()
-            found[:, part] = self.rows @ self.system.deflection(forces, _ACCURACY)
-        return 0.5 * (found + found.T)
+            answer = self.system.deflection(self.rows[part].T.toarray(), self.accuracy)
+            found[:, part] = self.rows @ answer
+            if kept is not None:
+                kept[:, part] = answer
+        return 0.5 * (found + found.T), kept
 
     def deflections(self, patterns: Array) -> Array:
         """G W^T patterns (f, p): elastic displacements under force patterns (k, p) [m/N]."""
-        return self.system.deflection(np.asarray(self.rows.T @ patterns))
+        if self._whole is not None:
+            whole, which = self._whole
+            further = np.zeros((len(which), patterns.shape[1]))
+            further[which] = patterns
+            return whole.deflections(further)
+        answers = self._solved[1]
+        if answers is not None:
+            return np.asarray(answers @ patterns)
+        return self.system.deflection(np.asarray(self.rows.T @ patterns), self.accuracy)
 
 
-def flexibility_of(system: FreeSystem, rows: Any) -> Flexibility:
+def flexibility_of(system: FreeSystem, rows: Any, tolerance: float = 0.0) -> Flexibility:
     """The elastic flexibility at rows W (k, f), by the solver that suits system and rows.
 
-    Substitution costs little for each row once there are factors; conjugate gradients for 32 rows
-    cost about half as much as the modes, and no memory.
+    Substitution costs little for each row once there are factors, and less than iterations for many
+    rows of bodies with less than 80,000 unknowns. Where larger ones are iterated and are completed
+    to a tolerance, a twentieth of it is left to the iterations.
     """
-    if (rows.shape[0] <= _FEW or rows.shape[1] > _LARGE) and system.iterates:
-        return IteratedFlexibility(system, rows)
+    few = rows.shape[0] <= _FEW
+    if (few or rows.shape[1] > _LARGE) and system.iterates:
+        loose = 0.0 if few else np.sqrt(_PART * tolerance)
+        return IteratedFlexibility(system, rows, max(_ACCURACY, float(loose)))
     return Flexibility(system, rows)
 
 
@@ -153,7 +190,8 @@ def residual_modes(
     """
     system = flexibility.system
     kept = modal_compliance(flexibility.rows, w, shapes)
-    patterns = leading_patterns(flexibility.compliance, kept, tolerance)
+    patterns = leading_patterns(flexibility.compliance, kept,
+                                max(tolerance - flexibility.accuracy**2, 0.0))
     deflections = system.deflection(loads)
     whole_work = (loads * deflections).sum(axis=0)
     work = ((loads.T @ shapes[:, w > 0.0] / w[w > 0.0]) ** 2).sum(axis=1)

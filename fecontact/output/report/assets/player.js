@@ -351,10 +351,27 @@ class Player {
     const level = ground.level - scale * ground.gap, profile = ground.profile.values;
     return { way, height: (x, y) => {
       if (!ground.wavy) return level;
+      if (ground.heights) return level + scale * this.#mapped(x - way[0], y - way[1]);
       const at = clamp(((this.d > 2 ? a * (x - way[0]) + b * (y - way[1]) : x - way[0]) - ground.first) / ground.spacing, 0, profile.length - 1);
       const k = min(floor(at), profile.length - 2);
       return level + scale * (profile[k] + (at - k) * (profile[k + 1] - profile[k]));
     } };
+  }
+
+  // Drawn height of the ground at a place of the space that stands still.
+  height(x, y) {
+    return this.#groundNow().height(x, y);
+  }
+
+  // Height of a map that repeats itself, between its four points around a place of its own frame.
+  #mapped(x, y) {
+    const { heights, origin, steps } = this.data.ground, { rows, columns, values } = heights;
+    const u = (x - origin[0]) / steps[0], v = (y - origin[1]) / steps[1], i = floor(u), j = floor(v);
+    const row = (k) => {
+      const at = (k % rows + rows) % rows * columns, one = (j % columns + columns) % columns;
+      return (1 - v + j) * values[at + one] + (v - j) * values[at + (one + 1) % columns];
+    };
+    return (1 - u + i) * row(i) + (u - i) * row(i + 1);
   }
 
   #drawGround() {
@@ -402,14 +419,16 @@ class Player {
     c.beginPath();
     // A net that moves and turns with the ground, around what of it lies below the middle.
     const turned = (x, y, sine, cosine = Math.cos(angle)) => [cosine * x - sine * y, sine * x + cosine * y];
+    const parts = this.data.ground.wavy ? 6 : 1;
     const sine = Math.sin(angle), x0 = cx + wayX, y0 = cy + wayY, reach = round(hypot(wide, deep) / 2 / spacing + 1) * spacing;
     const [x1, y1] = turned((left + right) / 2 - x0, (front + back) / 2 - y0, -sine).map((one) => round(one / spacing) * spacing);
     for (let x = x1 - reach; x < x1 + reach; x += spacing) {
       for (let y = y1 - reach; y < y1 + reach; y += spacing) {
-        [[0, spacing], [0, 0], [spacing, 0]].forEach(([u, v], k) => {
-          const [p, q] = turned(x + u, y + v, sine);
-          c[k ? "lineTo" : "moveTo"](...at(x0 + p, y0 + q));
-        });
+        // Along two sides of a mesh, over waves in several steps.
+        for (let k = -parts; k <= parts; k++) {
+          const [p, q] = turned(x + max(k, 0) * spacing / parts, y + max(-k, 0) * spacing / parts, sine);
+          c[k > -parts ? "lineTo" : "moveTo"](...at(x0 + p, y0 + q));
+        }
       }
     }
     c.stroke();
