@@ -1,7 +1,7 @@
 """Curves of special points over two parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from fecontact.bifurcation.continuation.points import (
     PeriodDoublingPoint,
 )
 from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
     ContinuationOptions,
     Problem,
     options_of,
@@ -54,8 +53,8 @@ def codim2_curve(
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
-        Step lengths, tolerances and stopping conditions; its bounds are those of the first
-        parameter.
+        Step lengths, tolerances and stopping conditions; its bounds and second_bounds are those of
+        the parameters where ``bounds`` gives none.
     bounds : mapping, optional
         Range of each parameter by name, ``{"B": (0.0, 30.0)}``, at which the curve ends; it also
         scales the arclength (by default the branch does, or the values at the point).
@@ -100,8 +99,8 @@ def codim2_curve(
     problem, u, attributes = begin(field, point, parameter, widths, scales)
     attributes |= {"parameters": list(names), "kind": str(point.kind),
                    "state_names": list(field.state_names)}
-    return _followed(problem, u, names, chosen, ranges.get(parameter, (-np.inf, np.inf)), direction,
-                     both, attributes)
+    return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
+                     direction, both, attributes)
 
 
 def _ranges(
@@ -125,20 +124,6 @@ def _ranges(
     return found
 
 
-@dataclass(frozen=True)
-class _Border:
-    """A bound of the second parameter, as an event at which the curve ends."""
-
-    name: str
-    parameter: str
-    bound: float
-    rounding: float
-
-    def __call__(self, stored: Mapping[str, Any]) -> float:
-        distance = float(stored[self.parameter]) - self.bound
-        return 0.0 if abs(distance) <= self.rounding else distance
-
-
 def _followed(
     problem: Problem, u: Array, names: tuple[str, str], options: ContinuationOptions,
     second: tuple[float, float], direction: float, both: bool, attributes: dict[str, Any],
@@ -149,36 +134,13 @@ def _followed(
     if not second[0] - near <= value <= second[1] + near:
         raise InputError(f"The start lies at {names[1]} = {value:.6g}, outside its bounds, "
                          f"{second[0]:g} to {second[1]:g}.")
-    tangent = _tangent(problem, u, direction)
-    borders, turned, leaves = [], False, False
-    for side, bound in zip((-1.0, 1.0), second, strict=True):
-        if not np.isfinite(bound):
-            continue
-        on_it = abs(value - bound) <= near
-        borders.append(_Border(f"{names[1]} = {bound:g}", names[1], bound, near if on_it else 0.0))
-        if on_it and side * tangent[-2] > 0.0:
-            turned, leaves = both, not both
-            tangent = -tangent if turned else tangent
-        both = both and not on_it
+    u[-2] = min(max(value, second[0]), second[1])
     stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
     ends = ["Bogdanov-Takens"] if attributes["kind"] == "Hopf" else []
-    chosen = replace(options, points=1 if leaves else options.points,
-                     stop_at=(*stops, *(border.name for border in borders), *ends),
-                     events={**options.events, **{border.name: border for border in borders}})
-    branch = continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
-                             attributes=attributes)
-    if leaves:
-        return replace(branch, status=BranchStatus.BOUND)
-    branch = _without_borders(branch, {border.name for border in borders})
-    return branch.reversed() if turned else branch
-
-
-def _without_borders(branch: Branch, borders: set[str]) -> Branch:
-    """The curve whose ends on bounds of the second parameter are regular points."""
-    reached = branch.points[-1].kind in borders
-    points = tuple(replace(point, kind=None) if point.kind in borders else point
-                   for point in branch.points)
-    return replace(branch, points=points, status=BranchStatus.BOUND if reached else branch.status)
+    chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
+    return continue_branch(problem, u, chosen, name=names[0],
+                           tangent=_tangent(problem, u, direction), both=both,
+                           attributes=attributes)
 
 
 def _tangent(problem: Problem, u: Array, direction: float) -> Array:

@@ -1,5 +1,6 @@
 """Continuation of a whole branch, to one side or to both."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,8 +33,8 @@ def continue_branch(
     name : str
         Name of the parameter.
     both : bool
-        Follow it to both sides; the points then go from one end to the other. From a start on a
-        bound only inwards.
+        Follow it to both sides; the points then go from one end to the other, and the options
+        limit their number on both sides together. From a start on a bound only inwards.
     attributes : dict, optional
         Kept with the branch.
 
@@ -46,10 +47,27 @@ def continue_branch(
     points, end = _collected(problem, u, options, tangent, direction, name)
     if both and end.status not in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
         start = start_of(problem, u, options, tangent, direction)
-        others, _ = _collected(problem, u, options, -start.tangent, direction, name)
+        points, left = shared(points, end.status, options.points)
+        others, _ = _collected(problem, u, replace(options, points=left), -start.tangent, direction,
+                               name)
         turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
         points = [*turned, *points]
     return Branch(name, tuple(points), end.status, end.message, attributes or {})
+
+
+def shared(
+    first: Sequence[BranchPoint], status: BranchStatus, most: int
+) -> tuple[list[BranchPoint], int]:
+    """What the first of two sides keeps of its points, and how many regular ones the other may have.
+
+    Both contain the start. A side that did not reach its end keeps half of them: it had all first,
+    so as to close where it can.
+    """
+    regular = [place for place, point in enumerate(first) if point.kind is None]
+    if status is not BranchStatus.POINTS:
+        return list(first), max(most + 1 - len(regular), 1)
+    kept = most // 2 + 1
+    return list(first[: regular[kept - 1] + 1]), most + 1 - kept
 
 
 def _collected(

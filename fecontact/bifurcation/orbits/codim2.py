@@ -65,6 +65,14 @@ class OrbitCurve(Problem):
             result = replace(result, row=orbit.weights() * result.rest(moved))
         return result, moved, turned
 
+    def met_again(
+        self, origin: Problem, u: Array, tangent: Array, like: Array, heading: Array, within: float,
+    ) -> Array | None:
+        """That of the orbits."""
+        if not isinstance(origin, OrbitCurve):
+            return None
+        return self.orbit.met_again(origin.orbit, u, tangent, like, heading, within)
+
     def rest(self, u: Array) -> Array:
         """Tangent (n,) of the branch of orbits at fixed second parameter."""
         linearised = self.orbit.linearise(u)
