@@ -29,6 +29,7 @@ from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range
+from .tree import BranchTree, branch_tree
 
 __all__ = [
     "Attractor",
@@ -39,6 +40,7 @@ __all__ = [
     "BranchPoint",
     "BranchSettings",
     "BranchStatus",
+    "BranchTree",
     "Collocation",
     "ContactField",
     "ContinuationOptions",
@@ -61,6 +63,7 @@ __all__ = [
     "ZeroHopfPoint",
     "amplitude",
     "basins",
+    "branch_tree",
     "codim2_curve",
     "contact_field",
     "equilibrium_branch",

@@ -152,10 +152,9 @@ class Branch(Summarised):
             If no solution is found there.
         """
         require_field(field)
-        if not isinstance(value, str) and np.ndim(value) == 1:
-            return tuple(self.at(field, float(one), which) for one in np.asarray(value))
+        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+            return tuple(self.at(field, float(one), which) for one in value)
         require_finite("Branch.at", value=value)
-        assert not isinstance(value, Sequence | np.ndarray)
         passed = self._passed(float(value))
         if not (isinstance(which, int | np.integer) and -len(passed) <= which < len(passed)):
             span = (f"from {self.parameter.min():.6g} to {self.parameter.max():.6g}" if self.points

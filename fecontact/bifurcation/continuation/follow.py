@@ -58,7 +58,7 @@ def continue_branch(
 def shared(
     first: Sequence[BranchPoint], status: BranchStatus, most: int
 ) -> tuple[list[BranchPoint], int]:
-    """What the first of two sides keeps of its points, and how many regular ones the other may have.
+    """What the first of two sides keeps of its points, and how many the other one may have.
 
     Both contain the start. A side that did not reach its end keeps half of them: it had all first,
     so as to close where it can.

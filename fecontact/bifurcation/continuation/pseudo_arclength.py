@@ -107,9 +107,10 @@ def continuation(
         last = here
         for there, special in reached:
             for located in special:
-                if located.kind in problem.ends:
+                ended = problem.ends.get(str(located.kind))
+                if ended is not None:
                     yield replace(located, kind=None)
-                    return End(problem.ends[located.kind])
+                    return End(ended)
                 yield located
                 if located.kind in stops:
                     return End(BranchStatus.STOPPED)
