@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,19 +37,20 @@ def codim2_curve(
     field: VectorField, point: BranchPoint, parameter: str, *,
     options: ContinuationOptions | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None, scales: ArrayLike | None = None,
-    direction: float = 1.0, both: bool = True,
+    direction: float = 1.0, both: bool = True, keep: Literal["kind", "period"] = "kind",
 ) -> Branch:
     """Follow a special point over two parameters, such as the border of flutter or stick-slip.
 
-    The kind of the point selects the curve. docs/bifurcation.md lists what its points store, and
-    its special points.
+    The kind of the point selects the curve, or its period: orbits of a fixed large period follow a
+    homoclinic orbit. docs/bifurcation.md lists what its points store, and its special points.
 
     Parameters
     ----------
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
-        A point of a branch over the first parameter; of orbits, one found by collocation.
+        A point of a branch over the first parameter; of orbits, one found by collocation. With
+        ``keep="period"`` any orbit of a system without excitation.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
@@ -66,6 +67,8 @@ def codim2_curve(
         constant.
     both : bool
         Go to both sides; the points then run from one end of the curve to the other.
+    keep : 'kind' or 'period'
+        What all points of the curve have in common.
 
     Returns
     -------
@@ -84,9 +87,14 @@ def codim2_curve(
     require_kind("codim2_curve", str, parameter=parameter)
     require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
     require_finite("codim2_curve", direction=direction)
-    if not isinstance(point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
+    if keep not in ("kind", "period"):
+        raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
+    if keep == "kind" and not isinstance(
+            point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
-                         f"'period doubling' or 'Neimark-Sacker'.")
+                         f"'period doubling' or 'Neimark-Sacker', or an orbit with keep='period'.")
+    if keep == "period" and not point.is_orbit:
+        raise InputError(f"{point.place} is no orbit, whose period keep='period' could keep.")
     names = (point.branch.parameter_name, parameter)
     field.index(parameter)
     if names[0] == parameter:
@@ -95,9 +103,13 @@ def codim2_curve(
     ranges = _ranges(names, bounds)
     chosen = options_of(options, ranges.get(names[0]))
     widths = {name: high - low for name, (low, high) in ranges.items() if np.isfinite(high - low)}
-    begin = orbit_curve if point.is_orbit else equilibrium_curve
-    problem, u, attributes = begin(field, point, parameter, widths, scales)
-    attributes |= {"parameters": list(names), "kind": str(point.kind),
+    problem: Problem
+    kind = "period" if keep == "period" else str(point.kind)
+    if point.is_orbit:
+        problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
+    else:
+        problem, u, attributes = equilibrium_curve(field, point, parameter, widths, scales)
+    attributes |= {"parameters": list(names), "kind": kind,
                    "state_names": list(field.state_names)}
     return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
                      direction, both, attributes)
