@@ -190,6 +190,8 @@ def orbit_curve(
     ----------
     field, point, second, scales
         As for :func:`fecontact.bifurcation.codim2_curve`.
+    kind : str
+        'fold', 'period doubling', 'Neimark-Sacker' or 'period'.
     widths : mapping
         Width of the diagram in each parameter by name; by default that of the branch for the first
         parameter and the magnitude of the second one.
