@@ -12,6 +12,7 @@ from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
     ContinuationOptions,
+    codim2_curve,
     equilibrium_branch,
     orbit_branch,
     vector_field,
@@ -119,3 +120,46 @@ def test_orbits_that_end_homoclinic(intervals, tmp_path):
     assert on.status is BranchStatus.POINTS
     assert on.points[-1].values["period"] > 1.5 * end.values["period"]
     assert on.points[-1].parameter == pytest.approx(c, abs=2e-7)
+
+
+def bautin(t, x, p, out):
+    # r' = r (b + c r^2 - r^4): orbits turn at b = -c^2 / 4, c = 2 r^2.
+    square = x[0] * x[0] + x[1] * x[1]
+    growth = p[0] + p[1] * square - square * square
+    out[0] = growth * x[0] - x[1] * (1.0 + 0.2 * x[0])
+    out[1] = growth * x[1] + x[0] * (1.0 + 0.2 * x[0])
+
+
+@pytest.mark.parametrize("largest", [0.02, 0.05, 0.1])
+def test_a_curve_of_folds_ends_at_a_bautin_point(largest):
+    """And does not run through the same orbits again."""
+    field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
+    hopf, = equilibrium_branch(field, parameter="b", bounds=(-2.0, 2.0)).of_kind("Hopf")
+    orbits = orbit_branch(field, hopf, method=Collocation(intervals=16), bounds=(-2.0, 2.0))
+    fold, = orbits.of_kind("fold")
+    curve = codim2_curve(field, fold, "c", bounds={"b": (-2.0, 1.0), "c": (-1.0, 1.2)},
+                         options=ContinuationOptions(largest_step=largest))
+    assert curve.status is BranchStatus.HOPF
+    b, c = curve.parameter, curve.column("c")
+    assert c**2 == pytest.approx(-4.0 * b, abs=1e-10)
+    assert (np.diff(c) < 0.0).all()
+    radius = curve.points[-1].values["maximum"][0]
+    assert 0.0 < radius < 0.02
+    assert c[-1] == pytest.approx(2.0 * radius**2, rel=0.02)
+    assert not curve.special
+
+
+def test_orbits_of_one_period_end_at_hopf_points():
+    """r = sqrt(a) with the period 2 pi / (w + a): w + a = 2.5 ends at a = 0, w = 2.5."""
+    def circle(t, x, p, out):
+        square = x[0] * x[0] + x[1] * x[1]
+        out[0] = (p[0] - square) * x[0] - (p[1] + square) * x[1]
+        out[1] = (p[0] - square) * x[1] + (p[1] + square) * x[0]
+
+    field = vector_field(circle, {"a": -0.5, "w": 2.0}, 2)
+    hopf, = equilibrium_branch(field, parameter="a", bounds=(-0.5, 1.0)).of_kind("Hopf")
+    orbits = orbit_branch(field, hopf, method=Collocation(intervals=12), bounds=(-0.5, 1.0))
+    curve = codim2_curve(field, orbits.at(field, 0.5), "w", keep="period", direction=-1.0,
+                         both=False, bounds={"a": (-1.0, 1.0), "w": (0.0, 3.0)})
+    assert curve.status is BranchStatus.HOPF
+    assert [curve.parameter[-1], curve.column("w")[-1]] == pytest.approx([0.0, 2.5], abs=1e-4)

@@ -1,6 +1,6 @@
 """Continuation of a whole branch, to one side or to both."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -47,27 +47,28 @@ def continue_branch(
     points, end = _collected(problem, u, options, tangent, direction, name)
     if both and end.status not in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
         start = start_of(problem, u, options, tangent, direction)
-        points, left = shared(points, end.status, options.points)
+        # The start counts once.
+        left = options.points + 1 - min(regular(points), options.points // 2 + 1)
         others, _ = _collected(problem, u, replace(options, points=left), -start.tangent, direction,
                                name)
+        points, whole = shortened(points, options.points + 1 - regular(others))
+        end = end if whole else End(BranchStatus.POINTS)
         turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
         points = [*turned, *points]
     return Branch(name, tuple(points), end.status, end.message, attributes or {})
 
 
-def shared(
-    first: Sequence[BranchPoint], status: BranchStatus, most: int
-) -> tuple[list[BranchPoint], int]:
-    """What the first of two sides keeps of its points, and how many the other one may have.
+def regular(points: Iterable[BranchPoint]) -> int:
+    """Number of points that are not special."""
+    return sum(point.kind is None for point in points)
 
-    Both contain the start. A side that did not reach its end keeps half of them: it had all first,
-    so as to close where it can.
-    """
-    regular = [place for place, point in enumerate(first) if point.kind is None]
-    if status is not BranchStatus.POINTS:
-        return list(first), max(most + 1 - len(regular), 1)
-    kept = most // 2 + 1
-    return list(first[: regular[kept - 1] + 1]), most + 1 - kept
+
+def shortened(points: Sequence[BranchPoint], most: int) -> tuple[list[BranchPoint], bool]:
+    """The first points of a side, so many regular ones, and whether these are all."""
+    places = [place for place, point in enumerate(points) if point.kind is None]
+    if len(places) <= most:
+        return list(points), True
+    return list(points[: places[most - 1] + 1]), False
 
 
 def _collected(

@@ -19,7 +19,8 @@ class BranchStatus(Enum):
 
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
-    HOPF = "The orbits shrink to an equilibrium: the branch ends at a Hopf point."
+    HOPF = ("The orbits shrink to an equilibrium: the branch ends at a Hopf point, a curve of folds "
+            "at a Bautin point.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
     STOPPED = "The branch reached a point at which it was to stop."
@@ -162,7 +163,7 @@ class ContinuationOptions:
         First step, and limits of the steps.
     points : int
         Number of regular points after which the branch ends. To both sides they count together; if
-        they do not suffice for the end of the first side, each gets half of them.
+        they do not suffice, each gets half of them, or what the other one leaves.
     bounds : tuple
         Least and largest value of the parameter; the last point lies on the bound.
     second_bounds : tuple

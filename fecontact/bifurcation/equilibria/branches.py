@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch, shared
+from fecontact.bifurcation.continuation.follow import continue_branch, regular, shortened
 from fecontact.bifurcation.continuation.points import BranchPoint, CrossingPoint
 from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
     ContinuationOptions,
     options_of,
     sizes_of,
@@ -118,7 +119,7 @@ def _crossing(
     tangent = tangent / np.sqrt(weights * tangent @ tangent)
     points: list[BranchPoint] = [replace(point, tangent=tangent)]
     branch: Branch | None = None
-    left = options.points
+    left, whole = options.points, True
     for side in (1.0, -1.0) if both else (1.0,):
         # At the branch point the system is singular; correct the first step away from it.
         first = point.u + side * options.step * tangent
@@ -127,15 +128,17 @@ def _crossing(
         found = continue_branch(problem, first, replace(options, points=left), name=parameter,
                                 tangent=side * tangent, attributes=attributes)
         if side < 0.0:
+            points, whole = shortened(points, options.points - regular(found))
             points = [*found.reversed().points, *points]
         else:
-            kept, left = shared(found.points, found.status, left) if both else (found.points, 0)
-            points += kept
+            points += found.points
+            left -= min(regular(found), left // 2)
         branch = branch or found
     if branch is None:
         raise InputError(f"The other branch leaves the bounds of {parameter} at once, at "
                          f"{point.parameter:.6g}; widen them.")
-    return replace(branch, points=tuple(points))
+    return replace(branch, points=tuple(points),
+                   status=branch.status if whole else BranchStatus.POINTS)
 
 
 def _start(field: VectorField, start: Equilibrium | ArrayLike | None) -> Equilibrium:

@@ -6,16 +6,17 @@ An orbit by collocation with two free parameters, and a test function at zero.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
+from fecontact.bifurcation.orbits.ends import VANISHED_ON_CURVES, VANISHING, vanishing
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.core.errors import InputError
@@ -53,6 +54,8 @@ class OrbitCurve(Problem):
     kind: str
     row: Array
     period: float = 1.0
+
+    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
     def linearise(self, u: Array) -> "CurveLinearised":
         """The equations about u."""
@@ -107,7 +110,13 @@ class OrbitCurve(Problem):
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Test functions of points of codimension two."""
+        """Test functions of points of codimension two, and of orbits that shrink to rest."""
+        found = self._codimension_two(u, linearisation)
+        if self.orbit.autonomous:
+            found[VANISHING] = vanishing(self.orbit, u, VANISHED_ON_CURVES)
+        return found
+
+    def _codimension_two(self, u: Array, linearisation: Any) -> dict[str, float]:
         if self.kind == "fold":
             along = self.rest(u)
             return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}

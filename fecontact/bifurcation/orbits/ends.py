@@ -11,8 +11,9 @@ from fecontact.core.types import Array
 
 # Name of the test function that is zero where an orbit shrinks to an equilibrium.
 VANISHING = "vanishing orbit"
-# Amplitude at which a branch ends, in that of the orbit before.
-_VANISHED = 1e-3
+# Amplitude at which a branch ends, in that of the orbit before; along curves over two parameters,
+# whose equations are singular at rest, more.
+_VANISHED, VANISHED_ON_CURVES = 1e-3, 0.1
 # Slowest motion on an orbit, in the fastest, from which an equilibrium is looked for.
 _SLOW = 0.02
 # Distance of an orbit from a saddle, in amplitudes, at which it counts as homoclinic, the part of
@@ -22,8 +23,8 @@ _NEAREST, _MOST_TIME, _BESIDE, _RESTING = 1e-3, 0.5, 0.1, 1e-3
 _TOLERANCE = 1e-10
 
 
-def vanishing(problem: Discretisation, u: Array) -> float:
-    """Amplitude along the shape of the orbit before, in its amplitude, less 1e-3.
+def vanishing(problem: Discretisation, u: Array, least: float = _VANISHED) -> float:
+    """Amplitude along the shape of the orbit before, in its amplitude, less the least one.
 
     Beyond a Hopf point the same orbits come once more, half a period later: the amplitude has then
     changed its sign.
@@ -32,7 +33,7 @@ def vanishing(problem: Discretisation, u: Array) -> float:
     weights = problem.weights()[: problem.size].reshape(before.shape)
     shape = weights * (before - before.mean(axis=0))
     return float((shape * (nodes - nodes.mean(axis=0))).sum()
-                 / (shape * (before - before.mean(axis=0))).sum()) - _VANISHED
+                 / (shape * (before - before.mean(axis=0))).sum()) - least
 
 
 def is_homoclinic(problem: Discretisation, u: Array, linearised: Any, tangent: Array) -> bool:
