@@ -33,6 +33,7 @@ from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range
 from .response_options import ResponseSettings
+from .tree import BranchTree, branch_tree
 
 __all__ = [
     "Attractor",
@@ -43,6 +44,7 @@ __all__ = [
     "BranchPoint",
     "BranchSettings",
     "BranchStatus",
+    "BranchTree",
     "Collocation",
     "ContactField",
     "ContinuationOptions",
@@ -70,6 +72,7 @@ __all__ = [
     "ZeroHopfPoint",
     "amplitude",
     "basins",
+    "branch_tree",
     "codim2_curve",
     "contact_field",
     "equilibrium_branch",

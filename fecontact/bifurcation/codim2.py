@@ -1,8 +1,8 @@
 """Curves of special points over two parameters."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from fecontact.bifurcation.continuation.points import (
     PeriodDoublingPoint,
 )
 from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
     ContinuationOptions,
     Problem,
     options_of,
@@ -38,24 +37,25 @@ def codim2_curve(
     field: VectorField, point: BranchPoint, parameter: str, *,
     options: ContinuationOptions | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None, scales: ArrayLike | None = None,
-    direction: float = 1.0, both: bool = True,
+    direction: float = 1.0, both: bool = True, keep: Literal["kind", "period"] = "kind",
 ) -> Branch:
     """Follow a special point over two parameters, such as the border of flutter or stick-slip.
 
-    The kind of the point selects the curve. docs/bifurcation.md lists what its points store, and
-    its special points.
+    The kind of the point selects the curve, or its period: orbits of a fixed large period follow a
+    homoclinic orbit. docs/bifurcation.md lists what its points store, and its special points.
 
     Parameters
     ----------
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
-        A point of a branch over the first parameter; of orbits, one found by collocation.
+        A point of a branch over the first parameter; of orbits, one found by collocation. With
+        ``keep="period"`` any orbit of a system without excitation.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
-        Step lengths, tolerances and stopping conditions; its bounds are those of the first
-        parameter.
+        Step lengths, tolerances and stopping conditions; its bounds and second_bounds are those of
+        the parameters where ``bounds`` gives none.
     bounds : mapping, optional
         Range of each parameter by name, ``{"B": (0.0, 30.0)}``, at which the curve ends; it also
         scales the arclength (by default the branch does, or the values at the point).
@@ -67,6 +67,8 @@ def codim2_curve(
         constant.
     both : bool
         Go to both sides; the points then run from one end of the curve to the other.
+    keep : 'kind' or 'period'
+        What all points of the curve have in common.
 
     Returns
     -------
@@ -85,9 +87,14 @@ def codim2_curve(
     require_kind("codim2_curve", str, parameter=parameter)
     require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
     require_finite("codim2_curve", direction=direction)
-    if not isinstance(point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
+    if keep not in ("kind", "period"):
+        raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
+    if keep == "kind" and not isinstance(
+            point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
-                         f"'period doubling' or 'Neimark-Sacker'.")
+                         f"'period doubling' or 'Neimark-Sacker', or an orbit with keep='period'.")
+    if keep == "period" and not point.is_orbit:
+        raise InputError(f"{point.place} is no orbit, whose period keep='period' could keep.")
     names = (point.branch.parameter_name, parameter)
     field.index(parameter)
     if names[0] == parameter:
@@ -96,12 +103,16 @@ def codim2_curve(
     ranges = _ranges(names, bounds)
     chosen = options_of(options, ranges.get(names[0]))
     widths = {name: high - low for name, (low, high) in ranges.items() if np.isfinite(high - low)}
-    begin = orbit_curve if point.is_orbit else equilibrium_curve
-    problem, u, attributes = begin(field, point, parameter, widths, scales)
-    attributes |= {"parameters": list(names), "kind": str(point.kind),
+    problem: Problem
+    kind = "period" if keep == "period" else str(point.kind)
+    if point.is_orbit:
+        problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
+    else:
+        problem, u, attributes = equilibrium_curve(field, point, parameter, widths, scales)
+    attributes |= {"parameters": list(names), "kind": kind,
                    "state_names": list(field.state_names)}
-    return _followed(problem, u, names, chosen, ranges.get(parameter, (-np.inf, np.inf)), direction,
-                     both, attributes)
+    return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
+                     direction, both, attributes)
 
 
 def _ranges(
@@ -125,20 +136,6 @@ def _ranges(
     return found
 
 
-@dataclass(frozen=True)
-class _Border:
-    """A bound of the second parameter, as an event at which the curve ends."""
-
-    name: str
-    parameter: str
-    bound: float
-    rounding: float
-
-    def __call__(self, stored: Mapping[str, Any]) -> float:
-        distance = float(stored[self.parameter]) - self.bound
-        return 0.0 if abs(distance) <= self.rounding else distance
-
-
 def _followed(
     problem: Problem, u: Array, names: tuple[str, str], options: ContinuationOptions,
     second: tuple[float, float], direction: float, both: bool, attributes: dict[str, Any],
@@ -149,36 +146,13 @@ def _followed(
     if not second[0] - near <= value <= second[1] + near:
         raise InputError(f"The start lies at {names[1]} = {value:.6g}, outside its bounds, "
                          f"{second[0]:g} to {second[1]:g}.")
-    tangent = _tangent(problem, u, direction)
-    borders, turned, leaves = [], False, False
-    for side, bound in zip((-1.0, 1.0), second, strict=True):
-        if not np.isfinite(bound):
-            continue
-        on_it = abs(value - bound) <= near
-        borders.append(_Border(f"{names[1]} = {bound:g}", names[1], bound, near if on_it else 0.0))
-        if on_it and side * tangent[-2] > 0.0:
-            turned, leaves = both, not both
-            tangent = -tangent if turned else tangent
-        both = both and not on_it
+    u[-2] = min(max(value, second[0]), second[1])
     stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
     ends = ["Bogdanov-Takens"] if attributes["kind"] == "Hopf" else []
-    chosen = replace(options, points=1 if leaves else options.points,
-                     stop_at=(*stops, *(border.name for border in borders), *ends),
-                     events={**options.events, **{border.name: border for border in borders}})
-    branch = continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
-                             attributes=attributes)
-    if leaves:
-        return replace(branch, status=BranchStatus.BOUND)
-    branch = _without_borders(branch, {border.name for border in borders})
-    return branch.reversed() if turned else branch
-
-
-def _without_borders(branch: Branch, borders: set[str]) -> Branch:
-    """The curve whose ends on bounds of the second parameter are regular points."""
-    reached = branch.points[-1].kind in borders
-    points = tuple(replace(point, kind=None) if point.kind in borders else point
-                   for point in branch.points)
-    return replace(branch, points=points, status=BranchStatus.BOUND if reached else branch.status)
+    chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
+    return continue_branch(problem, u, chosen, name=names[0],
+                           tangent=_tangent(problem, u, direction), both=both,
+                           attributes=attributes)
 
 
 def _tangent(problem: Problem, u: Array, direction: float) -> Array:

@@ -1,20 +1,18 @@
 """Bifurcation diagrams of a study: the branches of its section ``[branch]``."""
 
-from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import observe
-from fecontact.core.errors import FecontactError
+from fecontact.bifurcation.tree import BranchTree, Task, grow, tasks_beyond
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 
 if TYPE_CHECKING:
@@ -32,30 +30,20 @@ _SCALE = 10.0
 _CHECKED_POINTS = 12
 
 
-@dataclass
-class Branches:
-    """Branches by name, in the order in which they were followed.
+@dataclass(kw_only=True)
+class Branches(BranchTree):
+    """Branches by name, with the range of the observed displacement.
 
     Attributes
     ----------
     contact_field : ContactField
         The system as a function of the parameter.
     observe : (point, component)
-        The displacement that is observed.
-    found : dict of name to Branch
-        With the range of the observed displacement; see
-        :func:`fecontact.bifurcation.observe`.
-    notes : list of str
-        Sentences on branches that could not be followed.
-    interrupted : bool
-        Whether Ctrl-C ended it; what was computed until then is there.
+        The displacement that is observed; see :func:`fecontact.bifurcation.observe`.
     """
 
     contact_field: ContactField
     observe: tuple[str | int, Literal["x", "y", "z"]]
-    found: dict[str, Branch] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    interrupted: bool = False
 
 
 def follow_branches(
@@ -85,30 +73,19 @@ def follow_branches(
         shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
     # Check the names before the long computation.
     basis.point_row(shown, wanted.component)
-    result = Branches(contact_field(system, {wanted.checked_parameter: wanted.first}),
-                      (shown, wanted.component))
-    tasks = deque(_first_tasks(result.contact_field, wanted, initial))
-    while tasks:
-        task = tasks.popleft()
-        try:
-            branch = task.follow(_settings(wanted, task.title, progress))
-        except KeyboardInterrupt:
-            if not result.found:
-                raise
-            result.interrupted = True
-            break
-        except FecontactError as error:
-            if not result.found:
-                raise
-            result.notes.append(f"The branch '{task.title}' was not followed: {error}")
-            continue
-        result.found[task.title] = observe(result.contact_field, branch, *result.observe)
-        warn_of_limits(_limits_exceeded(result.contact_field, branch), f"On '{task.title}'")
-        if branch.status is BranchStatus.INTERRUPTED:
-            result.interrupted = True
-            break
-        if task.generation < wanted.generations:
-            tasks.extend(_tasks_beyond(result.contact_field, branch, task, wanted))
+    field = contact_field(system, {wanted.checked_parameter: wanted.first})
+
+    def kept(title: str, branch: Branch) -> Branch:
+        warn_of_limits(_limits_exceeded(field, branch), f"On '{title}'")
+        return observe(field, branch, shown, wanted.component)
+
+    def beyond(task: Task, branch: Branch) -> Iterator[Task]:
+        return tasks_beyond(field, branch, task, wanted.switch, _method(wanted),
+                            f"{task.title}, " if task.generation else "")
+
+    result = Branches(contact_field=field, observe=(shown, wanted.component))
+    grow(result, _first_tasks(field, wanted, initial), beyond, wanted.generations,
+         lambda title: _settings(wanted, title, progress), kept)
     return result
 
 
@@ -130,14 +107,6 @@ def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
             return
 
 
-class _Task(NamedTuple):
-    """A branch to follow."""
-
-    title: str
-    generation: int
-    follow: Callable[[ContinuationOptions], Branch]
-
-
 def _settings(
     wanted: "BranchSettings", title: str, progress: Callable[[str, float], None] | None
 ) -> ContinuationOptions:
@@ -148,31 +117,20 @@ def _settings(
     return replace(options, progress=lambda points: progress(title, points / options.points))
 
 
-def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[_Task]:
+def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[Task]:
     low, high = wanted.checked_bounds
     if wanted.kind != "orbits":
-        yield _Task(_EQUILIBRIA, 0, lambda options: equilibrium_branch(
+        yield Task(_EQUILIBRIA, 0, lambda options: equilibrium_branch(
             field, parameter=wanted.checked_parameter, options=_fine(options),
             direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high))
     if wanted.kind != "equilibria":
-        yield _Task("orbits of the run", 0, partial(_orbits, field, wanted, initial))
+        yield Task("orbits of the run", 0, partial(_orbits, field, wanted, initial))
 
 
 def _fine(options: ContinuationOptions) -> ContinuationOptions:
     """Options with shorter steps for equilibria, which are cheap and drawn as curves."""
     return replace(options, step=min(options.step, _LONGEST_STEP),
                    largest_step=min(options.largest_step, _LONGEST_STEP))
-
-
-def _tasks_beyond(
-    field: ContactField, branch: Branch, task: _Task, wanted: "BranchSettings"
-) -> Iterator[_Task]:
-    for kind in wanted.switch:
-        points = branch.of_kind(kind)
-        for number, point in enumerate(points):
-            title = _title(task.title, kind, f" {number + 1}" if len(points) > 1 else "")
-            yield _Task(title, task.generation + 1,
-                        partial(_beyond, field, point, wanted))
 
 
 def _orbits(
@@ -199,24 +157,3 @@ def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
     if wanted.method == "shooting":
         return Shooting(segments=wanted.segments)
     return Collocation(intervals=wanted.intervals)
-
-
-def _beyond(
-    field: ContactField, point: BranchPoint, wanted: "BranchSettings", options: ContinuationOptions
-) -> Branch:
-    """The branch that begins at a special point."""
-    from fecontact.bifurcation.orbits.branches import orbit_branch
-
-    if point.kind == "Hopf":
-        return orbit_branch(field, point, method=_method(wanted), options=options)
-    if point.is_orbit:
-        return orbit_branch(field, point, options=options)
-    return equilibrium_branch(field, point, options=options)
-
-
-def _title(name: str, kind: str, number: str) -> str:
-    if kind == "Hopf":
-        return f"orbits{number}"
-    if kind == "period doubling":
-        return f"{name}, doubled{number}"
-    return f"{name}, crossing{number}"

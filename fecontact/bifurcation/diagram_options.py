@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
 # Limits of the mesh intervals or segments and of the runs beneath a diagram, against typing errors.
 _MOST_PIECES, _MOST_RUNS = 10_000, 100_000
-_SWITCHES = ("Hopf", "period doubling", "branch point")
+# Kinds of special points at which other branches begin.
+SWITCHES = ("Hopf", "period doubling", "branch point")
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,9 @@ class BranchSettings:
             raise InputError(f"BranchSettings: step = {self.step:g} must not be above largest_step "
                              f"= {self.largest_step:g}.")
         for kind in self.switch:
-            if kind not in _SWITCHES:
+            if kind not in SWITCHES:
                 raise InputError(f"BranchSettings: switch = '{kind}' is not known; choose from "
-                                 f"{choices(_SWITCHES)}.")
+                                 f"{choices(SWITCHES)}.")
         if self.start is not None:
             require_finite("BranchSettings", start=self.start)
         for name, most in (("intervals", _MOST_PIECES), ("segments", _MOST_PIECES),

@@ -7,7 +7,7 @@ import pytest
 
 from fecontact import InputError, Study, simulate
 from fecontact.bifurcation import BranchSettings
-from fecontact.bifurcation import diagram as module
+from fecontact.bifurcation import tree as module
 from fecontact.bifurcation.diagram import follow_branches
 from fecontact.cli import execute
 from fecontact.io import read_branch, read_branches, write_branches

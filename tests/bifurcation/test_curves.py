@@ -187,6 +187,38 @@ def test_a_start_on_a_bound_of_the_second_parameter():
         codim2_curve(field, start, "c", bounds={"c": (-2.0, 0.0)})
 
 
+@pytest.mark.parametrize("largest", [0.05, 0.3, 1.0])
+def test_a_curve_stays_within_both_ranges(largest):
+    """With any steps: the parabola of folds leaves the box at b = 1, not at c = 2."""
+    field = vector_field(takens, {"b": -1.0, "c": -1.0}, 2)
+    start = equilibrium_branch(field, [-0.6, 0.0], "b", bounds=(-2.0, 2.0)).of_kind("fold")[0]
+    options = ContinuationOptions(step=0.05, largest_step=largest, second_bounds=(-1.5, 3.0))
+    curve = codim2_curve(field, start, "c", bounds={"b": (-2.0, 1.0)}, options=options)
+    assert curve.status is BranchStatus.BOUND
+    ends = sorted((point.values["c"], point.values["b"])
+                  for point in (curve.points[0], curve.points[-1]))
+    assert np.array(ends) == pytest.approx(np.array([[-1.5, 0.5625], [2.0, 1.0]]), rel=1e-10)
+    assert curve.column("b").max() < 1.0 + 1e-12
+    assert curve.column("c").min() > -1.5 - 1e-12
+
+
+@pytest.mark.parametrize(("most", "regular"), [(9, 9), (20, 20), (400, None)])
+def test_points_to_both_sides_count_together(most, regular):
+    field = vector_field(takens, {"b": -1.0, "c": -1.0}, 2)
+    start = equilibrium_branch(field, [-0.6, 0.0], "b", bounds=(-2.0, 2.0)).of_kind("fold")[0]
+    options = ContinuationOptions(step=0.05, largest_step=0.05, points=most)
+    curve = codim2_curve(field, start, "c", bounds=BOX, options=options)
+    found = sum(point.kind is None for point in curve)
+    c = curve.column("c")
+    if regular is None:
+        assert c[[0, -1]] in (pytest.approx([-2.0, 2.0]), pytest.approx([2.0, -2.0]))
+        assert found < 400
+    else:
+        assert found == regular
+        assert c.min() < c.max() - 0.1
+        assert c.min() < -1.0 < c.max()
+
+
 def test_kind_errors():
     field = two_mass_field(0.5)
     branch = equilibrium_branch(field, parameter="B", bounds=(0.0, 12.0))

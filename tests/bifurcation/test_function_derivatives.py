@@ -227,3 +227,21 @@ def test_normal_form_and_multipliers_with_powers():
                for j, width in enumerate(np.diff(mesh)))
     expected = np.exp(mean * last.values["period"])
     assert np.prod(last.values["multipliers"]).real == pytest.approx(expected, rel=1e-7)
+
+
+def saddle(t, x, p, out):
+    # At rest at (1, 0) for m = -1, where the terms cancel; df/dc = y.
+    out[0] = x[1]
+    out[1] = p[0] + p[1] * x[1] + x[0] * x[0] + x[0] * x[1]
+
+
+def test_terms_that_cancel_do_not_refute_the_complex_step():
+    """Near the rest point the rates do not change by more than their rounding."""
+    field = vector_field(saddle, {"m": -1.0, "c": 0.2}, 2)
+    assert field.differentiation == "complex"
+    k = np.arange(4000.0)
+    away = 10.0 ** (-16.0 + 13.0 * np.modf(0.61803 * k)[0])
+    x = np.stack([1.0 + away * np.sin(k), away * np.cos(1.3 * k)], axis=1)
+    for c in (-0.3, 0.2, 0.7434):
+        P = field.derivatives(np.zeros(len(k)), x, np.array([-1.0, c]), (0, 1))[2]
+        assert P[:, 1, 1] == pytest.approx(x[:, 1], rel=1e-12, abs=0.0)

@@ -136,6 +136,10 @@ def test_orbits_at_a_value(field, kept):
     assert kept.at(field, kept.points[3].parameter) is kept.points[3]
     with pytest.raises(InputError, match=r"has 0 solutions at 0\.7"):
         kept.at(field, 0.7)
+    several = kept.at(field, [0.09, 0.16, 0.36])
+    assert [point.parameter for point in several] == pytest.approx([0.09, 0.16, 0.36], rel=1e-12)
+    assert [radius(point) for point in several] == pytest.approx([0.3, 0.4, 0.6], rel=1e-7)
+    assert kept.at(field, np.array([])) == ()
 
 
 def test_an_orbit_is_followed_over_another_parameter(field, kept):

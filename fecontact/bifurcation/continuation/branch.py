@@ -1,6 +1,6 @@
 """Branches: solutions in their order over a parameter."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal, overload
@@ -123,15 +123,23 @@ class Branch(Summarised):
             raise InputError(f"The branch stores no value {name!r}; it has: {choices(known)}.")
         return np.array([point.values[name] for point in self.points])
 
-    def at(self, field: VectorField, value: float, which: int = 0) -> BranchPoint:
+    @overload
+    def at(self, field: VectorField, value: float, which: int = 0) -> BranchPoint: ...
+    @overload
+    def at(
+        self, field: VectorField, value: Sequence[float] | Array, which: int = 0
+    ) -> tuple[BranchPoint, ...]: ...
+    def at(
+        self, field: VectorField, value: float | Sequence[float] | Array, which: int = 0
+    ) -> BranchPoint | tuple[BranchPoint, ...]:
         """The solution at a value of the parameter, solved from the point of the branch beside it.
 
         Parameters
         ----------
         field : VectorField
             That of the branch.
-        value : float
-            The value.
+        value : float or (k,) sequence
+            The value; several give a tuple with the solution at each.
         which : int
             Which of the solutions with this value, counted along the branch from 0; -1 is the last.
 
@@ -144,6 +152,8 @@ class Branch(Summarised):
             If no solution is found there.
         """
         require_field(field)
+        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+            return tuple(self.at(field, float(one), which) for one in value)
         require_finite("Branch.at", value=value)
         passed = self._passed(float(value))
         if not (isinstance(which, int | np.integer) and -len(passed) <= which < len(passed)):

@@ -1,5 +1,6 @@
 """Continuation of a whole branch, to one side or to both."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,8 +33,8 @@ def continue_branch(
     name : str
         Name of the parameter.
     both : bool
-        Follow it to both sides; the points then go from one end to the other. From a start on a
-        bound only inwards.
+        Follow it to both sides; the points then go from one end to the other, and the options
+        limit their number on both sides together. From a start on a bound only inwards.
     attributes : dict, optional
         Kept with the branch.
 
@@ -46,10 +47,28 @@ def continue_branch(
     points, end = _collected(problem, u, options, tangent, direction, name)
     if both and end.status not in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
         start = start_of(problem, u, options, tangent, direction)
-        others, _ = _collected(problem, u, options, -start.tangent, direction, name)
+        # The start counts once.
+        left = options.points + 1 - min(regular(points), options.points // 2 + 1)
+        others, _ = _collected(problem, u, replace(options, points=left), -start.tangent, direction,
+                               name)
+        points, whole = shortened(points, options.points + 1 - regular(others))
+        end = end if whole else End(BranchStatus.POINTS)
         turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
         points = [*turned, *points]
     return Branch(name, tuple(points), end.status, end.message, attributes or {})
+
+
+def regular(points: Iterable[BranchPoint]) -> int:
+    """Number of points that are not special."""
+    return sum(point.kind is None for point in points)
+
+
+def shortened(points: Sequence[BranchPoint], most: int) -> tuple[list[BranchPoint], bool]:
+    """The first points of a side, so many regular ones, and whether these are all."""
+    places = [place for place, point in enumerate(points) if point.kind is None]
+    if len(places) <= most:
+        return list(points), True
+    return list(points[: places[most - 1] + 1]), False
 
 
 def _collected(

@@ -19,6 +19,10 @@ class BranchStatus(Enum):
 
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
+    HOPF = ("The orbits shrink to an equilibrium: the branch ends at a Hopf point, a curve of folds "
+            "at a Bautin point.")
+    HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
+                  "they stay ever longer near a saddle.")
     STOPPED = "The branch reached a point at which it was to stop."
     CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
               "again.")
@@ -83,12 +87,15 @@ class Problem(Protocol):
     confirms : frozenset of str
         Test functions that jump a little where the mesh is renewed, and whose zeros
         :meth:`examine` confirms.
+    ends : mapping
+        Test functions that end the branch where they become negative, and the status there.
     """
 
     keeps_matrix: ClassVar[bool] = False
     precision: float = 1e-12
     event_precision: ClassVar[float] = 1e-12
     confirms: ClassVar[frozenset[str]] = frozenset()
+    ends: ClassVar[Mapping[str, BranchStatus]] = {}
 
     def linearise(self, u: Array) -> Linearisation:
         """Linearise the equations at u.
@@ -123,6 +130,10 @@ class Problem(Protocol):
     def tests(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, float]:
         """Test functions by kind; special points are their zeros. Folds need none."""
         return {}
+
+    def ended(self, u: Array, linearisation: Linearisation, tangent: Array) -> BranchStatus | None:
+        """Why the branch ends at a regular point; None where it goes on."""
+        return None
 
     def examine(
         self, kind: str, u: Array, linearisation: Linearisation, tangent: Array
@@ -185,9 +196,12 @@ class ContinuationOptions:
     step, smallest_step, largest_step : float
         First step, and limits of the steps.
     points : int
-        Number of regular points after which the branch ends.
+        Number of regular points after which the branch ends. To both sides they count together; if
+        they do not suffice, each gets half of them, or what the other one leaves.
     bounds : tuple
         Least and largest value of the parameter; the last point lies on the bound.
+    second_bounds : tuple
+        The same for the second parameter of a curve over two.
     tolerance : float
         Newton's method ends with a step of this size relative to 1 + |u|; the remaining error is of
         the order of its square. Special points and events are located to 1e-10.
@@ -196,7 +210,8 @@ class ContinuationOptions:
     largest_turn : float
         Largest angle between tangents of neighbouring points [rad].
     locate : bool
-        Whether to locate special points, besides the events, and check changes of stability.
+        Whether to locate special points, besides the events, check changes of stability, and end
+        at Hopf points and homoclinic orbits.
     stop_at : sequence of str
         Kinds of special points, or names of events, at which the branch ends.
     events : mapping
@@ -212,6 +227,7 @@ class ContinuationOptions:
     largest_step: float = 0.05
     points: int = 400
     bounds: tuple[float, float] = (-np.inf, np.inf)
+    second_bounds: tuple[float, float] = (-np.inf, np.inf)
     tolerance: float = 1e-7
     iterations: int = 7
     largest_turn: float = 0.6
@@ -229,14 +245,22 @@ class ContinuationOptions:
             raise InputError(f"ContinuationOptions: step = {self.step:g} must lie between "
                              f"smallest_step = {self.smallest_step:g} and "
                              f"largest_step = {self.largest_step:g}.")
-        try:
-            low, high = self.bounds
-            fine = float(low) < float(high)
-        except (TypeError, ValueError):
-            fine = False
-        if not fine:
-            raise InputError(f"ContinuationOptions: bounds = {self.bounds!r} must be two values of "
-                             f"the parameter, the smaller one first.")
+        for name in ("bounds", "second_bounds"):
+            given = getattr(self, name)
+            try:
+                low, high = given
+                fine = float(low) < float(high)
+            except (TypeError, ValueError):
+                fine = False
+            if not fine:
+                raise InputError(f"ContinuationOptions: {name} = {given!r} must be two values of "
+                                 f"the parameter, the smaller one first.")
+
+    @property
+    def box(self) -> tuple[tuple[int, float, float], ...]:
+        """Bounded unknowns: the place of each in u, its least and its largest value."""
+        return tuple((place, *bounds) for place, bounds in
+                     ((-1, self.bounds), (-2, self.second_bounds)) if np.isfinite(bounds).any())
 
 
 def options_of(

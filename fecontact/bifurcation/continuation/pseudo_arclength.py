@@ -6,7 +6,7 @@ is the parameter.
 """
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -117,6 +117,10 @@ def continuation(
         last = here
         for there, special in reached:
             for located in special:
+                ended = problem.ends.get(str(located.kind))
+                if ended is not None:
+                    yield replace(located, kind=None)
+                    return End(ended)
                 yield located
                 if located.kind in stops:
                     return End(BranchStatus.STOPPED)
@@ -128,6 +132,9 @@ def continuation(
             yield BranchPoint(there.u, there.tangent, there.values)
             count += 1
             last, here = here, there
+        ended = problem.ended(here.u, here.linearisation, here.tangent) if options.locate else None
+        if ended is not None:
+            return End(ended)
         before = last
         # An unresolved change of stability has halved the step; restore its length behind it.
         unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
@@ -160,11 +167,13 @@ def inside(value: float, options: ContinuationOptions) -> float:
 
 
 def _leaves(start: Solution, options: ContinuationOptions) -> bool:
-    """Whether the branch starts on a bound of the parameter and heads outwards."""
-    slope, value = float(start.tangent[-1]), float(start.u[-1])
-    bound = options.bounds[1] if slope > 0.0 else options.bounds[0]
-    ahead = np.copysign(1.0, slope) * (bound - value)
-    return slope != 0.0 and bool(ahead <= _ON_BOUND * max(abs(value), abs(slope)))
+    """Whether the branch starts on a bound of a parameter and heads outwards."""
+    for place, low, high in options.box:
+        slope, value = float(start.tangent[place]), float(start.u[place])
+        ahead = high - value if slope > 0.0 else value - low
+        if slope != 0.0 and ahead <= _ON_BOUND * max(abs(value), abs(slope)):
+            return True
+    return False
 
 
 def start_of(
@@ -203,10 +212,13 @@ def _step(
 
 
 def _room(here: Solution, options: ContinuationOptions) -> float:
-    """Length along the tangent to the bound of the parameter ahead."""
-    slope = float(here.tangent[-1])
-    bound = options.bounds[1] if slope > 0.0 else options.bounds[0]
-    return (bound - float(here.u[-1])) / slope if slope != 0.0 else np.inf
+    """Length along the tangent to the nearest bound of a parameter ahead."""
+    room = np.inf
+    for place, low, high in options.box:
+        slope = float(here.tangent[place])
+        if slope != 0.0:
+            room = min(room, ((high if slope > 0.0 else low) - float(here.u[place])) / slope)
+    return room
 
 
 def _believable(

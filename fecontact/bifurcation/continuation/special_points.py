@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from fecontact.bifurcation.continuation.crossings import counted, with_count
 from fecontact.bifurcation.continuation.newton import Solution, norm
 from fecontact.bifurcation.continuation.points import UNRESOLVED, BranchPoint, special_point
@@ -17,6 +15,8 @@ _OFF_CUBIC, _ROUNDING = 0.2, 1e-7
 _JUMP = 1e-3
 # Part of a step to which a bound of the parameter is located.
 _BOUND = 1e-12
+# Part of a step to which the end of a branch is located.
+_END = 1e-9
 # Distance within which a fold belongs to a branch point, in the precision of either.
 _BESIDE = 30.0
 
@@ -24,8 +24,9 @@ _BESIDE = 30.0
 def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPoint]] | None:
     """The end of a step, and the special points before it, in order.
 
-    The step ends on a bound of the parameter where it passes one; the last special point then lies
-    there and has no kind.
+    The step ends on a bound of a parameter where it passes one; the last special point then lies
+    there and has no kind. It also ends where a test function ends the branch; the last special
+    point then has its name.
 
     Parameters
     ----------
@@ -42,6 +43,13 @@ def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPo
     (Solution, list of BranchPoint) or None
         None where the step is refused, or a bound is passed that no solution on the step meets.
     """
+    ended = next((name for name in step.problem.ends if step.here.tests.get(name, -1.0) > 0.0
+                  >= step.there.tests.get(name, 1.0)), None)
+    if ended is not None:
+        zero = step.zero(_test_value(ended), _END)
+        if zero is None:
+            return None
+        step = replace(step, there=zero[0])
     found = _zeros(step, strict)
     met = _bound_met(step)
     if found is None or met is None:
@@ -59,8 +67,8 @@ def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPo
         else:
             end = with_count(end, count)
     found.sort(key=lambda point: step.along(point.u))
-    if on_bound:
-        found.append(BranchPoint(end.u, end.tangent, end.values))
+    if on_bound or ended is not None:
+        found.append(BranchPoint(end.u, end.tangent, end.values, None if on_bound else ended))
     return end, found
 
 
@@ -71,7 +79,7 @@ def _zeros(step: Step, strict: bool) -> list[BranchPoint] | None:
                                       (here.tests, there.tests)))
     found = []
     for name in _changed(here, there):
-        if name in rounding:
+        if name in rounding or name in problem.ends:
             continue
         event = name in step.options.events
         zero = step.zero(_test_value(name), problem.event_precision if event else problem.precision,
@@ -103,14 +111,18 @@ def _changed(here: Solution, there: Solution) -> list[str]:
 def _bound_met(step: Step) -> tuple[Solution, bool] | None:
     """The end of a step, and whether it lies on a bound; None if the bound is not met."""
     end, on_bound = step.there, False
-    for sign, bound in zip((-1.0, 1.0), step.options.bounds, strict=True):
-        before, after = (sign * (float(at.u[-1]) - bound) for at in (step.here, step.there))
+    for sign, place, bound in ((sign, place, bound) for place, *bounds in step.options.box
+                               for sign, bound in zip((-1.0, 1.0), bounds, strict=True)):
+        before, after = (sign * (float(at.u[place]) - bound) for at in (step.here, end))
         if after < 0.0 or before > 0.0 or before == after:
             continue
-        zero = None if before == 0.0 else step.zero(_distance_to(bound), _BOUND)
+        zero = None if before == 0.0 else replace(step, there=end).zero(
+            _distance_to(place, bound), _BOUND)
         if zero is None:
             return None
-        end, on_bound = replace(zero[0], u=np.append(zero[0].u[:-1], bound)), True
+        u = zero[0].u.copy()
+        u[place] = bound
+        end, on_bound = replace(zero[0], u=u), True
     return end, on_bound
 
 
@@ -156,5 +168,5 @@ def _test_value(name: str) -> Callable[[Solution], float]:
     return lambda at: at.tests[name]
 
 
-def _distance_to(bound: float) -> Callable[[Solution], float]:
-    return lambda at: float(at.u[-1]) - bound
+def _distance_to(place: int, bound: float) -> Callable[[Solution], float]:
+    return lambda at: float(at.u[place]) - bound

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.follow import continue_branch, regular, shortened
 from fecontact.bifurcation.continuation.points import BranchPoint, CrossingPoint
 from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
     ContinuationOptions,
     options_of,
     sizes_of,
@@ -116,25 +117,28 @@ def _crossing(
     """The other branch through a branch point."""
     weights = problem.weights()
     tangent = tangent / np.sqrt(weights * tangent @ tangent)
-    points: list[BranchPoint] = []
-    ends = []
-    for side in (-1.0, 1.0) if both else (1.0,):
+    points: list[BranchPoint] = [replace(point, tangent=tangent)]
+    branch: Branch | None = None
+    left, whole = options.points, True
+    for side in (1.0, -1.0) if both else (1.0,):
         # At the branch point the system is singular; correct the first step away from it.
         first = point.u + side * options.step * tangent
         if not options.bounds[0] <= first[-1] <= options.bounds[1]:
             continue
-        branch = continue_branch(problem, first, options, name=parameter, tangent=side * tangent,
-                                 attributes=attributes)
-        ends.append(branch)
+        found = continue_branch(problem, first, replace(options, points=left), name=parameter,
+                                tangent=side * tangent, attributes=attributes)
         if side < 0.0:
-            points = [replace(each, tangent=-each.tangent) for each in branch.points[::-1]]
-            points.append(replace(point, tangent=tangent))
+            points, whole = shortened(points, options.points - regular(found))
+            points = [*found.reversed().points, *points]
         else:
-            points = [*(points or [replace(point, tangent=tangent)]), *branch.points]
-    if not ends:
+            points += found.points
+            left -= min(regular(found), left // 2)
+        branch = branch or found
+    if branch is None:
         raise InputError(f"The other branch leaves the bounds of {parameter} at once, at "
                          f"{point.parameter:.6g}; widen them.")
-    return replace(ends[-1], points=tuple(points))
+    return replace(branch, points=tuple(points),
+                   status=branch.status if whole else BranchStatus.POINTS)
 
 
 def _start(field: VectorField, start: Equilibrium | ArrayLike | None) -> Equilibrium:

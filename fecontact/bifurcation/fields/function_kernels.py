@@ -161,7 +161,10 @@ def _roughness(function, place, moved, at, size, room):
     """Fill ``room.orders[0]`` with how much the rates jump beside x.
 
     That is their rounding, cancellation included. It shows in second differences over steps, 1e-6
-    and less, over which the function is straight.
+    and less, over which the function is straight. Rates that hardly depend on the value, and are
+    rounded to something large that cancels, change by whole units of this rounding or not at all:
+    where short steps change nothing, the least change is that unit. Where none changes anything,
+    states and parameters tell what may cancel.
     """
     t, y, q = place.t, place.y, place.q
     above, below, orders = room.above, room.below, room.orders
@@ -183,6 +186,25 @@ def _roughness(function, place, moved, at, size, room):
             if jump > orders[0, i]:
                 orders[0, i] = jump
         h *= -0.4
+    for i in range(len(above)):
+        orders[1, i], orders[2, i] = 1.0, np.inf
+    part = _WIDEST * size
+    while part > 1e-13 * size:
+        moved[at] = value + part
+        function(t, y, q, above)
+        moved[at] = value - part
+        function(t, y, q, below)
+        for i in range(len(above)):
+            change = abs(above[i] - below[i])
+            orders[1, i] = min(orders[1, i], change)
+            if 0.0 < change < orders[2, i]:
+                orders[2, i] = change
+        part *= 0.25
+    hidden = max(np.abs(y).max(), np.abs(q).max()) if len(q) else np.abs(y).max()
+    for i in range(len(above)):
+        if orders[1, i] == 0.0:
+            unit = orders[2, i] if orders[2, i] < np.inf else 64.0 * _EPS * hidden
+            orders[0, i] = max(orders[0, i], unit)
     moved[at] = value
 
 

@@ -6,18 +6,20 @@ An orbit by collocation with two free parameters, and a test function at zero.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.points import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
+from fecontact.bifurcation.orbits.ends import VANISHED_ON_CURVES, VANISHING, vanishing
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 
 _TEST_STEP = 1e-5  # step of the differences of the test function, in the inner product
@@ -31,7 +33,8 @@ class OrbitCurve(Problem):
 
     The test function is the product of mu + 1 over the multipliers at period doublings, of
     mu_i mu_k - 1 over pairs at torus bifurcations. At folds it is the component of the first
-    parameter in the tangent of the branch at fixed second parameter.
+    parameter in the tangent of the branch at fixed second parameter. For orbits of one period it is
+    the difference of their period from that, relative to it.
 
     The unknowns are those of the orbit, ``u = [nodes, T if it is unknown, second, first]``.
 
@@ -40,14 +43,19 @@ class OrbitCurve(Problem):
     orbit : CollocationProblem
         With a second free parameter.
     kind : str
-        'fold', 'period doubling' or 'Neimark-Sacker'.
+        'fold', 'period doubling', 'Neimark-Sacker' or 'period'.
     row : (n,) array
         Border row that normalises the tangent, for folds.
+    period : float
+        The period [s] of all orbits, for the kind 'period'.
     """
 
     orbit: CollocationProblem
     kind: str
     row: Array
+    period: float = 1.0
+
+    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
     def linearise(self, u: Array) -> "CurveLinearised":
         """The equations about u."""
@@ -65,6 +73,14 @@ class OrbitCurve(Problem):
             result = replace(result, row=orbit.weights() * result.rest(moved))
         return result, moved, turned
 
+    def met_again(
+        self, origin: Problem, u: Array, tangent: Array, like: Array, heading: Array, within: float,
+    ) -> Array | None:
+        """That of the orbits."""
+        if not isinstance(origin, OrbitCurve):
+            return None
+        return self.orbit.met_again(origin.orbit, u, tangent, like, heading, within)
+
     def rest(self, u: Array) -> Array:
         """Tangent (n,) of the branch of orbits at fixed second parameter."""
         linearised = self.orbit.linearise(u)
@@ -75,6 +91,8 @@ class OrbitCurve(Problem):
 
     def test(self, linearised: CollocationLinearisation) -> float:
         """The test function."""
+        if self.kind == "period":
+            return linearised.period / self.period - 1.0
         if self.kind != "fold":
             doubling, _, torus = linearised.floquet.products
             return doubling if self.kind == "period doubling" else torus
@@ -92,13 +110,21 @@ class OrbitCurve(Problem):
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Test functions of points of codimension two."""
+        """Test functions of points of codimension two, and of orbits that shrink to rest."""
+        found = self._codimension_two(u, linearisation)
+        if self.orbit.autonomous:
+            found[VANISHING] = vanishing(self.orbit, u, VANISHED_ON_CURVES)
+        return found
+
+    def _codimension_two(self, u: Array, linearisation: Any) -> dict[str, float]:
         if self.kind == "fold":
             along = self.rest(u)
             return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}
         if self.kind == "period doubling":
             expansion = Expansion(self.orbit, u, linearisation.orbit)
             return {"generalised period doubling": expansion.doubling(_NORMAL_FORM_STEP)}
+        if self.kind == "period":
+            return {}
         mean = _critical_mean(linearisation.orbit.floquet.others)
         return {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
                 for order in (1, 2, 3, 4)}
@@ -165,14 +191,16 @@ class CurveLinearised:
 
 def orbit_curve(
     field: VectorField, point: BranchPoint, second: str, widths: Mapping[str, float],
-    scales: ArrayLike | None,
+    scales: ArrayLike | None, kind: str,
 ) -> tuple[OrbitCurve, Array, dict[str, Any]]:
-    """Problem, unknowns and attributes of the curve through a special point of orbits.
+    """Problem, unknowns and attributes of the curve of some kind through a point of orbits.
 
     Parameters
     ----------
     field, point, second, scales
         As for :func:`fecontact.bifurcation.codim2_curve`.
+    kind : str
+        'fold', 'period doubling', 'Neimark-Sacker' or 'period'.
     widths : mapping
         Width of the diagram in each parameter by name; by default that of the branch for the first
         parameter and the magnitude of the second one.
@@ -180,7 +208,8 @@ def orbit_curve(
     Raises
     ------
     InputError
-        If the point is not on a branch of orbits by collocation, or belongs to another field.
+        If the point is not on a branch of orbits by collocation, belongs to another field, or its
+        period, which is to be kept, is that of the excitation.
     """
     problem, u, _ = restored(field, point)
     problem = rescaled(problem, scales, widths.get(point.branch.parameter_name))
@@ -189,8 +218,11 @@ def orbit_curve(
     width = widths.get(second, abs(value) or 1.0)
     orbit = replace(problem, second=index, scales=np.insert(problem.scales, -1, width))
     start = np.insert(u, -1, value)
-    curve = OrbitCurve(orbit, str(point.kind), np.zeros(len(start)))
-    if point.kind == "fold":
+    if kind == "period" and not orbit.autonomous:
+        raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
+                         f"cannot keep; vary the frequency of the excitation instead.")
+    curve = OrbitCurve(orbit, kind, np.zeros(len(start)), problem.period(u))
+    if kind == "fold":
         curve = replace(curve, row=orbit.weights() * curve.rest(start))
     return curve, start, {**point.branch.attributes, "scales": orbit.scales}
 

@@ -1,13 +1,15 @@
 """Continuation problem of periodic orbits by orthogonal collocation."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
-from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
+from fecontact.bifurcation.orbits.ends import VANISHING, is_homoclinic, vanishing
 from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.mesh import (
     carry_over,
@@ -54,6 +56,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
 
     keeps_matrix: ClassVar[bool] = True
     confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
+    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
     def linearise(self, u: Array) -> CollocationLinearisation:
         """Residual and linearisation at u, each computed on demand."""
@@ -76,6 +79,17 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         """Range of the number of unstable multipliers, given their errors."""
         found: tuple[int, int] = linearisation.floquet.unstable_range
         return found
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Test functions of the multipliers, and of orbits that shrink to an equilibrium."""
+        found = super().tests(u, linearisation, tangent)
+        return found | {VANISHING: vanishing(self, u)} if self.autonomous else found
+
+    def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
+        """At orbits that are homoclinic to a saddle, as far as numbers tell."""
+        if self.autonomous and is_homoclinic(self, u, linearisation, tangent):
+            return BranchStatus.HOMOCLINIC
+        return None
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array

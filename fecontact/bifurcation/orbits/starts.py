@@ -289,9 +289,14 @@ def crossing(problem: CollocationProblem, u: Array, incoming: Array) -> Start:
     """
     row = problem.weights() * incoming
     bordered = problem.linearise(u).bordered(row)
-    equations = bordered.matrix[:-1]
-    _, _, vectors = np.linalg.svd(equations / np.abs(equations).max(axis=1)[:, None])
-    first, second = (bordered.expand(vector) for vector in vectors[-2:])
+    d = problem.field.dimension
+    # In the scales of the states, as one of these equations may be zero but for rounding.
+    sizes = np.concatenate([problem.scales[:d], problem.scales[-problem.common :]])
+    equations = bordered.matrix[:-1] * sizes
+    equations[:d] /= sizes[:d, None]
+    equations[d:] /= np.abs(equations[d:]).max(axis=1)[:, None]
+    _, _, vectors = np.linalg.svd(equations)
+    first, second = (bordered.expand(sizes * vector) for vector in vectors[-2:])
     other = (row @ second) * first - (row @ first) * second
     return replace(problem, reference=problem.nodes(u).copy()), u, other
 

@@ -1,0 +1,250 @@
+"""Trees of branches: those that begin at the special points of others, to a stated depth."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    options_of,
+)
+from fecontact.bifurcation.diagram_options import SWITCHES
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import FecontactError, InputError, choices
+from fecontact.core.types import Array
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.orbits.branches import Method
+
+# Distance within which two points are the same: in widths of the diagram, ranges of the states, and
+# parts of a period.
+_SAME = 1e-4
+
+
+@dataclass
+class BranchTree:
+    """Branches by name, in the order in which they were followed.
+
+    Attributes
+    ----------
+    found : dict of name to Branch
+        The branches.
+    notes : list of str
+        Sentences on branches that could not be followed.
+    interrupted : bool
+        Whether Ctrl-C ended it; what was computed until then is there.
+    """
+
+    found: dict[str, Branch] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    interrupted: bool = False
+
+
+def _followed(options: ContinuationOptions) -> Branch:
+    raise AssertionError("The branch is there already.")
+
+
+class Task(NamedTuple):
+    """A branch to follow: its name, generation, and the point from which it begins."""
+
+    title: str
+    generation: int
+    follow: Callable[[ContinuationOptions], Branch] = _followed
+    start: BranchPoint | None = None
+
+
+def branch_tree(
+    field: VectorField, first: Branch | Sequence[Branch] | Mapping[str, Branch], *,
+    depth: int = 1, switch: Iterable[str] = SWITCHES, method: "Method | None" = None,
+    options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
+) -> BranchTree:
+    """Follow the branches that begin on some, those that begin on these, and so on.
+
+    At Hopf points the orbits that are born there, at period doublings those of twice the period, at
+    branch points the other branch, of orbits both of its halves. A branch that a special point
+    shares with one that is known already, at its other end or where both cross, is not followed
+    again.
+
+    Parameters
+    ----------
+    field : VectorField
+        That of the branches.
+    first : Branch, sequence or mapping of name to Branch
+        Branches of equilibria or orbits over one parameter, also read from a file.
+    depth : int
+        How often to go over from a branch to those that begin on it.
+    switch : sequence of str
+        Kinds of special points at which to go over: 'Hopf', 'period doubling', 'branch point'.
+    method : Collocation, Shooting or HarmonicBalance, optional
+        Of the orbits born at Hopf points, by default collocation; others keep theirs.
+    options : ContinuationOptions, optional
+        Steps, tolerances and stopping conditions of each branch.
+    bounds : (float, float), optional
+        Range of the parameter, by default that of the first branches.
+
+    Returns
+    -------
+    BranchTree
+        With the first branches; 'orbits 2' is born at the second Hopf point, 'orbits 2, doubled'
+        goes on from there.
+
+    Raises
+    ------
+    InputError
+        If the branches have different parameters, or a kind of point is unknown.
+    """
+    require_field(field)
+    roots = _named(first)
+    kinds = tuple([switch] if isinstance(switch, str) else switch)
+    for kind in kinds:
+        if kind not in SWITCHES:
+            raise InputError(f"branch_tree: switch = {kind!r} is not known; choose from "
+                             f"{choices(SWITCHES)}.")
+    if not (isinstance(depth, int | np.integer) and depth >= 0):
+        raise InputError(f"branch_tree: depth = {depth!r} must be a whole number from 0 on.")
+    if bounds is None and (options is None or not np.isfinite(options.bounds).any()):
+        ends = np.concatenate([branch.parameter for branch in roots.values()])
+        bounds = (float(ends.min()), float(ends.max()))
+    chosen = options_of(options, bounds)
+
+    def beyond(task: Task, branch: Branch) -> Iterator[Task]:
+        return tasks_beyond(field, branch, task, kinds, method,
+                            "" if len(roots) == 1 and not task.generation else f"{task.title}, ")
+
+    tasks = [task for name, branch in roots.items() if depth
+             for task in beyond(Task(name, 0), branch)]
+    return grow(BranchTree(roots), tasks, beyond, depth, lambda _: chosen,
+                lambda _, branch: branch)
+
+
+def _named(first: Branch | Sequence[Branch] | Mapping[str, Branch]) -> dict[str, Branch]:
+    """The first branches by name, over one parameter."""
+    if isinstance(first, Branch):
+        first = [first]
+    if not isinstance(first, Mapping):
+        first = {f"branch {number + 1}" if len(first) > 1 else "first": branch
+                 for number, branch in enumerate(first)}
+    for branch in first.values():
+        require_kind("branch_tree", Branch, first=branch)
+    names = {branch.parameter_names for branch in first.values() if len(branch)}
+    if len(names) != 1 or len(next(iter(names))) != 1:
+        raise InputError("branch_tree: first must hold branches over the same single parameter, "
+                         "each with points.")
+    return dict(first)
+
+
+def grow(
+    result: BranchTree, tasks: Iterable[Task], beyond: Callable[[Task, Branch], Iterable[Task]],
+    depth: int, options: Callable[[str], ContinuationOptions],
+    kept: Callable[[str, Branch], Branch],
+) -> BranchTree:
+    """Follow the tasks and those beyond them, generation by generation, into the result.
+
+    ``options(title)`` says how a branch is followed, ``kept(title, branch)`` what is kept of it. An
+    error of the first branch is raised; those of others become notes.
+    """
+    waiting = deque(tasks)
+    while waiting:
+        task = waiting.popleft()
+        if task.start is not None and _known(task.start, result.found.values()):
+            continue
+        try:
+            branch = task.follow(options(task.title))
+        except KeyboardInterrupt:
+            if not result.found:
+                raise
+            result.interrupted = True
+            break
+        except FecontactError as error:
+            if not result.found:
+                raise
+            result.notes.append(f"The branch '{task.title}' was not followed: {error}")
+            continue
+        result.found[task.title] = kept(task.title, branch)
+        if branch.status is BranchStatus.INTERRUPTED:
+            result.interrupted = True
+            break
+        if task.generation < depth:
+            waiting.extend(beyond(task, branch))
+    return result
+
+
+def tasks_beyond(
+    field: VectorField, branch: Branch, task: Task, kinds: Iterable[str], method: "Method | None",
+    before: str,
+) -> Iterator[Task]:
+    """The branches that begin at the special points of one; ``before`` their orbits' names."""
+    for kind in kinds:
+        points = branch.of_kind(kind)
+        for number, point in enumerate(points):
+            count = f" {number + 1}" if len(points) > 1 else ""
+            title = {"Hopf": f"{before}orbits{count}",
+                     "period doubling": f"{task.title}, doubled{count}",
+                     "branch point": f"{task.title}, crossing{count}"}[kind]
+            yield Task(title, task.generation + 1, partial(_beyond, field, point, method, 1.0),
+                       point)
+            if kind == "branch point" and point.is_orbit:
+                yield Task(f"{title}, other half", task.generation + 1,
+                           partial(_beyond, field, point, method, -1.0), point)
+
+
+def _beyond(
+    field: VectorField, point: BranchPoint, method: "Method | None", direction: float,
+    options: ContinuationOptions,
+) -> Branch:
+    """The branch that begins at a special point."""
+    from fecontact.bifurcation.orbits.branches import orbit_branch
+
+    if point.kind == "Hopf":
+        return orbit_branch(field, point, method=method, options=options)
+    if point.is_orbit:
+        return orbit_branch(field, point, options=options, direction=direction)
+    return equilibrium_branch(field, point, options=options)
+
+
+def _known(start: BranchPoint, found: Iterable[Branch]) -> bool:
+    """Whether the branch that begins at a special point has been followed from somewhere else."""
+    branches = list(found)
+    values = np.concatenate([branch.parameter for branch in branches])
+    width = float(np.ptp(values)) or abs(start.parameter) or 1.0
+    place, spread, period = _whereabouts(start)
+    size = max(float(np.linalg.norm(middle) + np.linalg.norm(extent)) for branch in branches
+               for middle, extent, _ in map(_whereabouts, branch))
+
+    def there(point: BranchPoint, periods: float | None) -> bool:
+        other, extent, its_period = _whereabouts(point)
+        return (abs(point.parameter - start.parameter) <= _SAME * width
+                and (start.kind == "Hopf" or float(np.linalg.norm(extent - spread))
+                     <= _SAME * size)
+                and float(np.linalg.norm(other - place)) <= _SAME * size
+                and (periods is None or abs(its_period - periods * period)
+                     <= 1e-2 * periods * period))
+
+    if start.kind == "Hopf":
+        return any(branch.status is BranchStatus.HOPF and there(branch.points[-1], None)
+                   for branch in branches)
+    if start.kind == "period doubling":
+        return any(point.kind == HALVING and there(point, 2.0)
+                   for branch in branches for point in branch.special)
+    # Both branches through a branch point mark it.
+    return sum(point.kind == start.kind and there(point, 1.0 if start.is_orbit else None)
+               for branch in branches for point in branch.special) > 1
+
+
+def _whereabouts(point: BranchPoint) -> tuple[Array, Array, float]:
+    """Middle and range (d,) of the states, and the period; of equilibria the state, 0, 0."""
+    if not point.is_orbit:
+        state = np.asarray(point.values["state"])
+        return state, np.zeros(len(state)), 0.0
+    low, high = (np.asarray(point.values[name]) for name in ("minimum", "maximum"))
+    return 0.5 * (low + high), high - low, float(point.values["period"])
