@@ -4,7 +4,7 @@ import numpy as np
 import pressed_sphere as ps
 import pytest
 
-STICKS = 0.25 ** (1.0 / 3.0)
+STICKS = 0.1 ** (1.0 / 3.0)
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +26,8 @@ def errors(found):
 
 
 def test_two_elements_along_the_radius(coarse):
-    """The approach to 0.3 %, the radius of contact to 0.5 %, of stick to 1 %, the loss to 4 %."""
-    assert (np.abs(errors(coarse)) < [3e-3, 5e-3, 0.015, 0.01, 0.04]).all()
+    """Approach, radius and displacement to 0.3, 0.5, 0.6 %, stick to 6.5 %, the loss to 7.5 %."""
+    assert (np.abs(errors(coarse)) < [3e-3, 5e-3, 6e-3, 0.065, 0.075]).all()
     assert coarse.clearance > 0.0
     history = coarse.history
     force = ps.PART * ps.MU * coarse.exact.load
@@ -51,8 +51,8 @@ def test_the_loop_is_closed_and_symmetric(coarse):
 @pytest.mark.slow
 def test_four_elements_along_the_radius(fine, coarse):
     """All errors together fall with the mesh."""
-    assert (np.abs(errors(fine)) < [2e-3, 5e-3, 0.01, 0.01, 0.02]).all()
-    assert np.linalg.norm(errors(fine)) < 0.6 * np.linalg.norm(errors(coarse))
+    assert (np.abs(errors(fine)) < [1e-3, 1e-3, 5e-3, 0.015, 0.03]).all()
+    assert np.linalg.norm(errors(fine)) < 0.4 * np.linalg.norm(errors(coarse))
     assert fine.clearance > 0.0
     inner = fine.radii < 0.9 * ps.WIDTH
     ellipse = fine.exact.peak * np.sqrt(1.0 - (fine.radii[inner] / ps.WIDTH) ** 2)
