@@ -128,7 +128,7 @@ EXAMPLES = {
     "pressed_sphere": (("out",), [(r"^2 elements: approach (\S+) um", 20.0, 0.06),
                                   (r" a = (\S+) mm", 1.0, 5e-3),
                                   (r"c / a = (\S+) ", 0.4642, 0.03),
-                                  (r"displacement (\S+) um", 6.9735, 0.05),
+                                  (r"displacement (\S+) um", 6.9687, 0.05),
                                   (r", loss (\S+) mJ", 6.3035, 0.5)],
                        {"out/pressed_sphere.png", "out/pressed_sphere_shear.png"}),
     "sweep_on_dask": ((), [(r"^(\d+) cases, 0 failed", 4.0, 0.0)], set()),
