@@ -147,7 +147,7 @@ five times as wide and high as the contact, and what it lacks of a half-space is
 tractions on the same face: 5 % of the approach, 4 % of the displacement, nothing of forces, radii
 and loss. Radii follow from second moments of the tractions. Friction has two directions here:
 across the load, where Cattaneo and Mindlin have none, it reaches 12 % of the largest. The loss is a
-small difference of large works: its error falls from 7 to 2 %.
+small difference of large works: its error falls from 7 to 2 %. The displacement stays 0.3 % short.
 
 {comparisons(rows)}
 

@@ -33,7 +33,7 @@ def test_two_elements_along_the_radius(coarse):
     force = ps.PART * ps.MU * coarse.exact.load
     assert history.friction_forces[ps.STEPS].sum(axis=0) == pytest.approx([force, 0.0],
                                                                           abs=1e-6 * force)
-    assert abs(history.imbalance[-1]) < 2e-3 * history.loss[-1]
+    assert abs(history.imbalance[-1]) < 3e-3 * history.loss[-1]
 
 
 def test_the_loop_is_closed_and_symmetric(coarse):
@@ -41,11 +41,11 @@ def test_the_loop_is_closed_and_symmetric(coarse):
     history = coarse.history
     there, back = history.loss[np.array([2, 3]) * ps.STEPS] - history.loss[
         np.array([1, 2]) * ps.STEPS]
-    assert there == pytest.approx(back, rel=2e-3)
+    assert there == pytest.approx(back, rel=3e-3)
     first, last = history.friction_forces[[ps.STEPS, 3 * ps.STEPS]]
-    assert last[:, 0] == pytest.approx(first[:, 0], abs=3e-3 * first.max())
+    assert last[:, 0] == pytest.approx(first[:, 0], abs=0.01 * first.max())
     # Across the load they depend on how friction has turned before.
-    assert last[:, 1] == pytest.approx(first[:, 1], abs=0.02 * first.max())
+    assert last[:, 1] == pytest.approx(first[:, 1], abs=0.05 * first.max())
 
 
 @pytest.mark.slow
