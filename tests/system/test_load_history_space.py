@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from space_systems import chain, circle, dragged, jenkins, node
 
 import fecontact as fc
-from fecontact import InputError, LoadPath, load_history
+from fecontact import AnalysisError, InputError, LoadPath, load_history
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,
@@ -385,6 +385,15 @@ def test_bristles_take_the_largest_load_for_their_stiffness():
 def test_motions_that_a_system_does_not_have_are_refused(system, path, told):
     with pytest.raises(InputError, match=told):
         load_history(system, LoadPath(**path))
+
+
+@pytest.mark.parametrize(("angle", "way"), [(0.0, "along the ground .x."),
+                                            (0.5 * np.pi, "along the ground .y.")])
+def test_what_nothing_holds_at_the_first_vertex_is_named(angle, way):
+    """A path begins without friction: a force along the ground moves free masses away."""
+    with pytest.raises(AnalysisError, match=f"nothing holds the body against a translation {way}"):
+        load_history(chain(ConstantFriction(0.5), angle=angle, force=1.0),
+                     LoadPath(load_scale=(1.0, 2.0)))
 
 
 def test_states_of_plane_bodies_and_solids_are_told_apart():
