@@ -224,6 +224,11 @@ def check_preload(names, printed, folder):
     assert abs(names["run"].modal_velocities).max() < 1e-8
     assert names["stuck"].frequencies_hz[0] == pytest.approx(np.sqrt(6.1e6 / 2.0) / (2 * np.pi))
     assert all((folder / name).stat().st_size > 5000 for name in ("shear.png", "loop.png"))
+    # Sliding turns by a' = k Q' cos a / (mu F), k = c / (c + K): sin a = tanh(k Q / (mu F)).
+    sine = np.tanh(6.0 / 6.1 * 10.0 / 20.0)
+    assert names["turned"].friction_forces[-1, 0] == pytest.approx(
+        20.0 * np.array([np.sqrt(1.0 - sine**2), sine]), rel=1.5e-3)
+    assert (folder / "shear-map.png").exists()
 
 
 def check_rotation(names, printed, folder):

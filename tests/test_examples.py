@@ -138,9 +138,10 @@ EXAMPLES = {
                                (r", loss (\S+) mJ", 3.584, 0.036)], {"out/two_spheres.png"}),
     # Half of these: the plane is that of symmetry.
     "pressed_sphere": (("out",), [(r"^2 elements: approach (\S+) um", 20.0, 0.06),
-                                  (r" a = (\S+) mm", 1.0, 5e-3), (r"c / a = (\S+) ", 0.63, 0.007),
-                                  (r"displacement (\S+) um", 5.3574, 0.08),
-                                  (r", loss (\S+) mJ", 2.6163, 0.1)],
+                                  (r" a = (\S+) mm", 1.0, 5e-3),
+                                  (r"c / a = (\S+) ", 0.4642, 0.03),
+                                  (r"displacement (\S+) um", 6.9687, 0.05),
+                                  (r", loss (\S+) mJ", 6.3035, 0.5)],
                        {"out/pressed_sphere.png", "out/pressed_sphere_shear.png"}),
     "sweep_on_dask": ((), [(r"^(\d+) cases, 0 failed", 4.0, 0.0)], set()),
 }

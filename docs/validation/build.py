@@ -26,7 +26,7 @@ HEAD = """# Validation
 
 What the package computes, beside closed forms, published numbers and the figures of W. Sextro,
 *Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes everything here
-again, in about eight minutes on two cores, and writes this page.
+again, in about ten minutes on two cores, and writes this page.
 
 """
 

@@ -124,7 +124,7 @@ the forces up to thirty times. The same rings solved in increments without time 
 def sphere_of_elements(images: Path) -> str:
     """Table and pictures of an elastic sphere on a rigid plane."""
     rows = []
-    for elements in (2, 3, 4):
+    for elements in (2, 4):
         found = pressed_sphere.pressed(elements)
         exact, part = found.exact, found.part
         rows += [Comparison(f"{elements} elements: {quantity}", wanted, value)
@@ -141,12 +141,14 @@ def sphere_of_elements(images: Path) -> str:
     return f"""## An elastic sphere on a rigid plane
 
 The lowest part of such a sphere, of finite elements (Q2, nu = 0.49), on a rigid plane: pressed, and
-sheared to and fro by Q = 0.75 mu P in increments without time (`examples/pressed_sphere.py`; so many
-elements along the radius of the contact). What is compared is half of the values above. The body is
-five times as wide and high as the contact, and what it lacks of a half-space is taken from uniform
-tractions on the same face: 5 % of the approach, 4 % of the displacement, nothing of forces, radii
-and loss. Radii follow from second moments of the tractions. Friction has two directions here:
-beside the load, where Cattaneo and Mindlin have none, it reaches 12 % of the largest.
+sheared by +-Q, Q = 0.9 mu P, in increments without time (`examples/pressed_sphere.py`; so many
+elements along the radius of the contact). The plane is that of symmetry of two such spheres: half
+of their approach, displacement and loss. The body is five times as wide and high as the contact,
+and what it lacks of a half-space is taken from uniform tractions on the same face: 5 % of the
+approach, 4 % of the displacement, nothing of forces, radii and loss. Radii follow from second
+moments of the tractions. Friction has two directions here: across the load, where Cattaneo and
+Mindlin have none, it reaches 12 % of the largest. The loss is a small difference of large works:
+its error falls from 7 to 2 %. The displacement stays 0.3 % short.
 
 {comparisons(rows)}
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from space_systems import chain, circle, dragged, jenkins, node
 
 import fecontact as fc
-from fecontact import InputError, LoadPath, load_history
+from fecontact import AnalysisError, InputError, LoadPath, load_history
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,
@@ -387,6 +387,15 @@ def test_motions_that_a_system_does_not_have_are_refused(system, path, told):
         load_history(system, LoadPath(**path))
 
 
+@pytest.mark.parametrize(("angle", "way"), [(0.0, "along the ground .x."),
+                                            (0.5 * np.pi, "along the ground .y.")])
+def test_what_nothing_holds_at_the_first_vertex_is_named(angle, way):
+    """A path begins without friction: a force along the ground moves free masses away."""
+    with pytest.raises(AnalysisError, match=f"nothing holds the body against a translation {way}"):
+        load_history(chain(ConstantFriction(0.5), angle=angle, force=1.0),
+                     LoadPath(load_scale=(1.0, 2.0)))
+
+
 def test_states_of_plane_bodies_and_solids_are_told_apart():
     from fecontact.analysis import prestressed_modes
     plane = load_history(chain(ConstantFriction(0.5), dimension=2), LoadPath(load_scale=(1.0, 2.0)))
@@ -405,3 +414,36 @@ def test_summaries_tell_vectors_by_their_size():
     assert "friction force: 4 N" in repr(history.state())
     assert history.travel == pytest.approx(-circle(1e-3, 8)[:, 0])
     assert history.state(2).travels == pytest.approx([0.0, -1e-3], abs=1e-12)
+
+
+def test_two_solids_whose_interface_slides():
+    """A block on a held one, dragged along (1, 2, 0): its springs hold what friction and load say.
+
+    Both are elastic; all nodes slide in the end, and the limits of friction add up to mu N.
+    """
+    from solid_blocks import block_body, block_mesh
+
+    from fecontact.fem import pair_faces
+    from fecontact.reduction import reduce_bodies
+    lower = fc.ElasticBody(block_mesh((3, 3, 1), (0.3, 0.3, 0.05)).placed(
+        shift=(-0.05, -0.1, -0.05)), fixed={"contact": "xyz"})
+    bodies = {"upper": block_body((2, 2, 1)), "lower": lower}
+    pairing = pair_faces(bodies, "upper.contact", "lower.top", nodes=4, nodes_on="face")
+    middle = {"C": (0.1, 0.05, 0.05), "B": (0.1, 0.05, 0.05)}
+    bases = reduce_bodies(bodies, [pairing], modes=8, each={"upper": middle})
+    mu, load = 0.3, 400.0
+    system = fc.ContactSystem(
+        bodies=bases, interfaces=[fc.Interface(
+            "seam", pairing, normal=LinearContact(2e8), friction=ConstantFriction(mu),
+            sliding=SlidingTranslation(0.0, (1.0, 2.0, 0.0)))],
+        drive=fc.Drive(stiffness_x=5e6, stiffness_y=5e6), load=fc.Load(load))
+    history = load_history(system, LoadPath(travel=(0.0, 1e-4), steps=10), rtol=1e-5)
+    assert (history.contact_state[-1] == 2).all()
+    limits = np.linalg.norm(history.friction_forces[-1], axis=1)
+    assert limits == pytest.approx(mu * history.normal_force[-1], rel=1e-9)
+    assert limits.sum() == pytest.approx(mu * load, rel=1e-6)
+    pulled = 5e6 * (system.arrays.drive_shapes[:2] @ history.modal_coordinates[-1])
+    assert -history.friction_forces[-1].sum(axis=0) == pytest.approx(pulled, rel=1e-6)
+    along = np.array([1.0, 2.0]) / np.sqrt(5.0)
+    assert pulled @ along == pytest.approx(mu * load, rel=2e-3)
+    assert np.abs(history.imbalance).max() < 2e-5 * history.work[-1]

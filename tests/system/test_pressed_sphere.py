@@ -4,7 +4,7 @@ import numpy as np
 import pressed_sphere as ps
 import pytest
 
-STICKS = 0.25 ** (1.0 / 3.0)
+STICKS = 0.1 ** (1.0 / 3.0)
 
 
 @pytest.fixture(scope="module")
@@ -26,14 +26,14 @@ def errors(found):
 
 
 def test_two_elements_along_the_radius(coarse):
-    """The approach to 0.3 %, the radius of contact to 0.5 %, of stick to 1 %, the loss to 4 %."""
-    assert (np.abs(errors(coarse)) < [3e-3, 5e-3, 0.015, 0.01, 0.04]).all()
+    """Approach, radius and displacement to 0.3, 0.5, 0.6 %, stick to 6.5 %, the loss to 7.5 %."""
+    assert (np.abs(errors(coarse)) < [3e-3, 5e-3, 6e-3, 0.065, 0.075]).all()
     assert coarse.clearance > 0.0
     history = coarse.history
     force = ps.PART * ps.MU * coarse.exact.load
     assert history.friction_forces[ps.STEPS].sum(axis=0) == pytest.approx([force, 0.0],
                                                                           abs=1e-6 * force)
-    assert abs(history.imbalance[-1]) < 2e-3 * history.loss[-1]
+    assert abs(history.imbalance[-1]) < 3e-3 * history.loss[-1]
 
 
 def test_the_loop_is_closed_and_symmetric(coarse):
@@ -41,18 +41,18 @@ def test_the_loop_is_closed_and_symmetric(coarse):
     history = coarse.history
     there, back = history.loss[np.array([2, 3]) * ps.STEPS] - history.loss[
         np.array([1, 2]) * ps.STEPS]
-    assert there == pytest.approx(back, rel=2e-3)
+    assert there == pytest.approx(back, rel=3e-3)
     first, last = history.friction_forces[[ps.STEPS, 3 * ps.STEPS]]
-    assert last[:, 0] == pytest.approx(first[:, 0], abs=3e-3 * first.max())
+    assert last[:, 0] == pytest.approx(first[:, 0], abs=0.01 * first.max())
     # Across the load they depend on how friction has turned before.
-    assert last[:, 1] == pytest.approx(first[:, 1], abs=0.02 * first.max())
+    assert last[:, 1] == pytest.approx(first[:, 1], abs=0.05 * first.max())
 
 
 @pytest.mark.slow
 def test_four_elements_along_the_radius(fine, coarse):
     """All errors together fall with the mesh."""
-    assert (np.abs(errors(fine)) < [2e-3, 5e-3, 0.01, 0.01, 0.02]).all()
-    assert np.linalg.norm(errors(fine)) < 0.6 * np.linalg.norm(errors(coarse))
+    assert (np.abs(errors(fine)) < [1e-3, 1e-3, 5e-3, 0.015, 0.03]).all()
+    assert np.linalg.norm(errors(fine)) < 0.4 * np.linalg.norm(errors(coarse))
     assert fine.clearance > 0.0
     inner = fine.radii < 0.9 * ps.WIDTH
     ellipse = fine.exact.peak * np.sqrt(1.0 - (fine.radii[inner] / ps.WIDTH) ** 2)
