@@ -17,6 +17,7 @@ import numpy as np
 
 import fecontact as fc
 from fecontact.bifurcation import (
+    BranchStatus,
     ContinuationOptions,
     FrequencyResponse,
     HarmonicBalance,
@@ -81,7 +82,7 @@ def responses(
         field = contact_field(blade_pair(load, angle), {FREQUENCY: (low, excited_at)})
         found.append(frequency_response(
             field, (low, high), observe=("first.end", "y"),
-            method=method or HarmonicBalance(3, 128, stability=None),
+            method=method or HarmonicBalance(3, 256, stability=None),
             options=ContinuationOptions(points=2000, largest_step=0.1)))
     return FrequencyResponse(tuple(one.branches[0] for one in found), "centrifugal load [N]",
                              np.array(loads), found[0].observed)
@@ -127,8 +128,8 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     """Prints peaks over the load; a picture in the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     best = np.pi * FORCE / COEFFICIENT  # both blades take half of the load
-    ratios = [1.0, 2.0] if quick else [0.7, 0.85, 1.0, 1.3, 2.0]
-    method = HarmonicBalance(1, 64, stability=None) if quick else None
+    ratios = [1.0, 2.0] if quick else [0.7, 0.85, 1.0, 1.3, 2.0, 4.0]
+    method = HarmonicBalance(1, 256, stability=None) if quick else None
     over = {f"{degrees:g}°": responses([ratio * best for ratio in ratios], np.radians(degrees),
                                        method=method)
             for degrees in ((180.0,) if quick else (180.0, 90.0))}
@@ -138,6 +139,8 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
             print(f"{name}, load {load:6.2f} N: {peak.parameter / (2.0 * np.pi):.2f} Hz, "
                   f"{1e6 * peaks(response)[level]:.3f} um, one harmonic "
                   f"{1e6 * estimate(load):.3f} um")
+            if response.branches[level].status is not BranchStatus.BOUND:
+                print(f"  not the whole response: {response.branches[level].status.value}")
     draw(over["180°"], over, folder / "blade_pair.png")
 
 
