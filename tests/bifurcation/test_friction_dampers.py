@@ -15,7 +15,7 @@ from fecontact.bifurcation import (
 
 TURN = 2.0 * np.pi
 END = ("first.end", "y")
-BEST = np.pi * blade_pair.FORCE / blade_pair.COEFFICIENT
+BEST = blade_pair.BEST
 
 
 def orbit(field, parameter, seen, hz, method):
