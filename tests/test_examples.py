@@ -50,6 +50,11 @@ EXAMPLES = {
     "friction_damper": (("out",), [(r"^free: .* at (\S+) Hz", 92.80, 0.01),
                                    (r"^stuck: .* at (\S+) Hz", 113.18, 0.02),
                                    (r"^best load (\S+) N", 5.0, 0.5)], {"out/friction_damper.png"}),
+    # Frequencies and amplitudes of blades with the best load, and with twice as much.
+    "blade_pair": (("out",), [(r"^load   5.24 N: \S+ Hz, (\S+) um", 10.309, 0.02),
+                              (r"^load   5.24 N: .* harmonic (\S+) um", 10.472, 1e-3),
+                              (r"^load  10.47 N: \S+ Hz, (\S+) um", 13.868, 0.03)],
+                   {"out/blade_pair.png"}),
     # Two bolts of 2e8 N/m, shortened by 10 um: at most 4 kN.
     "lap_joint": (("out",), [(r"^the bolts press with (\S+) N", 3250.0, 2.0),
                              (r"^stuck: (\S+) Hz", 79.206, 0.01),

@@ -151,6 +151,12 @@ def responses(folder: Path) -> dict[str, Path]:
                                                       "hardening_response")}
 
 
+def blades(folder: Path) -> dict[str, Path]:
+    """Responses of two blades with a damper between them."""
+    example(folder, "blade_pair", ".")
+    return {"blade_pair": folder / "blade_pair.png"}
+
+
 def modes(folder: Path) -> dict[str, Path]:
     """Nonlinear modes of a beam with a damper, and of two masses."""
     example(folder, "nonlinear_modes", ".")
@@ -164,6 +170,7 @@ MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
     responses: ("friction_damper_response", "hardening_response"),
+    blades: ("blade_pair",),
     modes: ("damped_beam_mode", "damped_beam_responses", "internal_resonance")}
 
 

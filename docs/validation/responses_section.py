@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import blade_pair
-import friction_damper
 import frequency_response as example
+import friction_damper
 import numpy as np
 from comparison import Comparison, comparisons, table
 from pictures import save
@@ -184,7 +184,7 @@ def bodies() -> str:
     """Amplitudes of elastic bodies with friction dampers beside runs."""
     name = "load.forces.0.signal.angular_frequency"
     beam = friction_damper.damped_beam(friction_damper.BEST, 101.0).with_(
-        **{"friction.smoothing_slope": 200.0})
+        **{"interfaces.damper.friction.smoothing_slope": 200.0})
     w = TURN * 357.0
     pair = contact_field(blade_pair.blade_pair(5.236), {blade_pair.FREQUENCY: (
         w, blade_pair.excited_at)})
