@@ -36,7 +36,8 @@ def equilibrium_curve(
     field, point, second, scales
         As for :func:`fecontact.bifurcation.codim2_curve`.
     widths : mapping
-        Width of the diagram in each parameter by name; by default the size of its value.
+        Width of the diagram in each parameter by name; by default the size of its value, and for
+        the first one at least its part in the tangent of the branch.
 
     Raises
     ------
@@ -52,7 +53,9 @@ def equilibrium_curve(
     else:
         sizes, _ = sizes_of(scales, default_scales(begin))
         limits = sizes
-    width = [widths.get(name, abs(float(begin.values[index])) or 1.0)
+    # The tangent is at most as long as the branch's diagram is wide; the value may be near zero.
+    along = {second: 0.0, first: abs(float(point.tangent[-1]))}
+    width = [widths.get(name, max(abs(float(begin.values[index])), along[name]) or 1.0)
              for name, index in zip((second, first), active, strict=True)]
     plane = begin.values[list(active)]
     if not isinstance(point, HopfPoint):
