@@ -29,6 +29,8 @@ from fecontact.core.types import Array, ArrayLike
 
 # Smallest component of a tangent of length one that tells the sign of a parameter's change.
 _RESTS = 1e-6
+# Points beyond which a curve is one of neutral saddles, by its kind.
+_ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("resonance 1:1", "resonance 1:2")}
 # Part of a range within which a start on its end may lie beside it.
 _ON_BOUND = 1e-9
 
@@ -148,7 +150,7 @@ def _followed(
                          f"{second[0]:g} to {second[1]:g}.")
     u[-2] = min(max(value, second[0]), second[1])
     stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
-    ends = ["Bogdanov-Takens"] if attributes["kind"] == "Hopf" else []
+    ends = _ENDS.get(attributes["kind"], ())
     chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
     return continue_branch(problem, u, chosen, name=names[0],
                            tangent=_tangent(problem, u, direction), both=both,

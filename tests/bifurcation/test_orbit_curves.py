@@ -168,6 +168,35 @@ def test_strong_resonances():
         ("resonance 1:4", pytest.approx(0.5, abs=1e-8))]
 
 
+def sheared(t, x, p, out):
+    # Across the circle, (a, b)' = (p0 a - b, p1 a + p0 b).
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, a, z = x[0] / r, x[1] / r, r - 1.0, x[2]
+    cube = a * a + z * z
+    radial = (p[0] - cube) * a - z
+    out[0] = radial * C - 2.0 * r * S
+    out[1] = radial * S + 2.0 * r * C
+    out[2] = (p[0] - cube) * z + p[1] * a
+
+
+def test_a_curve_of_tori_ends_where_neutral_saddles_begin():
+    """Multipliers exp(pi (p0 +- i sqrt(p1))): tori at p0 = 0 for p1 > 0 alone."""
+    field, t, circle = circle_field(sheared, growth=-0.2, shear=0.1)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "growth",
+                          method=Collocation(intervals=16), bounds=(-0.3, 0.3), scales=np.ones(3))
+    point, = branch.of_kind("Neimark-Sacker")
+    assert point.angle == pytest.approx(np.pi * np.sqrt(0.1), rel=1e-8)
+    curve = codim2_curve(field, point, "shear", direction=-1.0,
+                         bounds={"growth": (-0.3, 0.3), "shear": (-0.4, 0.4)})
+    assert curve.parameter == pytest.approx(np.zeros(len(curve)), abs=1e-9)
+    shear = curve.column("shear")
+    ends = sorted([shear[0], shear[-1]])
+    assert ends == pytest.approx([0.0, 0.4], abs=1e-8)
+    assert curve.of_kind("resonance 1:4")[0].values["shear"] == pytest.approx(0.25, abs=1e-8)
+    end, = curve.of_kind("resonance 1:1")
+    assert end in (curve.points[0], curve.points[-1])
+
+
 def test_kind_errors(masses):
     field, branch = masses
     with pytest.raises(InputError, match="starts no curve; take a point of the kind 'fold'"):

@@ -162,10 +162,10 @@ def crossing_form(field: VectorField, x: Array, values: Array, scales: Array) ->
     for part in bend(field, x, values, v, scales):
         bent = part.first @ v
         inner = np.linalg.solve(bordered, np.append(bent, 0.0))[:d]
-        terms = np.abs(w) @ (np.abs(part.second) @ np.abs(v)
-                             + 3.0 * np.abs(part.first) @ np.abs(inner))
+        sizes = np.abs(part.second) @ np.abs(v) + 3.0 * np.abs(part.first) @ np.abs(inner)
         found.append((float(w @ bent), float(w @ (part.second @ v - 3.0 * part.first @ inner)),
-                      float(np.abs(w) @ np.abs(part.first) @ np.abs(v)), float(terms)))
+                      float(np.abs(w) @ np.abs(part.first) @ np.abs(v)),
+                      float(np.abs(w) @ sizes)))
     (quadratic, cubic, size, terms), (coarse, coarse_cubic, *_) = found
     length = 1.0 / float(np.linalg.norm(v / scales))
     if abs(quadratic) > abs(quadratic - coarse) + _ZERO * (size + terms * length):

@@ -43,9 +43,9 @@ def bend(
     """Derivatives of the Jacobian at x along a direction (d,), by formulas of order eight and six.
 
     Steps from 27 scales of the states down to 1e-9 of them are tried, and the one is taken at
-    which both formulas agree best, to rounding; entries count in the scales of the states. ``shift`` (k,)
-    moves the parameter values along with the states. ``every`` leaves steps out, for derivatives
-    that need not be the best.
+    which both formulas agree best, to rounding; entries count in the scales of the states.
+    ``shift`` (k,) moves the parameter values along with the states. ``every`` leaves steps out, for
+    derivatives that need not be the best.
     """
     size = float(np.linalg.norm(direction / scales))
     if shift is not None:
