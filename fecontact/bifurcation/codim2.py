@@ -52,7 +52,8 @@ def codim2_curve(
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
         A point of a branch over the first parameter; of orbits, one found by collocation. With
-        ``keep="period"`` any orbit of a system without excitation.
+        ``keep="period"`` any orbit of a system without excitation; or a point 'Bautin' of a curve,
+        where folds of orbits begin.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
@@ -89,12 +90,15 @@ def codim2_curve(
     require_kind("codim2_curve", str, parameter=parameter)
     require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
     require_finite("codim2_curve", direction=direction)
+    if point.kind == "Bautin":
+        point = _beyond_bautin(field, point, parameter)
     if keep not in ("kind", "period"):
         raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
     if keep == "kind" and not isinstance(
             point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
-                         f"'period doubling' or 'Neimark-Sacker', or an orbit with keep='period'.")
+                         f"'period doubling', 'Neimark-Sacker' or 'Bautin', or an orbit with "
+                         f"keep='period'.")
     if keep == "period" and not point.is_orbit:
         raise InputError(f"{point.place} is no orbit, whose period keep='period' could keep.")
     names = (point.branch.parameter_name, parameter)
@@ -115,6 +119,17 @@ def codim2_curve(
                    "state_names": list(field.state_names)}
     return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
                      direction, both, attributes)
+
+
+def _beyond_bautin(field: VectorField, point: BranchPoint, parameter: str) -> FoldPoint:
+    """The fold of orbits from which to follow the curve that begins at a Bautin point."""
+    from fecontact.bifurcation.codim2_switch import fold_at_bautin
+
+    both = tuple(map(str, point.branch.attributes["parameters"]))
+    if parameter != both[1]:
+        raise InputError(f"{point.place} is one over {both[0]!r} and {both[1]!r}: parameter = "
+                         f"{parameter!r} must be the latter.")
+    return fold_at_bautin(field, point)
 
 
 def _ranges(

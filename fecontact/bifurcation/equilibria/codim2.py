@@ -58,15 +58,17 @@ def equilibrium_curve(
     width = [widths.get(name, max(abs(float(begin.values[index])), along[name]) or 1.0)
              for name, index in zip((second, first), active, strict=True)]
     plane = begin.values[list(active)]
+    known = {"parameter_names": list(field.parameters), "parameter_values": begin.values,
+             "widths": np.array(width)}
     if not isinstance(point, HopfPoint):
         v, w = null_vectors(scaled(begin.jacobian, sizes))
         fold = FoldCurve(field, begin.values, active, np.concatenate([sizes, width]),
                          np.concatenate([limits, width]), w, v)
-        return fold, np.concatenate([begin.state, plane]), {}
+        return fold, np.concatenate([begin.state, plane]), known
     if not (begin.eigenvalues.imag > 0.0).any():
         raise InputError(f"{point.place} is no Hopf point of this field: all eigenvalues are real.")
     square = critical_pair(begin.jacobian)[0].imag ** 2
     b, c = hopf_borders(scaled(begin.jacobian, sizes), square)
     hopf = HopfCurve(field, begin.values, active, np.concatenate([sizes, [square], width]),
                      np.concatenate([limits, [_GROWTH * square], width]), b, c)
-    return hopf, np.concatenate([begin.state, [square], plane]), {}
+    return hopf, np.concatenate([begin.state, [square], plane]), known
