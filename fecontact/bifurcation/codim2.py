@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fecontact.bifurcation.codim2_switch import fold_at_bautin, other_curve, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import (
@@ -20,7 +21,8 @@ from fecontact.bifurcation.continuation.problem import (
     Problem,
     options_of,
 )
-from fecontact.bifurcation.equilibria.codim2 import equilibrium_curve
+from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium_curve
+from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.checks import require_kind
@@ -31,6 +33,8 @@ from fecontact.core.types import Array, ArrayLike
 _RESTS = 1e-6
 # Points beyond which a curve is one of neutral saddles, by its kind.
 _ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("resonance 1:1", "resonance 1:2")}
+# Points of curves of equilibria through which another one passes.
+_CROSSINGS = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")
 # Part of a range within which a start on its end may lie beside it.
 _ON_BOUND = 1e-9
 
@@ -52,8 +56,9 @@ def codim2_curve(
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
         A point of a branch over the first parameter; of orbits, one found by collocation. With
-        ``keep="period"`` any orbit of a system without excitation; or a point 'Bautin' of a curve,
-        where folds of orbits begin.
+        ``keep="period"`` any orbit of a system without excitation. Or a point of a curve: 'Bautin',
+        where folds of orbits begin, 'zero-Hopf', 'double Hopf' or 'Bogdanov-Takens', where another
+        curve passes.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
@@ -91,10 +96,11 @@ def codim2_curve(
     require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
     require_finite("codim2_curve", direction=direction)
     if point.kind == "Bautin":
-        point = _beyond_bautin(field, point, parameter)
+        point = fold_at_bautin(field, point, parameter)
     if keep not in ("kind", "period"):
         raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
-    if keep == "kind" and not isinstance(
+    crossing = point.kind in _CROSSINGS
+    if keep == "kind" and not crossing and not isinstance(
             point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
                          f"'period doubling', 'Neimark-Sacker' or 'Bautin', or an orbit with "
@@ -114,22 +120,21 @@ def codim2_curve(
     if point.is_orbit:
         problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
     else:
-        problem, u, attributes = equilibrium_curve(field, point, parameter, widths, scales)
+        if crossing:
+            begin, square = other_curve(field, point, parameter)
+            widths = {**widths_of(point), **widths}
+        else:
+            begin = equilibrium_at(field, point)
+            square = critical_square(begin, point)
+            # The tangent is at most as long as the diagram is wide; the value may be near zero.
+            along = max(abs(float(point.tangent[-1])), abs(point.parameter))
+            widths = {names[0]: along or 1.0, **widths}
+        kind = "fold" if square is None else "Hopf"
+        problem, u, attributes = equilibrium_curve(begin, names, square, widths, scales)
     attributes |= {"parameters": list(names), "kind": kind,
                    "state_names": list(field.state_names)}
     return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
                      direction, both, attributes)
-
-
-def _beyond_bautin(field: VectorField, point: BranchPoint, parameter: str) -> FoldPoint:
-    """The fold of orbits from which to follow the curve that begins at a Bautin point."""
-    from fecontact.bifurcation.codim2_switch import fold_at_bautin
-
-    both = tuple(map(str, point.branch.attributes["parameters"]))
-    if parameter != both[1]:
-        raise InputError(f"{point.place} is one over {both[0]!r} and {both[1]!r}: parameter = "
-                         f"{parameter!r} must be the latter.")
-    return fold_at_bautin(field, point)
 
 
 def _ranges(
