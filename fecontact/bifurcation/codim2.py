@@ -55,15 +55,12 @@ def codim2_curve(
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
-        A point of a branch over the first parameter; of orbits, one found by collocation. With
-        ``keep="period"`` any orbit of a system without excitation. Or a point of a curve: 'Bautin',
-        where folds of orbits begin, 'zero-Hopf', 'double Hopf' or 'Bogdanov-Takens', where another
-        curve passes.
+        A point of a branch over the first parameter; of orbits, one by collocation. Or a point of a
+        curve: 'Bautin', 'zero-Hopf', 'double Hopf', 'Bogdanov-Takens', for the other curve there.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
-        Step lengths, tolerances and stopping conditions; its bounds and second_bounds are those of
-        the parameters where ``bounds`` gives none.
+        Steps, tolerances, stopping conditions; bounds of parameters without ``bounds``.
     bounds : mapping, optional
         Range of each parameter by name, ``{"B": (0.0, 30.0)}``, at which the curve ends; it also
         scales the arclength (by default the branch does, or the values at the point).
@@ -76,7 +73,7 @@ def codim2_curve(
     both : bool
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
-        What all points of the curve have in common.
+        What the points have in common; 'period' takes any orbit of a system without excitation.
 
     Returns
     -------
