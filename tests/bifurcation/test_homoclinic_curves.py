@@ -64,9 +64,9 @@ def test_curve_of_homoclinic_orbits(field, near):
 def test_values_of_auto(field, near):
     """Printed by AUTO-07p with 60 intervals: c at m = -1 for two periods, at -2 and -4 for 60."""
     hopf, = equilibrium_branch(field, [-1.0, 0.0], "c", bounds=(-2.0, 2.0)).of_kind("Hopf")
-    orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), options=ContinuationOptions(
-        bounds=(-2.0, 2.0), locate=False, stop_at="15",
-        events={"15": lambda values: values["period"] - 15.0}))
+    options = ContinuationOptions(bounds=(-2.0, 2.0), locate=False, stop_at="15",
+                                  events={"15": lambda values: values["period"] - 15.0})
+    orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), options=options)
     assert orbits.points[-1].parameter == pytest.approx(0.743492, abs=6e-7)
     assert near.parameter == pytest.approx(0.743444, abs=6e-7)
     options = ContinuationOptions(largest_step=0.05, events={
