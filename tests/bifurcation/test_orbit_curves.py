@@ -6,6 +6,7 @@ from collocation_fields import two_masses_field
 
 from fecontact import InputError
 from fecontact.bifurcation import (
+    BranchStatus,
     Collocation,
     ContinuationOptions,
     PeriodicMotion,
@@ -195,6 +196,33 @@ def test_a_curve_of_tori_ends_where_neutral_saddles_begin():
     assert curve.of_kind("resonance 1:4")[0].values["shear"] == pytest.approx(0.25, abs=1e-8)
     end, = curve.of_kind("resonance 1:1")
     assert end in (curve.points[0], curve.points[-1])
+
+
+def ring(t, x, p, out):
+    # s' = p^2 + q^2 - 1/4 + s^2 + p s / 10 with s = r - 1.
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    s = r - 1.0
+    radial = p[0] * p[0] + p[1] * p[1] - 0.25 + s * s + 0.1 * p[0] * s
+    out[0] = radial * x[0] / r - (2.0 + 0.3 * x[0]) * x[1]
+    out[1] = radial * x[1] / r + (2.0 + 0.3 * x[0]) * x[0]
+
+
+def test_a_closed_curve_of_folds_is_gone_round_once():
+    """s = -p / 20 and 0.9975 p^2 + q^2 = 1/4."""
+    field = vector_field(ring, {"p": 0.0, "q": 0.1}, 2)
+    t = np.linspace(0.0, 2.0 * np.pi / np.sqrt(4.0 - 0.09 * 0.24), 600)
+    circle = (1.0 - np.sqrt(0.24)) * np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=float(t[-1])), "p",
+                          method=Collocation(intervals=20), bounds=(-1.0, 1.0), scales=np.ones(2))
+    assert branch.status is BranchStatus.CLOSED
+    curve = codim2_curve(field, branch.of_kind("fold")[0], "q",
+                         bounds={"p": (-1.0, 1.0), "q": (-1.0, 1.0)})
+    assert curve.status is BranchStatus.CLOSED
+    p, q = curve.parameter, curve.column("q")
+    assert 0.9975 * p**2 + q**2 == pytest.approx(np.full(len(p), 0.25), abs=1e-8)
+    angle = np.unwrap(np.arctan2(q, p))
+    assert abs(angle[-1] - angle[0]) == pytest.approx(2.0 * np.pi, rel=1e-6)
+    assert [point.kind for point in curve.special] == ["turning point"] * 2
 
 
 def test_kind_errors(masses):
