@@ -96,7 +96,7 @@ def runs(quick: bool = False) -> PoincareScan:
 def orbits(
     w: float, bounds: tuple[float, float], *, initial: Array | None = None, points: int = 60,
 ) -> Branch:
-    """The branch through the orbit on which a run at w settles, to both sides."""
+    """The branch through the orbit on which a run at w settles, ``points`` to either side."""
     field = field_at(w)
     motion = periodic_motion(
         field.system(), initial=np.zeros(4) if initial is None else initial,
@@ -104,7 +104,7 @@ def orbits(
     return orbit_branch(
         field, motion, method=Shooting(segments=motion.periods, rtol=RTOL), bounds=bounds,
         both=True, scales=SIZE * np.ptp(motion.states, axis=0) / 2.0, width=WIDTH,
-        options=ContinuationOptions(step=1e-3, largest_step=0.01, points=points))
+        options=ContinuationOptions(step=1e-3, largest_step=0.01, points=2 * points))
 
 
 def doubled(branch: Branch, doubling: BranchPoint, points: int) -> Branch | None:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fecontact.bifurcation.codim2_switch import fold_at_bautin, other_curve, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import (
@@ -20,7 +21,8 @@ from fecontact.bifurcation.continuation.problem import (
     Problem,
     options_of,
 )
-from fecontact.bifurcation.equilibria.codim2 import equilibrium_curve
+from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium_curve
+from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.checks import require_kind
@@ -29,6 +31,10 @@ from fecontact.core.types import Array, ArrayLike
 
 # Smallest component of a tangent of length one that tells the sign of a parameter's change.
 _RESTS = 1e-6
+# Points beyond which a curve is one of neutral saddles, by its kind.
+_ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("resonance 1:1", "resonance 1:2")}
+# Points of curves of equilibria through which another one passes.
+_CROSSINGS = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")
 # Part of a range within which a start on its end may lie beside it.
 _ON_BOUND = 1e-9
 
@@ -49,13 +55,12 @@ def codim2_curve(
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
-        A point of a branch over the first parameter; of orbits, one found by collocation. With
-        ``keep="period"`` any orbit of a system without excitation.
+        A point of a branch over the first parameter; of orbits, one by collocation. Or a point of a
+        curve: 'Bautin', 'zero-Hopf', 'double Hopf', 'Bogdanov-Takens', for the other curve there.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
-        Step lengths, tolerances and stopping conditions; its bounds and second_bounds are those of
-        the parameters where ``bounds`` gives none.
+        Steps, tolerances, stopping conditions; bounds of parameters without ``bounds``.
     bounds : mapping, optional
         Range of each parameter by name, ``{"B": (0.0, 30.0)}``, at which the curve ends; it also
         scales the arclength (by default the branch does, or the values at the point).
@@ -68,7 +73,7 @@ def codim2_curve(
     both : bool
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
-        What all points of the curve have in common.
+        What the points have in common; 'period' takes any orbit of a system without excitation.
 
     Returns
     -------
@@ -87,12 +92,16 @@ def codim2_curve(
     require_kind("codim2_curve", str, parameter=parameter)
     require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
     require_finite("codim2_curve", direction=direction)
+    if point.kind == "Bautin":
+        point = fold_at_bautin(field, point, parameter)
     if keep not in ("kind", "period"):
         raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
-    if keep == "kind" and not isinstance(
+    crossing = point.kind in _CROSSINGS
+    if keep == "kind" and not crossing and not isinstance(
             point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
-                         f"'period doubling' or 'Neimark-Sacker', or an orbit with keep='period'.")
+                         f"'period doubling', 'Neimark-Sacker' or 'Bautin', or an orbit with "
+                         f"keep='period'.")
     if keep == "period" and not point.is_orbit:
         raise InputError(f"{point.place} is no orbit, whose period keep='period' could keep.")
     names = (point.branch.parameter_name, parameter)
@@ -108,7 +117,17 @@ def codim2_curve(
     if point.is_orbit:
         problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
     else:
-        problem, u, attributes = equilibrium_curve(field, point, parameter, widths, scales)
+        if crossing:
+            begin, square = other_curve(field, point, parameter)
+            widths = {**widths_of(point), **widths}
+        else:
+            begin = equilibrium_at(field, point)
+            square = critical_square(begin, point)
+            # The tangent is at most as long as the diagram is wide; the value may be near zero.
+            along = max(abs(float(point.tangent[-1])), abs(point.parameter))
+            widths = {names[0]: along or 1.0, **widths}
+        kind = "fold" if square is None else "Hopf"
+        problem, u, attributes = equilibrium_curve(begin, names, square, widths, scales)
     attributes |= {"parameters": list(names), "kind": kind,
                    "state_names": list(field.state_names)}
     return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
@@ -148,7 +167,7 @@ def _followed(
                          f"{second[0]:g} to {second[1]:g}.")
     u[-2] = min(max(value, second[0]), second[1])
     stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
-    ends = ["Bogdanov-Takens"] if attributes["kind"] == "Hopf" else []
+    ends = _ENDS.get(attributes["kind"], ())
     chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
     return continue_branch(problem, u, chosen, name=names[0],
                            tangent=_tangent(problem, u, direction), both=both,

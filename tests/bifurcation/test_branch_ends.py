@@ -8,6 +8,7 @@ the two separatrices of the saddle, with scipy.
 import numpy as np
 import pytest
 
+from fecontact import InputError
 from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
@@ -147,6 +148,30 @@ def test_a_curve_of_folds_ends_at_a_bautin_point(largest):
     assert 0.0 < radius < 0.02
     assert c[-1] == pytest.approx(2.0 * radius**2, rel=0.02)
     assert not curve.special
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_curve_of_folds_begins_at_a_bautin_point(sign, tmp_path):
+    """Found from the curve of Hopf points b = 0, also from a file and on either side."""
+    def turned(t, x, p, out):
+        square = x[0] * x[0] + x[1] * x[1]
+        growth = p[0] + sign * p[1] * square - square * square
+        out[0] = growth * x[0] - x[1] * (1.0 + 0.2 * x[0])
+        out[1] = growth * x[1] + x[0] * (1.0 + 0.2 * x[0])
+
+    field = vector_field(turned, {"b": -1.0, "c": -0.3}, 2)
+    box = {"b": (-2.0, 2.0), "c": (-1.5, 1.5)}
+    hopf, = equilibrium_branch(field, parameter="b", bounds=box["b"]).of_kind("Hopf")
+    border = read_branch(write_branch(tmp_path / "curve.h5",
+                                      codim2_curve(field, hopf, "c", bounds=box)))
+    point, = border.special
+    curve = codim2_curve(field, point, "c", bounds=box)
+    b, c = curve.parameter, sign * curve.column("c")
+    assert c**2 == pytest.approx(-4.0 * b, abs=1e-10)
+    assert sorted([c[0], c[-1]]) == pytest.approx([0.0, 1.5], abs=1e-3)
+    assert curve.column("maximum")[[0, -1], 0].min() < 0.02
+    with pytest.raises(InputError, match=r"parameter = 'b' must be the latter"):
+        codim2_curve(field, point, "b")
 
 
 def test_orbits_of_one_period_end_at_hopf_points():

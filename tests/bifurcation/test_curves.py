@@ -15,6 +15,7 @@ from fecontact.bifurcation import (
     find_equilibrium,
     vector_field,
 )
+from fecontact.io import read_branch, write_branch
 
 BOX = {"b": (-2.0, 2.0), "c": (-2.0, 2.0)}
 
@@ -128,6 +129,44 @@ def test_zero_hopf_and_double_hopf():
     assert point.values["b"] == pytest.approx(0.0, abs=1e-10)
     assert point.second_frequency_hz == pytest.approx(1.0 / np.pi, rel=1e-9)
     assert curve.column("unstable_besides")[[0, -1]].tolist() in ([0, 2], [2, 0])
+
+
+def test_curves_through_points_of_codimension_two(tmp_path):
+    """From the curve of folds a = 0 to that of Hopf points a = b^2, back, and across."""
+    field = vector_field(zero_hopf, {"a": 0.25, "b": 0.3}, 3)
+    branch = equilibrium_branch(field, [0.5, 0.0, 0.0], "a", bounds=(-1.0, 1.0), direction=-1.0)
+    box = {"a": (-1.0, 1.0), "b": (-1.0, 1.0)}
+    folds = codim2_curve(field, branch.of_kind("fold")[0], "b", bounds=box)
+    folds = read_branch(write_branch(tmp_path / "folds.h5", folds))
+    hopfs = codim2_curve(field, folds.special[0], "b", bounds=box)
+    assert hopfs.attributes["kind"] == "Hopf"
+    assert hopfs.column("a") == pytest.approx(hopfs.column("b") ** 2, abs=1e-11)
+    assert hopfs.column("frequency_hz") == pytest.approx(np.full(len(hopfs), 1.5 / np.pi), rel=1e-9)
+    assert np.sort(hopfs.column("b"))[[0, -1]] == pytest.approx([-1.0, 1.0], abs=1e-9)
+    hopfs = codim2_curve(field, branch.of_kind("Hopf")[0], "b", bounds=box)
+    back = codim2_curve(field, hopfs.of_kind("zero-Hopf")[0], "b", bounds=box)
+    assert back.attributes["kind"] == "fold"
+    assert back.column("a") == pytest.approx(np.zeros(len(back)), abs=1e-11)
+    assert np.sort(back.column("b"))[[0, -1]] == pytest.approx([-1.0, 1.0], abs=1e-9)
+    field = vector_field(double_hopf, {"a": -1.0, "b": -0.5}, 4)
+    start, = equilibrium_branch(field, parameter="a", bounds=(-1.0, 1.0)).of_kind("Hopf")
+    first = codim2_curve(field, start, "b", bounds=box)
+    other = codim2_curve(field, first.of_kind("double Hopf")[0], "b", bounds=box)
+    assert other.column("b") == pytest.approx(np.zeros(len(other)), abs=1e-11)
+    assert np.sort(other.column("a"))[[0, -1]] == pytest.approx([-1.0, 1.0], abs=1e-9)
+    assert other.column("frequency_hz") == pytest.approx(np.full(len(other), 1.0 / np.pi), rel=1e-9)
+
+
+def test_the_folds_through_a_bogdanov_takens_point():
+    field = vector_field(takens, {"b": -1.0, "c": -1.0}, 2)
+    branch = equilibrium_branch(field, [-0.6, 0.0], "b", bounds=(-2.0, 2.0))
+    hopf = codim2_curve(field, branch.of_kind("Hopf")[0], "c", bounds=BOX)
+    point, = hopf.of_kind("Bogdanov-Takens")
+    fold = codim2_curve(field, point, "c", bounds=BOX)
+    assert fold.column("b") == pytest.approx(0.25 * fold.column("c") ** 2, abs=1e-11)
+    assert np.sort(fold.column("c"))[[0, -1]] == pytest.approx([-2.0, 2.0], rel=1e-9)
+    with pytest.raises(InputError, match="on a curve of folds starts no other curve here"):
+        codim2_curve(field, fold.of_kind("Bogdanov-Takens")[0], "c")
 
 
 def characteristic_border(B, v0):

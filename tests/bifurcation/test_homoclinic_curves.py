@@ -61,6 +61,22 @@ def test_curve_of_homoclinic_orbits(field, near):
     assert 0.0299 < slope < 0.0301
 
 
+def test_values_of_auto(field, near):
+    """Printed by AUTO-07p with 60 intervals: c at m = -1 for two periods, at -2 and -4 for 60."""
+    hopf, = equilibrium_branch(field, [-1.0, 0.0], "c", bounds=(-2.0, 2.0)).of_kind("Hopf")
+    options = ContinuationOptions(bounds=(-2.0, 2.0), locate=False, stop_at="15",
+                                  events={"15": lambda values: values["period"] - 15.0})
+    orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), options=options)
+    assert orbits.points[-1].parameter == pytest.approx(0.743492, abs=6e-7)
+    assert near.parameter == pytest.approx(0.743444, abs=6e-7)
+    options = ContinuationOptions(largest_step=0.05, events={
+        "-2": lambda values: values["m"] + 2.0})
+    curve = codim2_curve(field, near, "m", keep="period", both=False, direction=1.0,
+                         bounds={"m": (-4.0, -0.5), "c": (-2.0, 5.0)}, options=options)
+    assert curve.of_kind("-2")[0].values["c"] == pytest.approx(1.06764, abs=6e-6)
+    assert curve.points[-1].values["c"] == pytest.approx(1.54103, abs=6e-6)
+
+
 def circle(t, x, p, out):
     # r = sqrt(a), with the period 2 pi / (w + a).
     square = x[0] * x[0] + x[1] * x[1]
@@ -88,7 +104,7 @@ def test_kind_errors(field, near):
     rest = equilibrium_branch(field, [-1.0, 0.0], "c", bounds=(-2.0, 2.0))
     with pytest.raises(InputError, match=r"is no orbit, whose period keep='period' could keep"):
         codim2_curve(field, rest.points[0], "m", keep="period")
-    with pytest.raises(InputError, match=r"or an orbit with keep='period'"):
+    with pytest.raises(InputError, match=r"or 'Bautin', or an orbit with keep='period'"):
         codim2_curve(field, rest.points[0], "m")
     with pytest.raises(InputError, match="keep = 'amplitude' must be 'kind' or 'period'"):
         codim2_curve(field, near, "m", keep="amplitude")

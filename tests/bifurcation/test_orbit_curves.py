@@ -6,6 +6,7 @@ from collocation_fields import two_masses_field
 
 from fecontact import InputError
 from fecontact.bifurcation import (
+    BranchStatus,
     Collocation,
     ContinuationOptions,
     PeriodicMotion,
@@ -166,6 +167,62 @@ def test_strong_resonances():
     assert [(at.kind, at.values["nu"]) for at in curve.special] == [
         ("resonance 1:3", pytest.approx(2.0 / 3.0, abs=1e-8)),
         ("resonance 1:4", pytest.approx(0.5, abs=1e-8))]
+
+
+def sheared(t, x, p, out):
+    # Across the circle, (a, b)' = (p0 a - b, p1 a + p0 b).
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, a, z = x[0] / r, x[1] / r, r - 1.0, x[2]
+    cube = a * a + z * z
+    radial = (p[0] - cube) * a - z
+    out[0] = radial * C - 2.0 * r * S
+    out[1] = radial * S + 2.0 * r * C
+    out[2] = (p[0] - cube) * z + p[1] * a
+
+
+def test_a_curve_of_tori_ends_where_neutral_saddles_begin():
+    """Multipliers exp(pi (p0 +- i sqrt(p1))): tori at p0 = 0 for p1 > 0 alone."""
+    field, t, circle = circle_field(sheared, growth=-0.2, shear=0.1)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "growth",
+                          method=Collocation(intervals=16), bounds=(-0.3, 0.3), scales=np.ones(3))
+    point, = branch.of_kind("Neimark-Sacker")
+    assert point.angle == pytest.approx(np.pi * np.sqrt(0.1), rel=1e-8)
+    curve = codim2_curve(field, point, "shear", direction=-1.0,
+                         bounds={"growth": (-0.3, 0.3), "shear": (-0.4, 0.4)})
+    assert curve.parameter == pytest.approx(np.zeros(len(curve)), abs=1e-9)
+    shear = curve.column("shear")
+    ends = sorted([shear[0], shear[-1]])
+    assert ends == pytest.approx([0.0, 0.4], abs=1e-8)
+    assert curve.of_kind("resonance 1:4")[0].values["shear"] == pytest.approx(0.25, abs=1e-8)
+    end, = curve.of_kind("resonance 1:1")
+    assert end in (curve.points[0], curve.points[-1])
+
+
+def ring(t, x, p, out):
+    # s' = p^2 + q^2 - 1/4 + s^2 + p s / 10 with s = r - 1.
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    s = r - 1.0
+    radial = p[0] * p[0] + p[1] * p[1] - 0.25 + s * s + 0.1 * p[0] * s
+    out[0] = radial * x[0] / r - (2.0 + 0.3 * x[0]) * x[1]
+    out[1] = radial * x[1] / r + (2.0 + 0.3 * x[0]) * x[0]
+
+
+def test_a_closed_curve_of_folds_is_gone_round_once():
+    """s = -p / 20 and 0.9975 p^2 + q^2 = 1/4."""
+    field = vector_field(ring, {"p": 0.0, "q": 0.1}, 2)
+    t = np.linspace(0.0, 2.0 * np.pi / np.sqrt(4.0 - 0.09 * 0.24), 600)
+    circle = (1.0 - np.sqrt(0.24)) * np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=float(t[-1])), "p",
+                          method=Collocation(intervals=20), bounds=(-1.0, 1.0), scales=np.ones(2))
+    assert branch.status is BranchStatus.CLOSED
+    curve = codim2_curve(field, branch.of_kind("fold")[0], "q",
+                         bounds={"p": (-1.0, 1.0), "q": (-1.0, 1.0)})
+    assert curve.status is BranchStatus.CLOSED
+    p, q = curve.parameter, curve.column("q")
+    assert 0.9975 * p**2 + q**2 == pytest.approx(np.full(len(p), 0.25), abs=1e-8)
+    angle = np.unwrap(np.arctan2(q, p))
+    assert abs(angle[-1] - angle[0]) == pytest.approx(2.0 * np.pi, rel=1e-6)
+    assert [point.kind for point in curve.special] == ["turning point"] * 2
 
 
 def test_kind_errors(masses):

@@ -140,6 +140,8 @@ def test_orbits_at_a_value(field, kept):
     assert [point.parameter for point in several] == pytest.approx([0.09, 0.16, 0.36], rel=1e-12)
     assert [radius(point) for point in several] == pytest.approx([0.3, 0.4, 0.6], rel=1e-7)
     assert kept.at(field, np.array([])) == ()
+    with pytest.raises(InputError, match="The values of the parameter"):
+        kept.at(field, ["some"])
 
 
 def test_an_orbit_is_followed_over_another_parameter(field, kept):

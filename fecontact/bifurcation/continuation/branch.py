@@ -21,6 +21,7 @@ from fecontact.bifurcation.continuation.points import (
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.core.checks import as_floats
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, span
@@ -153,7 +154,8 @@ class Branch(Summarised):
         """
         require_field(field)
         if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
-            return tuple(self.at(field, float(one), which) for one in value)
+            values = as_floats(value, "The values of the parameter").ravel().tolist()
+            return tuple(self.at(field, one, which) for one in values)
         require_finite("Branch.at", value=value)
         passed = self._passed(float(value))
         if not (isinstance(which, int | np.integer) and -len(passed) <= which < len(passed)):

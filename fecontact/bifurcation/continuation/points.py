@@ -230,8 +230,8 @@ class BranchPoint:
     def criticality(self) -> str | None:
         """'supercritical', 'subcritical' or 'undecided'; None where no normal form tells it.
 
-        It is known at Hopf points, and of orbits by collocation at period doublings and
-        Neimark-Sacker points.
+        It is known at Hopf points, at forks of equilibria, and of orbits by collocation at period
+        doublings and Neimark-Sacker points.
         """
         found = self._details.get("criticality")
         return None if found is None else str(found)
@@ -334,6 +334,16 @@ class CrossingPoint(BranchPoint):
     def other_tangent(self) -> Array:
         """Direction (d + 1,) of the other branch of equilibria."""
         return np.asarray(self._detail("other_tangent"))
+
+    @property
+    def form(self) -> str:
+        """'fork' or 'transcritical', of equilibria."""
+        return str(self._detail("form"))
+
+    @property
+    def coefficient(self) -> float:
+        """Coefficient c of equilibria, in y' = k m y + c y^3 (fork) or k m y + c y^2."""
+        return float(self._detail("coefficient"))
 
 
 class UnresolvedPoint(BranchPoint):

@@ -19,8 +19,8 @@ class BranchStatus(Enum):
 
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
-    HOPF = ("The orbits shrink to an equilibrium: the branch ends at a Hopf point, a curve of folds "
-            "at a Bautin point.")
+    HOPF = ("The orbits shrink to an equilibrium: the branch ends at a Hopf point, a curve of "
+            "folds at a Bautin point.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
     STOPPED = "The branch reached a point at which it was to stop."

@@ -14,10 +14,8 @@ from fecontact.bifurcation.equilibria.codim2_problems import (
     hopf_borders,
     scaled,
 )
-from fecontact.bifurcation.equilibria.equilibrium import default_scales
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.equilibria.normal_forms import critical_pair, null_vectors
-from fecontact.bifurcation.equilibria.problem import equilibrium_at
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 
@@ -26,25 +24,26 @@ _GROWTH = 1e4
 
 
 def equilibrium_curve(
-    field: VectorField, point: BranchPoint, second: str, widths: Mapping[str, float],
+    begin: Equilibrium, names: tuple[str, str], square: float | None, widths: Mapping[str, float],
     scales: ArrayLike | None,
 ) -> tuple[PlaneCurve, Array, dict[str, Any]]:
     """Problem, unknowns and attributes of the curve through a fold or Hopf point of equilibria.
 
     Parameters
     ----------
-    field, point, second, scales
+    begin : Equilibrium
+        With an eigenvalue at zero, or a pair on the imaginary axis.
+    names : (str, str)
+        The first and the second parameter.
+    square : float or None
+        Square of the pair's angular frequency; None at folds.
+    scales
         As for :func:`fecontact.bifurcation.codim2_curve`.
     widths : mapping
         Width of the diagram in each parameter by name; by default the size of its value.
-
-    Raises
-    ------
-    InputError
-        If the point is no equilibrium of the field, or its Jacobian has no pair of eigenvalues.
     """
-    begin = equilibrium_at(field, point)
-    first = point.branch.parameter_name
+    field = begin.field
+    first, second = names
     active = (field.index(second), field.index(first))
     if scales is None:
         sizes = np.maximum(default_scales(begin), np.abs(begin.state))
@@ -55,15 +54,29 @@ def equilibrium_curve(
     width = [widths.get(name, abs(float(begin.values[index])) or 1.0)
              for name, index in zip((second, first), active, strict=True)]
     plane = begin.values[list(active)]
-    if not isinstance(point, HopfPoint):
+    known = {"parameter_names": list(field.parameters), "parameter_values": begin.values,
+             "widths": np.array(width)}
+    if square is None:
         v, w = null_vectors(scaled(begin.jacobian, sizes))
         fold = FoldCurve(field, begin.values, active, np.concatenate([sizes, width]),
                          np.concatenate([limits, width]), w, v)
-        return fold, np.concatenate([begin.state, plane]), {}
-    if not (begin.eigenvalues.imag > 0.0).any():
-        raise InputError(f"{point.place} is no Hopf point of this field: all eigenvalues are real.")
-    square = critical_pair(begin.jacobian)[0].imag ** 2
+        return fold, np.concatenate([begin.state, plane]), known
     b, c = hopf_borders(scaled(begin.jacobian, sizes), square)
     hopf = HopfCurve(field, begin.values, active, np.concatenate([sizes, [square], width]),
                      np.concatenate([limits, [_GROWTH * square], width]), b, c)
-    return hopf, np.concatenate([begin.state, [square], plane]), {}
+    return hopf, np.concatenate([begin.state, [square], plane]), known
+
+
+def critical_square(begin: Equilibrium, point: BranchPoint) -> float | None:
+    """Square of the angular frequency at a Hopf point of a branch; None at a fold.
+
+    Raises
+    ------
+    InputError
+        If the Jacobian has no pair of eigenvalues at the Hopf point.
+    """
+    if not isinstance(point, HopfPoint):
+        return None
+    if not (begin.eigenvalues.imag > 0.0).any():
+        raise InputError(f"{point.place} is no Hopf point of this field: all eigenvalues are real.")
+    return critical_pair(begin.jacobian)[0].imag ** 2

@@ -1,6 +1,7 @@
 """Normal form coefficients of folds, Hopf points and branch points of equilibria."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from fecontact.core.types import Array, ComplexArray
 # Rounding of l1: relative to the sum of its terms, and to the l1 of a Jacobian that changes by its
 # own size over the scales.
 _CANCELLATION, _JACOBIAN_ROUNDING = 1e-9, 1e-15
+# Part of the terms of a coefficient of a branch point below which it is zero, and the product of
+# null vectors below which zero is a double eigenvalue.
+_ZERO, _DEFECTIVE = 1e-6, 1e-8
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,45 @@ def fold_coefficient(field: VectorField, x: Array, values: Array, scales: Array)
     v, w = null_vectors(J[0])
     quadratic = bend(field, x, values, v, scales)[0].first @ v
     return 0.5 * float(w @ quadratic) / float(w @ v)
+
+
+def crossing_form(field: VectorField, x: Array, values: Array, scales: Array) -> dict[str, Any]:
+    r"""Normal form of a branch point: a fork y' = k m y + c y^3 or transcritical, k m y + c y^2.
+
+    .. math:: c = \tfrac12 w B(v, v) \quad \text{or} \quad
+        \tfrac16 w \big[ C(v, v, v) - 3 B(v, J^+ B(v, v)) \big]
+
+    with the null vectors v and w of J, |v| = 1, w v = 1, and y along v. It is a fork where the
+    former is zero to the accuracy of its differences. Its bent branch is stable, besides the other
+    eigenvalues, where c < 0 (supercritical).
+
+    References
+    ----------
+    Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., sections 5.4 and 7.4.
+    """
+    d = len(x)
+    _, J, _ = field.derivatives(np.zeros(1), x[None], values)
+    v, w = null_vectors(J[0])
+    if abs(w @ v) < _DEFECTIVE:
+        return {}
+    bordered = np.zeros((d + 1, d + 1))
+    bordered[:d, :d], bordered[:d, d], bordered[d, :d] = J[0], w, v
+    w = w / (w @ v)
+    found = []
+    for part in bend(field, x, values, v, scales):
+        bent = part.first @ v
+        inner = np.linalg.solve(bordered, np.append(bent, 0.0))[:d]
+        sizes = np.abs(part.second) @ np.abs(v) + 3.0 * np.abs(part.first) @ np.abs(inner)
+        found.append((float(w @ bent), float(w @ (part.second @ v - 3.0 * part.first @ inner)),
+                      float(np.abs(w) @ np.abs(part.first) @ np.abs(v)),
+                      float(np.abs(w) @ sizes)))
+    (quadratic, cubic, size, terms), (coarse, coarse_cubic, *_) = found
+    length = 1.0 / float(np.linalg.norm(v / scales))
+    if abs(quadratic) > abs(quadratic - coarse) + _ZERO * (size + terms * length):
+        return {"form": "transcritical", "coefficient": 0.5 * quadratic}
+    decided = abs(cubic) > abs(cubic - coarse_cubic) + _ZERO * (terms + size / length)
+    return {"form": "fork", "coefficient": cubic / 6.0, "criticality":
+            ("supercritical" if cubic < 0.0 else "subcritical") if decided else "undecided"}
 
 
 def branching_tangents(

@@ -20,6 +20,7 @@ from fecontact.bifurcation.equilibria.equilibrium import (
 from fecontact.bifurcation.equilibria.normal_forms import (
     branching_tangents,
     critical_pair,
+    crossing_form,
     fold_coefficient,
     hopf,
     null_vectors,
@@ -136,7 +137,8 @@ class EquilibriumProblem(Problem):
                     "coefficient": fold_coefficient(self.field, x, values, self.scales)}
         if kind == "branch point":
             other = branching_tangents(self.field, x, values, self.index, self.scales, tangent)
-            return {"null_vector": v} | ({} if other is None else {"other_tangent": other})
+            return {"null_vector": v, **crossing_form(self.field, x, values, self.scales)} | (
+                {} if other is None else {"other_tangent": other})
         return {}
 
     def _hopf(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any] | None:

@@ -17,6 +17,7 @@ _SECOND = (np.array([8 / 5, -1 / 5, 8 / 315, -1 / 560]), np.array([3 / 2, -3 / 2
 _STEPS = 3.0 ** np.arange(3.0, -19.0, -1.0)
 # Relative difference of both orders up to which the step with the best agreement is taken.
 _AGREEMENT = 1e-3
+_EPS = 2.2e-16
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,9 @@ def bend(
     """Derivatives of the Jacobian at x along a direction (d,), by formulas of order eight and six.
 
     Steps from 27 scales of the states down to 1e-9 of them are tried, and the one is taken at
-    which both formulas agree best; entries count in the scales of the states. ``shift`` (k,)
-    moves the parameter values along with the states. ``every`` leaves steps out, for derivatives
-    that need not be the best.
+    which both formulas agree best, to rounding; entries count in the scales of the states.
+    ``shift`` (k,) moves the parameter values along with the states. ``every`` leaves steps out, for
+    derivatives that need not be the best.
     """
     size = float(np.linalg.norm(direction / scales))
     if shift is not None:
@@ -59,8 +60,10 @@ def bend(
     odd = A[:, 5:] - A[:, 3::-1]
     even = A[:, 5:] + A[:, 3::-1] - 2.0 * A[:, 4:5]
     balance = np.append(scales, np.ones(len(active))) / scales[:, None]
-    first, coarse_first = _best(odd, _FIRST, h, balance)
-    second, coarse_second = _best(even, _SECOND, h**2, balance)
+    # Of the rows: entries may be what cancellation leaves.
+    rounding = _EPS * (np.abs(A) * balance).max(axis=(1, 3))[:, :, None]
+    first, coarse_first = _best(odd, _FIRST, h, balance, rounding)
+    second, coarse_second = _best(even, _SECOND, h**2, balance, rounding)
     return Bend(first, second), Bend(coarse_first, coarse_second)
 
 
@@ -84,11 +87,12 @@ def _jacobians(
 
 
 def _best(
-    parts: Array, weights: tuple[Array, Array], power: Array, balance: Array
+    parts: Array, weights: tuple[Array, Array], power: Array, balance: Array, rounding: Array
 ) -> tuple[Array, Array]:
     fine, coarse = (np.einsum("k,skij->sij", w, parts) / power[:, None, None] for w in weights)
     with np.errstate(invalid="ignore", over="ignore"):
-        error = np.abs((fine - coarse) * balance).max(axis=(1, 2))
+        error = (np.abs((fine - coarse) * balance) + rounding / power[:, None, None]).max(
+            axis=(1, 2))
         size = np.abs(fine * balance).max(axis=(1, 2))
     error[~np.isfinite(error)] = np.inf
     relative = np.where(size > 0.0, error / np.where(size > 0.0, size, 1.0), np.inf)

@@ -16,9 +16,9 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
-from fecontact.bifurcation.orbits.ends import VANISHED_ON_CURVES, VANISHING, vanishing
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
+from fecontact.bifurcation.orbits.same_orbit import VANISHED_ON_CURVES, VANISHING, vanishing
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 

@@ -9,7 +9,6 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
-from fecontact.bifurcation.orbits.ends import VANISHING, is_homoclinic, vanishing
 from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.mesh import (
     carry_over,
@@ -17,7 +16,15 @@ from fecontact.bifurcation.orbits.mesh import (
     extremes,
 )
 from fecontact.bifurcation.orbits.normal_forms import examined
-from fecontact.bifurcation.orbits.same_orbit import HALVING, halves_meet, in_phase, same_place
+from fecontact.bifurcation.orbits.same_orbit import (
+    HALVING,
+    VANISHING,
+    halves_meet,
+    in_phase,
+    is_homoclinic,
+    same_place,
+    vanishing,
+)
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
