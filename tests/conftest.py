@@ -30,7 +30,7 @@ LONG = {
     "test_sweep", "test_sweep_command", "test_sweep_strobed", "test_sweep_summaries",
     "test_movie", "test_analysis_plots", "test_trust", "test_damaged_files", "test_whole_files",
     "test_cli", "test_solid_commands", "test_cli_stop", "test_open", "test_locks", "test_bad_input",
-    "test_poincare_scan", "test_branch_study", "test_orbits_by_shooting", "test_squeal",
+    "test_poincare_scan", "test_branches_in_space", "test_branch_study", "test_orbits_by_shooting", "test_squeal",
     "test_convergence", "test_mode_convergence",
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",
     "test_receptance", "test_references", "test_eigen", "test_set_valued_search",
