@@ -452,3 +452,23 @@ def test_summaries_of_one_point_see_all_directions():
         "rms_velocity@C": (0.13 + fall**2 / 3.0) ** 0.5}, rel=1e-3)
     with pytest.raises(fc.InputError, match="plane bodies do not move along z"):
         summarise(fc.Study.from_toml(PLANE).run(), functions_for(["amplitude_z@0"]))
+
+
+def test_sweeps_of_solids_have_the_numbers_of_single_runs(tmp_path):
+    from fecontact.sweeps.summaries import functions_for, summarise
+
+    path = tmp_path / "pad.toml"
+    path.write_text(PAD)
+    study = fc.Study.read(path).with_(**{"load.normal": 100.0, "ground.speed": 0.1,
+                                         "drive.stiffness_x": 1e3, "drive.stiffness_y": 1e3})
+    names = ("amplitude_x", "amplitude_y@0", "amplitude_z@0", "friction_power", "belt_power")
+    table = fc.sweep(study, {"ground.speed_y": [0.0, 0.2]}, summaries=names, workers=1,
+                     folder=tmp_path / "sweep")
+    for case in range(2):
+        alone = summarise(study.with_(**table.changes(case)).run(), functions_for(names))
+        assert alone == {name: table.values[name][case] for name in names}
+    # What the belts give moves the pad too; friction is the same on both, and along them.
+    friction, belt = table.values["friction_power"], table.values["belt_power"]
+    assert belt[1] / belt[0] == pytest.approx(5.0**0.5, rel=2e-3)
+    assert (belt - friction)[1] == pytest.approx((belt - friction)[0], rel=0.02)
+    assert table.values["amplitude_y@0"][1] > 100.0 * table.values["amplitude_y@0"][0]
