@@ -48,8 +48,8 @@ on a coarse one, where all are within 3 % of the published ones.
 {_plate()}
 
 The published values are those of Mindlin's plate whose edges do not move along themselves (modes 4
-to 7 to 6e-5). Lines along the bottom hold z alone: the twist of the plate near its edges is
-free, which costs mode 7, two half waves each way, most. What each support costs, Q2, 8 x 8 x 2; with
+to 7 to 6e-5). Lines along the bottom hold z alone: the twist of the plate near its edges is free,
+which costs mode 7, two half waves each way, most. What each support costs, Q2, 8 x 8 x 2; with
 sides that neither move up nor along themselves the solid has standing waves of Rayleigh and Lamb,
 to which its frequencies converge like h^3.9:
 

@@ -198,7 +198,7 @@ def test_mixed_and_unread_elements_are_told(tmp_path):
 def test_surfaces_beside_a_solid_and_faces_without_area_are_told(tmp_path):
     path = tmp_path / "a.vtu"
     mesh = block_mesh((1, 1, 1))
-    nodes = np.vstack([mesh.nodes, mesh.nodes + [1.0, 0.0, 0.0]])
+    nodes = np.vstack([mesh.nodes, mesh.nodes + np.eye(3)[0]])
     meshio.write(path, meshio.Mesh(nodes, [("hexahedron", mesh.cells), ("quad", mesh.outline),
                                            ("triangle", [[8, 9, 10], [0, 1, 8]])]))
     with pytest.raises(MeshError, match=r"mixes dimensions: 2 of its surface elements have nodes "

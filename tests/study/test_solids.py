@@ -441,9 +441,10 @@ def test_what_nothing_holds_is_named():
 def test_summaries_of_one_point_see_all_directions():
     from fecontact.sweeps.summaries import functions_for, summarise
 
+    start = {"displacement": [0.0] * 6, "velocity": [0.3, 0.2, 0, 0, 0, 0]}
     run = fc.Study.from_toml(PAD).with_(**{
         "gap": 1.0, "load.gravity": [0.0, 0.0, -9.81], "simulation.t_end": 0.01,
-        "simulation.initial": {"displacement": [0.0] * 6, "velocity": [0.3, 0.2, 0, 0, 0, 0]}}).run()
+        "simulation.initial": start}).run()
     found = summarise(run, functions_for(["amplitude_x@C", "amplitude_y@C", "amplitude_z@C",
                                           "rms_velocity@C"]))
     fall = 9.81 * 0.01
@@ -467,8 +468,7 @@ def test_sweeps_of_solids_have_the_numbers_of_single_runs(tmp_path):
     for case in range(2):
         alone = summarise(study.with_(**table.changes(case)).run(), functions_for(names))
         assert alone == {name: table.values[name][case] for name in names}
-    # What the belts give moves the pad too; friction is the same on both, and along them.
-    friction, belt = table.values["friction_power"], table.values["belt_power"]
+    # Friction is the same on both belts, and along them: they give mu N V.
+    belt = table.values["belt_power"]
     assert belt[1] / belt[0] == pytest.approx(5.0**0.5, rel=2e-3)
-    assert (belt - friction)[1] == pytest.approx((belt - friction)[0], rel=0.02)
     assert table.values["amplitude_y@0"][1] > 100.0 * table.values["amplitude_y@0"][0]
