@@ -80,8 +80,8 @@ def _periods(states: Array, once: Array, system: ContactSystem) -> float:
     :func:`fecontact.analysis.periodicity`.
     """
     basis, m = system.basis, system.basis.modes
-    points = [0, *range(2, 2 + basis.contact_nodes)]
-    rows = basis.T[points, : basis.dimension].reshape(-1, m).T
+    seen_at = [0, *range(2, 2 + basis.contact_nodes)]
+    rows = basis.T[seen_at, : basis.dimension].reshape(-1, m).T
     seen = np.hstack([states[:, :m] @ rows, states[:, m : 2 * m] @ rows])
     size = np.ptp(seen, axis=0)
     moves = np.concatenate([part > 1e-9 * part.max(initial=0.0) for part in np.split(size, 2)])

@@ -12,12 +12,14 @@ from fecontact import (
     ContactSystem,
     Drive,
     Ground,
+    InputError,
     Load,
     ModalBasis,
     basis_from_matrices,
     ensemble,
     simulate,
 )
+from fecontact.analysis import periodicity
 from fecontact.bifurcation import (
     Axis,
     Collocation,
@@ -126,9 +128,36 @@ def test_scan_of_impacts_is_that_of_the_plane():
         size = np.abs(one).max(axis=(0, 1))
         assert (np.abs(other[..., [0, 1, 3, 4]] - one) < 1e-4 * size).all()
         assert np.abs(other[..., [2, 5]]).max() < 1e-12
+    for mine, theirs in zip(space.observed("B", "z"), plane.observed("B", "y"), strict=True):
+        assert mine == pytest.approx(theirs, abs=1e-4 * np.abs(theirs).max())
+    with pytest.raises(InputError, match=r"component 'phi' at 'B' must be one of .*'phi_x'.*'z'"):
+        space.observed("B", "phi")
+    with pytest.raises(InputError, match="component 'z' at 'B' must be one of 'phi', 'x', 'y'"):
+        plane.observed("B", "z")
     # Two different states at the frequency of period two, one at the other.
     spread = np.ptp(space.up[..., 0], axis=1) / np.abs(space.up[..., 0]).max(axis=1)
     assert spread[0] > 0.01 > 100.0 * spread[1]
+
+
+def test_crossings_and_periods_are_those_of_the_plane():
+    """At 30.84 rad/s the motion repeats after two periods; nothing moves but along z."""
+    w = 30.84
+    period = 2.0 * np.pi / w
+    found = []
+    for system, axis in ((impact_oscillator(2, w), "y"), (impacts_in_space(w), "z")):
+        section = Crossing("B", axis, of="velocity", sense="falling")
+        found.append(simulate(system, 100 * period, initial=np.zeros(system.size),
+                              outputs=4001, events=[section], rtol=1e-9))
+    plane, space = found
+    assert len(plane.events.only("event 0")) > 80
+    assert space.events.only("event 0").time == pytest.approx(
+        plane.events.only("event 0").time, abs=1e-5 * period)
+    assert [periodicity(run, t_start=50 * period).periods for run in found] == [2, 2]
+    with pytest.raises(InputError, match="component = 'w' must be one of"):
+        Crossing("B", "w")
+    with pytest.raises(InputError, match="component 'phi' at 'B' must be one of"):
+        Crossing("B", "phi").row(impacts_in_space())
+    assert Axis("B", "phi_z").row(impacts_in_space()).shape == (6,)
 
 
 def test_basins_are_those_of_the_plane():

@@ -47,6 +47,27 @@ def test_every_element_reaches_its_full_rate(element, cells, errors, rates):
     assert reached == pytest.approx([order] * 3, rel=0.06)
 
 
+def test_plate_between_walls_has_standing_lamb_waves():
+    """In three dimensions they are exact; errors fall like h^4."""
+    exact = np.array([sliding_box.lamb_hz(halves) for halves in sliding_box.BENDING])
+    coarse, fine = (sliding_box.bending_hz(10.0 / n, n // 4, "walls") for n in (4, 8))
+    assert fine / exact - 1.0 == pytest.approx([5.28e-4, 2.384e-3, 2.311e-3, 7.136e-3], rel=5e-3)
+    # With twice as fine a mesh 3.92, 3.89, 3.90 and 3.87.
+    assert np.log2((coarse - exact) / (fine - exact)) == pytest.approx(
+        [3.84, 3.77, 3.78, 3.67], abs=0.02)
+
+
+def test_published_plate_does_not_move_along_its_edges():
+    """FV52 is Mindlin's plate of such edges; held along z alone, a plate is softer in twist."""
+    found = [sliding_box.mindlin_hz(halves) for halves in sliding_box.BENDING[:3]]
+    assert found == pytest.approx(np.array(sliding_box.PLATE_HZ)[[0, 1, 3]], rel=6e-5)
+    on = {name: sliding_box.bending_hz(1.25, 2, name) for name in sliding_box.SUPPORTS}
+    softer = 1.0 - on["sides"] / on["walls"]
+    assert softer[:3] == pytest.approx([0.0361, 0.0211, 0.0306], abs=5e-4)
+    line = 1.0 - on["lines"] / on["sides"]
+    assert line[:3] == pytest.approx([0.0154, 0.0232, 0.0374], abs=5e-4)
+
+
 def test_plate_on_line_supports_is_near_its_published_frequencies_on_coarse_meshes_only():
     """NAFEMS FV52 with 4 x 4 x 1 and 8 x 8 x 2 elements; the first frequency falls on and on."""
     coarse, fine = sliding_box.plate_hz(2.5, 1), sliding_box.plate_hz(1.25, 2)

@@ -191,9 +191,26 @@ def test_mixed_and_unread_elements_are_told(tmp_path):
     meshio.write(path, meshio.Mesh(hexahedra.nodes, surface))
     with pytest.raises(MeshError, match=r"holds surfaces only, in space .*; a solid needs"):
         read_mesh(path)
-    meshio.write(path, meshio.Mesh(with_roof, [("tetra", roof), *surface,
-                                               ("triangle", [[4, 6, 8]])]))
-    assert len(read_mesh(path).cells) == 1  # surfaces beside a solid are its faces
+    meshio.write(path, meshio.Mesh(with_roof, [("tetra", roof), ("triangle", [[4, 6, 8]])]))
+    assert len(read_mesh(path).cells) == 1  # surfaces on a solid are its faces
+
+
+def test_surfaces_beside_a_solid_and_faces_without_area_are_told(tmp_path):
+    path = tmp_path / "a.vtu"
+    mesh = block_mesh((1, 1, 1))
+    nodes = np.vstack([mesh.nodes, mesh.nodes + np.eye(3)[0]])
+    meshio.write(path, meshio.Mesh(nodes, [("hexahedron", mesh.cells), ("quad", mesh.outline),
+                                           ("triangle", [[8, 9, 10], [0, 1, 8]])]))
+    with pytest.raises(MeshError, match=r"mixes dimensions: 2 of its surface elements have nodes "
+                                        r"that belong to no solid element; mesh all of the body"):
+        read_mesh(path)
+    # A roof instead of a block: two corners of a hexahedron coincide with two others.
+    roof = mesh.nodes.copy()
+    high = np.flatnonzero(roof[:, 2] > 0.0)
+    roof[high, 0] = 0.0
+    meshio.write(path, meshio.Mesh(roof, [("hexahedron", mesh.cells)]))
+    with pytest.raises(MeshError, match="1 mesh cells have no volume, or are folded or inverted"):
+        read_mesh(path)
 
 
 def test_solids_without_a_third_coordinate_or_with_inverted_cells_are_told(tmp_path):

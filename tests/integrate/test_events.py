@@ -137,8 +137,10 @@ def test_events_are_stored(tmp_path):
 def test_bad_input():
     with pytest.raises(InputError, match="'touchdown' must be one of"):
         ContactEvents(stop="touchdown")
-    with pytest.raises(InputError, match="component = 'z'"):
-        Crossing("B", "z")
+    with pytest.raises(InputError, match="component = 'w'"):
+        Crossing("B", "w")
+    with pytest.raises(InputError, match="component 'z' at 'B' must be one of 'phi', 'x', 'y'"):
+        simulate(drop(), 1.0, initial=START, events=[Crossing("B", "z")])
     with pytest.raises(InputError, match="sense = 'up'"):
         Crossing("B", "x", sense="up")
     with pytest.raises(InputError, match="value = nan"):

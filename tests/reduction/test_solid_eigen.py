@@ -4,19 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import eigsh
+from scipy.sparse import csr_array, eye_array
+from scipy.sparse.linalg import eigsh, splu
 from skfem import MeshHex, MeshTet
 from solid_blocks import block_mesh
 
 import fecontact.reduction.solvers.solid_solver as solid_solver
 import fecontact.reduction.static_modes.residual_vectors as residual_vectors
-from fecontact import ElasticBody, InputError, Material, Mesh, modal_basis
+from fecontact import AnalysisError, ElasticBody, InputError, Material, Mesh, modal_basis
 from fecontact.fem.elements.cell_kinds import CELL_KINDS
 from fecontact.reduction import eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import FreeSystem, eigenmodes, strain_energies
-from fecontact.reduction.solvers.factorisation import factorised, nested_dissection
+from fecontact.reduction.solvers.factorisation import (
+    CholmodFactors,
+    factorised,
+    nested_dissection,
+)
 from fecontact.reduction.solvers.lobpcg import lowest_modes
 from fecontact.reduction.solvers.solid_solver import aspect_ratios, suited
+from fecontact.reduction.static_modes.residual_vectors import Flexibility, IteratedFlexibility
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 
@@ -228,6 +234,31 @@ def test_many_rows_of_large_bodies_are_iterated_to_a_part_of_the_tolerance(room,
         missing = 1.0 - (rows**2).sum(axis=1) / exact[:-3]
         assert 0.5 * tolerance < missing.max() <= tolerance
         assert missing.min() > -1e-9
+
+
+def test_cholmod_where_it_is_installed():
+    """The same modes and flexibility, and the same complaint, as by SuperLU."""
+    pytest.importorskip("sksparse.cholmod")
+    body = ElasticBody(block((4, 3, 3)), STEEL)
+    system = FreeSystem.of(body, "direct")
+    assert isinstance(system.factors, CholmodFactors)
+    K = system.stiffness[system.held][:, system.held].tocsc()
+    force = np.random.default_rng(0).standard_normal((K.shape[0], 3))
+    expected = splu(K).solve(force)
+    assert np.abs(system.factors.solve(force) - expected).max() < 1e-9 * np.abs(expected).max()
+    L, diagonal, place = system.factors.triangle()
+    product = (L.toarray() * diagonal) @ L.toarray().T
+    assert np.abs(product[np.ix_(place, place)] - K).max() < 1e-13 * abs(K).max()
+    assert eigenmodes(body, 12, "direct")[0][6:] == pytest.approx(
+        eigenmodes(body, 12, "iterative")[0][6:], rel=1e-9)
+    rows = csr_array(np.eye(6, K.shape[0] + 6))
+    compliance = Flexibility(system, rows).compliance
+    assert compliance == pytest.approx(
+        IteratedFlexibility(FreeSystem.of(body, "iterative"), rows, 1e-7).compliance,
+        abs=1e-6 * compliance.max())
+    with pytest.raises(AnalysisError, match="stiffness of the supported body is singular"):
+        factorised((system.stiffness - 1e-2 * abs(system.stiffness).max() * eye_array(
+            system.stiffness.shape[0])).tocsc())
 
 
 def test_nested_dissection():

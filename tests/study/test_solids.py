@@ -441,9 +441,10 @@ def test_what_nothing_holds_is_named():
 def test_summaries_of_one_point_see_all_directions():
     from fecontact.sweeps.summaries import functions_for, summarise
 
+    start = {"displacement": [0.0] * 6, "velocity": [0.3, 0.2, 0, 0, 0, 0]}
     run = fc.Study.from_toml(PAD).with_(**{
         "gap": 1.0, "load.gravity": [0.0, 0.0, -9.81], "simulation.t_end": 0.01,
-        "simulation.initial": {"displacement": [0.0] * 6, "velocity": [0.3, 0.2, 0, 0, 0, 0]}}).run()
+        "simulation.initial": start}).run()
     found = summarise(run, functions_for(["amplitude_x@C", "amplitude_y@C", "amplitude_z@C",
                                           "rms_velocity@C"]))
     fall = 9.81 * 0.01
@@ -452,3 +453,22 @@ def test_summaries_of_one_point_see_all_directions():
         "rms_velocity@C": (0.13 + fall**2 / 3.0) ** 0.5}, rel=1e-3)
     with pytest.raises(fc.InputError, match="plane bodies do not move along z"):
         summarise(fc.Study.from_toml(PLANE).run(), functions_for(["amplitude_z@0"]))
+
+
+def test_sweeps_of_solids_have_the_numbers_of_single_runs(tmp_path):
+    from fecontact.sweeps.summaries import functions_for, summarise
+
+    path = tmp_path / "pad.toml"
+    path.write_text(PAD)
+    study = fc.Study.read(path).with_(**{"load.normal": 100.0, "ground.speed": 0.1,
+                                         "drive.stiffness_x": 1e3, "drive.stiffness_y": 1e3})
+    names = ("amplitude_x", "amplitude_y@0", "amplitude_z@0", "friction_power", "belt_power")
+    table = fc.sweep(study, {"ground.speed_y": [0.0, 0.2]}, summaries=names, workers=1,
+                     folder=tmp_path / "sweep")
+    for case in range(2):
+        alone = summarise(study.with_(**table.changes(case)).run(), functions_for(names))
+        assert alone == {name: table.values[name][case] for name in names}
+    # Friction is the same on both belts, and along them: they give mu N V.
+    belt = table.values["belt_power"]
+    assert belt[1] / belt[0] == pytest.approx(5.0**0.5, rel=2e-3)
+    assert table.values["amplitude_y@0"][1] > 100.0 * table.values["amplitude_y@0"][0]
