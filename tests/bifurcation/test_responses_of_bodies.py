@@ -74,7 +74,7 @@ def test_block_that_slips_in_two_directions(friction):
 
 
 def pair_of_beams():
-    """Two clamped beams on each other, pressed by a load at the end of the upper one that shakes."""
+    """Two clamped beams on each other, the upper one pressed down; a force shakes its end."""
     mesh = fc.generate(fc.Beam(length=0.1, height=0.004, element_size=0.004))
     bodies = {f"beam{k}": fc.ElasticBody(mesh.placed((0.0, k * 0.004)), thickness=0.01,
                                          fixed={"left": "xy"}) for k in range(2)}

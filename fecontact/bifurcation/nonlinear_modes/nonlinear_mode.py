@@ -18,7 +18,7 @@ from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_row
-from fecontact.bifurcation.nonlinear_modes.linear_start import XI, LinearStart, linear_start
+from fecontact.bifurcation.nonlinear_modes.linear_start import LinearStart, linear_start
 from fecontact.bifurcation.nonlinear_modes.mode_problem import ModeProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
@@ -90,7 +90,7 @@ class NonlinearMode(Summarised):
 
     @property
     def damping_ratio(self) -> Array:
-        """xi / (2 Omega) (N,)."""
+        """Xi / (2 Omega) (N,)."""
         return np.asarray(self.xi / (2.0 * self.angular_frequency))
 
     @property
