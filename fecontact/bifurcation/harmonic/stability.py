@@ -105,10 +105,15 @@ def _floquet(problem: Balance, T: float, f: Array, J: Array) -> Floquet:
         J[:, k, k] -= LEAK / T
     factors, nothing, widths = _room(N, len(points), layout.states)
     condensation.condense(J, f, nothing, widths, T, basis, slopes, 0, factors)
-    if problem.autonomous or layout.states < _MANY:
+    if problem.autonomous or not layout.displacements or layout.states < _MANY:
         return floquet_of(factors, problem.autonomous)
     M = np.empty((N, layout.states, layout.states))
     transitions(factors, M)
+    # Velocities in the scale of displacements, by the stiffness of each coordinate.
+    m, scale = layout.displacements, np.ones(layout.states)
+    stiffness = -J[:, m : 2 * m, :m].mean(axis=0).diagonal()
+    scale[m : 2 * m] = np.sqrt(np.maximum(stiffness, (2.0 * np.pi / T) ** 2))
+    M *= scale / scale[:, None]
     product, largest = M[0], 0.0
     for step in M[1:]:
         product = step @ product
