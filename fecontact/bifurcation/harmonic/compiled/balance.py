@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
 from fecontact.bifurcation.fields.parametrised_system import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
 
@@ -52,7 +52,7 @@ class CompiledBalance:
         if near is None or not near.low < value < near.high:
             values = problem.values.copy()
             values[problem.free] = value
-            near = self.affine = self.contact_field.affine(values, problem.free)
+            near = self.affine = affine_arrays(self.contact_field, values, problem.free)
             self.known.clear()
         if near is None:
             return None
