@@ -7,8 +7,8 @@ from scripts_for_tests import ROOT, check_numbers, run_script
 BENCHMARKS = {
     "bodies": ((), [(r"^ (2) bodies of 20 modes", 2.0, 0.0)]),
     "contact_kernels": ((), [(r"^ +400 +(\d+)", 40.0, 0.0)]),
-    "continuation": ((), [(r"^ +50 .* (\S+) +\S+$", 0.0, 1e-9),
-                           (r"^ +50 .* \S+ +(\S+)$", 0.0, 1e-6)]),
+    "continuation": ((), [(r"^ +50 fecontact .* (\S+) +\S+$", 0.0, 1e-9),
+                          (r"^ +50 fecontact .* \S+ +(\S+)$", 0.0, 1e-6)]),
     "eigen": ((), [(r"^square 13 x 13, P2.* (\S+)$", 0.0, 1e-12),
                    (r"^cube .* iterative .* (\S+)$", 0.0, 1e-8),
                    (r"^plate .* direct .* (\S+)$", 0.0, 1e-8)]),
@@ -25,7 +25,7 @@ BENCHMARKS = {
     "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
-HELPERS = {"integrator", "integrator_peers", "integrator_problems"}
+HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems"}
 
 
 def test_every_benchmark_is_here():
