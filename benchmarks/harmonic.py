@@ -94,12 +94,12 @@ class Numpy:
             tangent = np.linalg.solve(np.vstack([J, tangent]), unit)
             tangent /= np.linalg.norm(tangent)
             while True:
-                Y, count = X + step * tangent, 0
+                Y, needed = X + step * tangent, 0
                 for count in range(1, 11):
                     R, J = self.equations(Y)
                     change = np.linalg.solve(np.vstack([J, tangent]),
                                              -np.append(R, tangent @ (Y - X) - step))
-                    Y = Y + change
+                    Y, needed = Y + change, count
                     if np.linalg.norm(change) < 1e-8 * (1.0 + np.linalg.norm(Y)):
                         break
                 else:
@@ -108,7 +108,7 @@ class Numpy:
                 break
             X = Y
             found.append(X)
-            step = min(step * (1.5 if count < 4 else 0.8), largest)
+            step = min(step * (1.5 if needed < 4 else 0.8), largest)
         return np.array(found)
 
 
@@ -130,7 +130,7 @@ def jenkins(x: Array, values: Array) -> tuple[Array, Array]:
 
 
 def duffing_system() -> fc.ContactSystem:
-    """x'' + .05 x' + x + .1 x^3 = .18 sin W t."""
+    """X'' + .05 x' + x + .1 x^3 = .18 sin W t."""
     rows = np.zeros((3, 1))
     rows[1, 0] = 1.0
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
@@ -140,7 +140,7 @@ def duffing_system() -> fc.ContactSystem:
 
 
 def jenkins_system() -> fc.ContactSystem:
-    """x'' + .02 x' + x + f = sin W t."""
+    """X'' + .02 x' + x + f = sin W t."""
     rows = np.zeros((3, 1))
     rows[0, 0] = 1.0
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
@@ -198,7 +198,8 @@ def oscillator(name: str, rounds: int, points: int) -> None:
             each = 1e6 * spent / len(branch)
             off = np.abs(response.harmonic(1)).max() / peak - 1.0
             print(f"{name:8s} fecontact {stability or 'no stability':14s} {len(branch):5d} points "
-                  f"{each:8.1f} us a point, NumPy over it {numpy_each / each:6.2f}, peak {off:8.1e}")
+                  f"{each:8.1f} us a point, NumPy over it {numpy_each / each:6.2f}, "
+                  f"peak {off:8.1e}")
 
 
 def largest_error(mine: Branch, exact: Branch, modes: int) -> float:

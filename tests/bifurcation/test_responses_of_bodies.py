@@ -74,7 +74,7 @@ def test_block_that_slips_in_two_directions(friction):
 
 
 def pair_of_beams():
-    """Two clamped beams on each other, pressed by a load at the end of the upper one that shakes."""
+    """Two clamped beams on each other, the upper one pressed down; a force shakes its end."""
     mesh = fc.generate(fc.Beam(length=0.1, height=0.004, element_size=0.004))
     bodies = {f"beam{k}": fc.ElasticBody(mesh.placed((0.0, k * 0.004)), thickness=0.01,
                                          fixed={"left": "xy"}) for k in range(2)}
@@ -103,7 +103,7 @@ def test_two_beams_with_an_interface():
     assert off < 1e-6
     mine = here.orbit(samples=501).states
     row = field.displacement_row("beam1.end", "y")
-    assert np.abs((mine - states) @ row).max() < 2e-3 * np.ptp(states @ row) / 2.0
+    assert np.abs((mine - states) @ row).max() < 1e-3 * np.ptp(states @ row) / 2.0
     for k in range(6):
         size = np.ptp(states[:, k]) / 2.0
         if size > 1e-2 * np.ptp(states[:, 0]):
