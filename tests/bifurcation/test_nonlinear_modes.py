@@ -18,11 +18,18 @@ from fecontact.bifurcation import (
     nonlinear_mode,
     orbit_branch,
 )
+from fecontact.bifurcation.nonlinear_modes.linear_start import unforced
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import FourParameterIwanFriction, Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.reduction import CubicSpring, point_masses
+from fecontact.system.forcing_period import common_period
 
 UP = (0.0, 1.0)
+
+
+def forcing_free(system):
+    """Whether nothing excites a system."""
+    return common_period(system) is None
 
 
 def masses(first=0.0, second=0.0, between=0.0, damping=0.0, **parts):
@@ -194,6 +201,39 @@ def test_free_bodies_vibrate_about_where_they_are():
     assert np.abs(mode.coordinates(0)).max() < 1e-12
     assert mode.conservative
     assert mode.stable.all()
+
+
+def test_what_depends_on_time_is_left_out_and_the_rest_kept():
+    rows = np.zeros((3, 1))
+    rows[0, 0] = 1.0
+    basis = fc.basis_from_matrices([[2.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
+                                   translations=[[1.0], [0.0]])
+    given = fc.ContactSystem(
+        basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0, 1e-6),
+        drive=fc.Drive(stiffness_x=3.0, motion_x=fc.laws.Constant(0.1), angular_frequency=2.0),
+        load=fc.Load(gravity=(0.4, 0.0), base_acceleration_x=Harmonic(1.0, 3.0), forces=(
+            fc.PointLoad("C", "x", signal=fc.laws.Constant(0.5)),
+            fc.PointLoad("C", "x", signal=fc.laws.Pulse("half-sine", 1.0, 1.0)))))
+    free = unforced(given)
+    assert forcing_free(free)
+    state = np.zeros(3)
+    # Gravity, the constant force and the displaced spring remain, in modal forces.
+    assert free.rhs(0.3, state)[1] == pytest.approx((2.0 * 0.4 + 0.5 + 0.3) / np.sqrt(2.0))
+    assert (free.rhs(0.3, state) == free.rhs(0.7, state)).all()
+    assert given.rhs(0.3, state)[1] != given.rhs(0.7, state)[1]
+
+
+def test_elements_at_nodes_without_normal_force_slide_in_the_linear_mode():
+    """A gap opens one of two nodes: its spring has no part in the frequency."""
+    rows = np.zeros((2, 3, 2))
+    rows[:, 0, 0] = rows[:, 1, 1] = 1.0
+    basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {
+        "contact": rows, "B": rows[0], "C": rows[0]})
+    system = fc.ContactSystem(
+        basis, normal=fc.laws.LinearContact(1e4, 0.0), friction=JenkinsFriction(8.0, 1.0, 1e-6),
+        drive=fc.Drive(stiffness_x=1.0), load=fc.Load(normal=1.0), gap=(0.0, 1.0))
+    mode = nonlinear_mode(system, (1e-6, 1e-4), method=HarmonicBalance(1, 64))
+    assert mode.angular_frequency == pytest.approx(np.sqrt(1.0 + 4.0), rel=1e-6)
 
 
 @pytest.mark.parametrize(("samples", "within"), [(512, 4e-5), (4096, 1e-6)])

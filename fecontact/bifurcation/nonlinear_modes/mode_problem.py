@@ -82,7 +82,7 @@ class ModeProblem(HarmonicProblem):
 
     @property
     def rounding(self) -> float:
-        """See :attr:`Problem.rounding`."""
+        """Relative size of Newton steps below which growing steps are rounding."""
         return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:

@@ -197,8 +197,8 @@ def nonlinear_mode(
     method : HarmonicBalance, optional
         Harmonics, samples; kinks need many samples.
     options : ContinuationOptions, optional
-        By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: relative
-        changes of amplitude, of a fifth of the frequency, of a damping ratio of 0.1. Without bounds.
+        By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: changes
+        relative to amplitude, a fifth of the frequency, a damping ratio of 0.1. Without bounds.
 
     Raises
     ------
@@ -266,8 +266,8 @@ def _leaving(
     seen = complex(row @ start.shape)
     m = field.system().basis.modes
     if abs(seen) <= _LEAST_SEEN * np.linalg.norm(row[:m]) * np.linalg.norm(start.shape[:m]):
-        raise InputError(f"{observed} does not move in this mode, at {w / (2.0 * np.pi):.5g} Hz, or "
-                         f"hardly; observe another displacement.")
+        raise InputError(f"{observed} does not move in this mode, at {w / (2.0 * np.pi):.5g} Hz, "
+                         f"or hardly; observe another displacement.")
     # The observed displacement begins at its largest value.
     shape = start.shape * amplitude / seen
     sizes = np.abs(shape)
