@@ -15,9 +15,12 @@ from .output.files.dataset import to_pandas, to_xarray
 from .output.files.export import export_csv, export_fields, export_mat, export_netcdf
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
+from .output.files.stored_system import read_system
 from .output.files.wear import read_wear, write_wear
 from .output.report.branch_report import report_branches
+from .output.report.mode_report import report_modes
 from .output.report.notebook import ReportFrame, report_frame, report_widget
+from .output.report.response_report import report_response
 from .output.report.run_report import report
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import UffModes, read_uff
@@ -41,12 +44,15 @@ __all__ = [
     "read_mode",
     "read_resonance_curve",
     "read_response",
+    "read_system",
     "read_table",
     "read_uff",
     "read_wear",
     "report",
     "report_branches",
     "report_frame",
+    "report_modes",
+    "report_response",
     "report_sweep",
     "report_widget",
     "to_pandas",

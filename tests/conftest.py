@@ -31,6 +31,7 @@ LONG = {
     "test_sweep", "test_sweep_command", "test_sweep_strobed", "test_sweep_summaries",
     "test_movie", "test_analysis_plots", "test_trust", "test_damaged_files", "test_whole_files",
     "test_cli", "test_solid_commands", "test_cli_stop", "test_open", "test_locks", "test_bad_input",
+    "test_friction_dampers", "test_response_command", "test_report_response", "test_orbit_trajectories",
     "test_poincare_scan", "test_branch_study", "test_orbits_by_shooting", "test_squeal",
     "test_convergence", "test_mode_convergence",
     "test_integrator", "test_collocation", "test_points_as_starts", "test_orbit_bifurcations",

@@ -13,6 +13,7 @@ import friction_section
 import impact_section
 import line_contact_section
 import normal_contact
+import responses_section
 import sliding_solids_section
 import solids_section
 import two_bodies_section
@@ -43,6 +44,7 @@ def main() -> None:
                        ("solids", lambda: solids_section.section(images)),
                        ("sliding solids", lambda: sliding_solids_section.section(images)),
                        ("continuation", continuation_cases.section),
+                       ("frequency responses", lambda: responses_section.section(images)),
                        ("section 4.2", lambda: impact_section.section(images)),
                        ("section 4.3", lambda: friction_section.section(images)),
                        ("section 4.4", lambda: two_mass_section.section(images))):

@@ -32,6 +32,7 @@ from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range
+from .response_options import ResponseSettings
 
 __all__ = [
     "Attractor",
@@ -61,6 +62,7 @@ __all__ = [
     "PoincareScan",
     "Resonance",
     "ResonanceCurve",
+    "ResponseSettings",
     "Shooting",
     "StabilityMap",
     "UnresolvedPoint",

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from fecontact.cli.commands import about, branch, run, study, sweep
+from fecontact.cli.commands import about, branch, response, run, study, sweep
 from fecontact.core.errors import InputError
 
 
@@ -35,6 +35,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.wear,
     sweep.sweep,
     branch.branch,
+    response.response,
     run.report,
     run.render,
     run.plot,

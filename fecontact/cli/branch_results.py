@@ -26,14 +26,15 @@ _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "per
 
 def write_branch_results(
     result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
-    beneath: "PoincareScan | None" = None, study: str | None = None,
+    beneath: "PoincareScan | None" = None, study: str | None = None, root: Path | None = None,
 ) -> list[Path]:
     """Write branches as HDF5, CSV and a page, and plot them; returns the files."""
     from fecontact.output.plots.bifurcation_diagram import plot_branches
     from fecontact.output.plots.stability import plot_eigenvalues
     from fecontact.output.report.branch_report import report_branches
 
-    files = [write_branches(folder / f"{name}-branch.h5", result.found)]
+    files = [write_branches(folder / f"{name}-branch.h5", result.found, study=study, root=root,
+                            system=result.contact_field.system())]
     table = folder / f"{name}-branch.csv"
     write_text(table, branches_csv(result.found))
     files.append(table)

@@ -15,3 +15,12 @@ Changes = Annotated[list[str] | None, Parameter(
     help="Override a key of the study, `ground.speed=0.1`; may be repeated.")]
 Folder = Annotated[Path | None, Parameter(
     name=["--output", "-o"], help="Folder of the results; by default that of the study.")]
+Branches = Annotated[str | None, Parameter(
+    name="--branch", help="Of a file of branches: name of one, or its number from 0; of a level.")]
+At = Annotated[float | None, Parameter(
+    help="Of a file of branches: the orbit at this value of the parameter, of a nonlinear mode "
+    "that of this amplitude [m]; by default that of the largest observed amplitude.")]
+AtHz = Annotated[float | None, Parameter(
+    name="--at-hz", help="The same of an angular frequency, in Hz.")]
+Which = Annotated[int, Parameter(
+    help="Which of several orbits at this value, counted along the branch from 0.")]

@@ -138,7 +138,7 @@ def has_run(file: Path, changes: Iterable[str] | None = None) -> Path:
             raise InputError(f"{study.results / study.name}.vtkhdf does not exist; run the study "
                              f"first: fecontact run {file}")
         return found
-    _no_changes(file, changes)
+    require_stored(file, changes)
     if not file.is_dir():
         return file
     runs = sorted(file.glob("*.vtkhdf"))
@@ -171,9 +171,10 @@ def run_of(study: "Study") -> Path | None:
     return next(iter(near.values()), None)
 
 
-def _no_changes(file: Path, changes: Iterable[str] | None) -> None:
+def require_stored(file: Path, changes: Iterable[str] | None) -> None:
+    """InputError where keys of a study are changed of what is a stored result."""
     if changes:
-        raise InputError(f"--set changes keys of a study, but {file} is a stored run; name the "
+        raise InputError(f"--set changes keys of a study, but {file} is a stored result; name the "
                          f"study instead.")
 
 

@@ -15,6 +15,7 @@ from fecontact.core.errors import InputError, MissingLibraryError, choices
 
 FRAMES = (".vtkhdf", ".pvd", ".vtu")  # fields over the bodies, for ParaView
 MEDIA = (".png", ".mp4", ".pdf")
+BRANCHES = (".h5", ".hdf5")  # branches and responses, shown as a page made of their numbers
 _started: list[subprocess.Popen[bytes]] = []  # not waited for; Python warns of those let go
 
 
@@ -36,7 +37,7 @@ def require_kind_of_result(file: Path) -> None:
     if not file.is_file():
         raise InputError(f"{file} does not exist; give a file that fecontact wrote, or a study "
                          f"that was run.")
-    known = (*FRAMES, *MEDIA)
+    known = (*FRAMES, *MEDIA, *BRANCHES)
     if file.suffix.lower() not in known:
         raise InputError(f"{file} is not a result that can be shown without running code; files "
                          f"that can end in {choices(known)}.")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fecontact.bifurcation.diagram_options import BranchSettings
+from fecontact.bifurcation.response_options import ResponseSettings, flat_levels
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import (
@@ -62,7 +63,7 @@ from fecontact.system.quasistatic.history import LoadHistory
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
     "simulation": SimulationSettings, "wear": WearSettings, "branch": BranchSettings,
-    "output": OutputSettings, "render": RenderSettings,
+    "response": ResponseSettings, "output": OutputSettings, "render": RenderSettings,
 }
 
 
@@ -99,6 +100,8 @@ class Study(Summarised, StudyModels):
         ``[wear]``
     branch : BranchSettings
         ``[branch]``
+    response : ResponseSettings
+        ``[response]``
     output : OutputSettings
         ``[output]``
     render : RenderSettings
@@ -127,6 +130,7 @@ class Study(Summarised, StudyModels):
     simulation: SimulationSettings = field(default_factory=SimulationSettings)
     wear: WearSettings = field(default_factory=WearSettings)
     branch: BranchSettings = field(default_factory=BranchSettings)
+    response: ResponseSettings = field(default_factory=ResponseSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     render: RenderSettings = field(default_factory=RenderSettings)
     preload: PreloadSettings | None = None
@@ -193,6 +197,8 @@ class Study(Summarised, StudyModels):
         require_readable(tables, title)
         tables = {name: table if name in ("geometry", "bodies") else with_folder(table, folder)
                   for name, table in tables.items()}
+        if "response" in tables:
+            tables["response"] = flat_levels(tables["response"])
         for name in tables:
             if name == "contact":
                 raise InputError(f"{title} has an unknown section 'contact'; laws of single "

@@ -10,7 +10,7 @@ import numpy as np
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, quantity, suitable_unit
-from fecontact.output.files.case import library_versions
+from fecontact.output.files.stored_system import library_versions
 from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload

@@ -66,15 +66,16 @@ def test_the_diagram_is_that_of_the_branches(found, path):
     shown = Shown(path)
     for number, table in enumerate(shown.header["branches"]):
         branch = found.found[table["name"]]
-        x, y = (shown.array("branches", number, name) for name in "xy")
+        x, y = (shown.array("branches", number, name, 0) for name in "xy")
         np.testing.assert_allclose(x, branch.parameter, atol=1e-5 * np.ptp(branch.parameter))
         heights = branch.column("observed_maximum")
         np.testing.assert_allclose(1e-3 * y[:, 0], heights, rtol=1e-4)
         special = {index for index, point in enumerate(branch.points) if point.kind is not None}
         assert {index for index, _ in table["special"]} == special
         assert special <= set(table["kept"])
-    assert shown.header["xLabel"] == "ground speed [m/s]"
-    assert shown.header["yLabel"] == "displacement x of B, maximum [mm]"
+    diagram, = shown.header["diagrams"]
+    assert diagram["xLabel"] == "ground speed [m/s]"
+    assert diagram["yLabel"] == "displacement x of B, maximum [mm]"
     # The rigid block has no stress to paint.
     assert shown.header["bodies"]["paints"] == ["displacement", "none"]
 

@@ -18,6 +18,7 @@ from fecontact.core.types import Array, ComplexArray
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.orbits.motions import PeriodicMotion
+    from fecontact.integrate.trajectory import Trajectory
 
 # Kind of a point at which the stability changes though no test function has a zero, or that finer
 # meshes do not have.
@@ -148,12 +149,9 @@ class BranchPoint:
             If the point is no orbit, or was found by shooting and there is no field.
         """
         from fecontact.bifurcation.harmonic.layout import balanced
-        from fecontact.bifurcation.orbits.motions import collocated, run_again
+        from fecontact.bifurcation.orbits.motions import collocated, of_runs
 
-        if not (isinstance(samples, int | np.integer) and samples >= 2):
-            raise InputError(f"orbit: samples = {samples!r} must be a whole number from 2 on.")
-        if not self.is_orbit:
-            raise InputError(f"{self.place} is no periodic orbit.")
+        self._require_orbit("orbit: samples", samples)
         values = None if field is None else self.parameter_values(field)
         period = float(self.values["period"])
         mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
@@ -165,11 +163,52 @@ class BranchPoint:
             raise InputError(f"{self.place} was found by shooting, whose orbits are run again; "
                              f"give the field: point.orbit(field).")
         else:
-            # Shooting is for contact fields alone, the only ones with a system.
-            found = run_again(field.system(values), self.u, mesh, period,  # type: ignore[attr-defined]
-                              samples)
+            found = of_runs(self._runs(field, samples), period)
         periods = int(self.branch.attributes["periods"]) if self.header is not None else 1
         return replace(found, periods=periods, parameter_values=values)
+
+    def trajectory(self, field: VectorField, outputs: int = 1001) -> "Trajectory":
+        """The orbit over one period as a trajectory, which can be plotted, stored and rendered.
+
+        Orbits by shooting are run again. Of others the work is integrated over the outputs by the
+        trapezoidal rule, so that the error of energies falls with the square of their distance.
+
+        Parameters
+        ----------
+        field : ContactField
+            That of the branch.
+        outputs : int
+            Number of times; orbits by shooting may have some more.
+
+        Raises
+        ------
+        InputError
+            If the point is no orbit, or the field is not that of a contact system.
+        """
+        from fecontact.bifurcation.fields.contact_field import ContactField
+        from fecontact.bifurcation.orbits.motions import joined, sampled_run
+
+        require_kind("trajectory", ContactField, field=field)
+        self._require_orbit("trajectory: outputs", outputs)
+        if self.by_shooting:
+            return joined(self._runs(field, outputs))
+        system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]
+        return sampled_run(system, self.orbit(field, outputs))
+
+    def _require_orbit(self, name: str, samples: int) -> None:
+        if not (isinstance(samples, int | np.integer) and samples >= 2):
+            raise InputError(f"{name} = {samples!r} must be a whole number from 2 on.")
+        if not self.is_orbit:
+            raise InputError(f"{self.place} is no periodic orbit.")
+
+    def _runs(self, field: VectorField, samples: int) -> "list[Trajectory]":
+        """Runs of the segments of an orbit by shooting."""
+        from fecontact.bifurcation.orbits.motions import run_again, solver_of
+
+        # Shooting is for contact fields alone, the only ones with a system.
+        system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]
+        return run_again(system, self.u, np.asarray(self.values["mesh"], dtype=float),
+                         float(self.values["period"]), samples, solver_of(self.branch.attributes))
 
     @property
     def located(self) -> bool:

@@ -27,6 +27,36 @@ class BranchStatus(Enum):
     INTERRUPTED = "The continuation was interrupted; what was computed until then is kept."
 
 
+@dataclass(frozen=True, eq=False)
+class Stride:
+    """Plain steps of a branch that a problem makes at once, without special points among them.
+
+    Attributes
+    ----------
+    points : list of Solution
+        One for each step.
+    problem : Problem
+        The problem for the next step.
+    here, before : Solution
+        Last point, with the tangent in the lengths of that problem, and the one before it.
+    step : float
+        Length of the next step.
+    """
+
+    points: list[Any]
+    problem: "Problem"
+    here: Any
+    before: Any
+    step: float
+
+
+class Strider(Protocol):
+    """What makes plain steps."""
+
+    def stride(self, problem: Any, here: Any, step: float, most: int, start: Any) -> Stride | None:
+        """At most so many plain steps from a solution; None if the next step is none."""
+
+
 class Linearisation(Protocol):
     """The equations about some u."""
 
@@ -115,6 +145,10 @@ class Problem(Protocol):
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
         """Problem, u and tangent on a new mesh, asked for after each step; None to keep the old."""
+        return None
+
+    def strider(self, options: "ContinuationOptions") -> Strider | None:
+        """What makes plain steps of a branch faster than one by one."""
         return None
 
     def met_again(

@@ -89,7 +89,17 @@ def continuation(
     stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
     before: Solution | None = None
     halved, whole = 0, step
+    strider = problem.strider(options)
     while count < options.points:
+        if strider is not None and halved == 0 and count > 1:
+            stride = strider.stride(problem, here, step, options.points - count, start)
+            if stride is not None:
+                for at in stride.points:
+                    yield BranchPoint(at.u, at.tangent, at.values)
+                count += len(stride.points)
+                problem, here, before = stride.problem, stride.here, stride.before
+                step = stride.step
+                continue
         step = min(step, _OVERSHOOT * _room(here, options))
         try:
             reached = _step(problem, here, step, options)

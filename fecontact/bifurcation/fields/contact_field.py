@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
+from fecontact.bifurcation.fields.parametrised_system import AffineArrays, ParametrisedSystem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
@@ -65,6 +65,15 @@ class ContactField(VectorField):
     def arrays(self, values: Array) -> SystemArrays:
         """Arrays of the system for kernels, for parameter values (k,)."""
         return self._family.arrays(values)
+
+    @property
+    def constant_period(self) -> bool:
+        """Whether no parameter of the field changes the period of the forcing."""
+        return self._constant_period
+
+    def affine(self, values: Array, index: int) -> AffineArrays | None:
+        """Arrays over one parameter; see :meth:`ParametrisedSystem.affine`."""
+        return self._family.affine(values, index)
 
     def rates(self, t: Array, x: Array, values: Array) -> Array:
         """Rates (N, d); see :meth:`VectorField.rates`."""

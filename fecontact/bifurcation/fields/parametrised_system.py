@@ -3,11 +3,13 @@
 Building a system and its arrays takes some 0.2 ms of Python. Most arrays are constant or affine in
 each parameter; these are interpolated between the corners of a box, after a check at further
 points of it. The boxes lie about the base values, each twice as wide as the one before, so that the
-result depends on the parameter values alone and not on earlier calls.
+result depends on the parameter values alone and not on earlier calls. Where ranges are given, they
+are the first box.
 """
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from itertools import product
 from numbers import Real
 from typing import Any
@@ -28,6 +30,29 @@ _MOST_PARAMETERS = 4
 _AFFINE_ERROR = 1e-12
 # Largest number of doublings of the box; values farther away are not interpolated.
 _MOST_LEVELS = 50
+# Part of a range by which its box is wider, for differences at its ends.
+_BEYOND = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class AffineArrays:
+    """Arrays over one parameter p, the others fixed: those that vary are views of one vector.
+
+    Attributes
+    ----------
+    arrays : SystemArrays
+    flat, base, slope : (k,) arrays
+        What varies; ``flat[:] = base + p * slope`` sets it.
+    low, high : float
+        Range of p.
+    """
+
+    arrays: SystemArrays
+    flat: Array
+    base: Array
+    slope: Array
+    low: float
+    high: float
 
 
 class ParametrisedSystem:
@@ -39,10 +64,13 @@ class ParametrisedSystem:
         The system before any of the parameters is set.
     parameters : dict
         Names and base values.
+
+    ``ranges`` are those of the parameters, for all of them or none.
     """
 
     def __init__(
-        self, system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str]
+        self, system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str],
+        ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         require_kind("A field of a system", ContactSystem, system=system)
         require_kind("A field of a system", Iterable, names=parameters)
@@ -62,12 +90,29 @@ class ParametrisedSystem:
         self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
         self._base, self._width = values, np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
         self._first: _Corners | None = None
+        self._given: _Corners | None = None
         # The box used last, and its range of values.
         self._recent: tuple[list[tuple[float, float]], _Corners] | None = None
         if 0 < len(values) <= _MOST_PARAMETERS:
             self.system(values)
-            self._first = self._box((0,) * len(values))
+            self._first = self._between(ranges or {}) or self._box((0,) * len(values))
         self._fixed = self.system(values).arrays if not len(values) else None
+
+    def _between(self, ranges: Mapping[str, tuple[float, float]]) -> "_Corners | None":
+        """A box of ranges that are given; None where some are not, or none is affine over it."""
+        if set(ranges) != set(self.parameters):
+            return None
+        low, high = np.array([ranges[name] for name in self.parameters], dtype=float).T
+        if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
+            return None
+        for beyond in (_BEYOND, 0.0):
+            try:
+                self._given = _corners(self, low - beyond * (high - low),
+                                       high + beyond * (high - low))
+            except (_NotAffineError, FecontactError):
+                continue
+            return self._given
+        return None
 
     def system(self, values: Array) -> ContactSystem:
         """The system itself; those made last are kept.
@@ -122,10 +167,17 @@ class ParametrisedSystem:
         here = self.system(values).arrays
         return SystemArrays(*(_slope(step, *each) for each in zip(here, *sides, strict=True)))
 
+    def affine(self, values: Array, index: int) -> AffineArrays | None:
+        """Arrays over one parameter about its value; None where they are not affine in it."""
+        corners = None if self._fixed is not None else self._corners_of(values)
+        return None if corners is None else corners.along(values, index)
+
     def _corners_of(self, values: Array) -> "_Corners | None":
         """The box for these values; None where they are not interpolated."""
         if self._first is None:
             return None
+        if self._given is not None and self._given.hold(values):
+            return self._given
         if self._recent is not None and _inside(values, self._recent[0]):
             return self._recent[1]
         levels = tuple(_level(value - base, width) for value, base, width in zip(
@@ -225,12 +277,26 @@ class _Corners:
                 return False
         return True
 
+    def along(self, values: Array, index: int) -> AffineArrays:
+        """Arrays of their own over one value, the others fixed."""
+        ends = [values.copy(), values.copy()]
+        ends[0][index], ends[1][index] = self.low[index], self.high[index]
+        low, high = (np.array(self._weights(end)) @ self._flat for end in ends)
+        slope = (high - low) / (self.high[index] - self.low[index])
+        flat = low.copy()
+        return AffineArrays(self._with(flat, list(self._plain)), flat,
+                            low - self.low[index] * slope, slope, float(self.low[index]),
+                            float(self.high[index]))
+
     def at(self, values: Array) -> SystemArrays:
+        return self._with(np.array(self._weights(values)) @ self._flat, list(self._plain))
+
+    def _weights(self, values: Array) -> list[float]:
         weights = [1.0]
         for (low, high), value in zip(self._limits, values.tolist(), strict=True):
             x = (value - low) / (high - low)
             weights = [w * (1.0 - x) for w in weights] + [w * x for w in weights]
-        return self._with(np.array(weights) @ self._flat, list(self._plain))
+        return weights
 
     def _with(self, flat: Array, arrays: list[Any]) -> SystemArrays:
         for number, place, shape in self._places:

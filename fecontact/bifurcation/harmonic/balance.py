@@ -9,14 +9,19 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic.compiled_balance import CompiledBalance
+from fecontact.bifurcation.harmonic.compiled_steps import Equations
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
-from fecontact.bifurcation.harmonic.memory import differences, march, solve_around
+from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 
 # Relative step of differences in a parameter that changes the period.
 _DIFFERENCE = 1e-5
+UNREPEATED = ("The internal variables of friction do not come to repeat; take more samples a "
+              "period.")
+_NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0))
 
 
 def turn_of(field: VectorField, values: Array, free: int) -> float | None:
@@ -72,6 +77,10 @@ class Balance:
     turn : float, optional
         Product of the period of the forcing and the parameter, where this is a frequency; see
         :func:`turn_of`.
+    kept : Kept
+        Deflections of elements that never slide.
+    compiled : CompiledBalance, optional
+        Makes compiled equations.
     """
 
     field: VectorField
@@ -84,11 +93,17 @@ class Balance:
     layout: Layout
     periods: int = 1
     turn: float | None = None
+    kept: Kept = _NOTHING_KEPT
+    compiled: CompiledBalance | None = None
+
+    def equations(self, value: float) -> Equations | None:
+        """Compiled equations about a value of the parameter; None where there are none."""
+        return None if self.compiled is None else self.compiled.equations(self, value)
 
     @cached_property
     def autonomous(self) -> bool:
         """Whether the period is an unknown."""
-        return self.field.forcing_period(self.values) is None
+        return self.turn is None and self.field.forcing_period(self.values) is None
 
     @cached_property
     def series(self) -> Series:
@@ -170,9 +185,9 @@ class Balance:
         assert isinstance(self.field, ContactField)
         x[:, m : 2 * m] = differences(x[:, :m]) / period
         z = np.empty((self.samples, layout.memory))
-        if not march(self.times(period), x, self.field.arrays(self.parameters(u)), period, z):
-            raise AnalysisError("The internal variables of friction do not come to repeat; take "
-                                "more samples a period.")
+        if not march(self.times(period), x, self.field.arrays(self.parameters(u)), period,
+                     self.kept.at(x[:, :m]), z):
+            raise AnalysisError(UNREPEATED)
         x[:, first:] = z
         return x
 
@@ -314,6 +329,7 @@ class Linearised:
         _, J, P = problem.field.derivatives(self.times, x, problem.parameters(self.u),
                                             (problem.free,))
         J = J[:, first:]
+        J[:, :, :m] += LEAK / T * problem.kept.rows
         values = problem.series.values
         speeds = differences(values) / T
         found = np.empty((N, c, 2 * H + 1, b))

@@ -100,9 +100,7 @@ def goes_on(
 
 def method_of(point: BranchPoint) -> HarmonicBalance:
     """Harmonic balance as the branch of a point has it."""
-    known = point.branch.attributes
-    return HarmonicBalance(int(known["harmonics"]), int(known["samples"]),
-                           stability=str(known["stability"]))
+    return starts.method_of(point.branch.attributes)
 
 
 def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
@@ -130,9 +128,10 @@ def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
             "parameter_names": list(field.parameters),
             "parameter_values": problem.values, "scales": problem.scales,
             "harmonics": problem.harmonics, "samples": problem.samples,
-            "stability": problem.stability, "periods": problem.periods,
+            "stability": problem.stability or "none", "periods": problem.periods,
             "displacements": layout.displacements, "memory": layout.memory,
-            "memory_nodes": layout.nodes}
+            "memory_nodes": layout.nodes,
+            **({"kept_deflections": problem.kept.offsets} if layout.memory else {})}
 
 
 def follow(

@@ -63,6 +63,25 @@ def layout_of(field: VectorField) -> Layout:
     return Layout(field.dimension, modes, memory, nodes if memory else 0)
 
 
+def element_rows(field: VectorField, layout: Layout) -> Array:
+    """Rows (c, m) of the displacements that deflect springs with sliders; zero for other variables.
+
+    Bristles that never slide are no springs: their deflection stays about zero.
+    """
+    rows = np.zeros((layout.memory, layout.displacements))
+    if not (layout.memory and isinstance(field, ContactField)):
+        return rows
+    system = field.system()
+    arrays, s = system.arrays, layout.memory // layout.nodes
+    tangents = [arrays.Tx, arrays.T2] if len(arrays.T2) else [arrays.Tx]
+    for nodes, share, law in system.law_groups("friction"):
+        if law.memory and law.sliders(share) is not None:
+            for node in range(layout.nodes)[nodes]:
+                for k in range(law.memory * len(tangents)):
+                    rows[node * s + k] = tangents[k % len(tangents)][node]
+    return rows
+
+
 def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> Array:
     """States (N, d) from coefficients, internal variables (N, c) and the basis (N, 2 H + 1)."""
     m, end = layout.displacements, layout.states - layout.memory

@@ -3,18 +3,22 @@
 Their rates g have kinks, of which a few harmonics know nothing. They are found at the N samples
 instead, by backward differences of second order, which damp what is stiff,
 
-    (3 z_n - 4 z_(n-1) + z_(n-2)) N / (2 T) = g(q_n, q'_n, z_n) - e z_n / T,
+    (3 z_n - 4 z_(n-1) + z_(n-2)) N / (2 T) = g(q_n, q'_n, z_n) - e (z_n - s_n) / T,
 
 with velocities q' that are the same differences of the displacements: a spring that sticks follows
-its displacement exactly. The leak e = 1e-6 makes the mean deflection of an element that never
-slides zero, which nothing else determines. What is found repeats, so that its derivatives are those
-of these equations, cyclic and node by node.
+its displacement exactly. Nothing but the leak e = 1e-6 determines the mean deflection of an element
+that never slides: s is the deflection x + a of an element that has stuck since it was preloaded, a
+the part that it slid back then (:class:`Kept`). One that slides a little gives up as much of a as
+it must. What is found repeats, so that its derivatives are those of these equations, cyclic and
+node by node.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
@@ -25,8 +29,34 @@ _nodes = types.Array(f8, 4, "C")
 
 LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
-_ROUNDS, _STEPS = 40, 40
+_ROUNDS, _STEPS = 60, 40
 _REPEATS, _SOLVED = 1e-12, 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Deflections that elements have which never slide: x + a.
+
+    Attributes
+    ----------
+    rows : (c, m) array
+        The displacement x from q, of springs; zero for other internal variables.
+    offsets : (c,) array
+        a [m].
+    """
+
+    rows: Array
+    offsets: Array
+
+    def at(self, q: Array) -> Array:
+        """Deflections (N, c) for displacements q (N, m)."""
+        return np.asarray(q @ self.rows.T + self.offsets)
+
+    def left_by(self, states: Array) -> "Kept":
+        """Those that elements have after states (N, d), on the average."""
+        c, m = self.rows.shape
+        return Kept(self.rows, (states[:, states.shape[1] - c :]
+                                - states[:, :m] @ self.rows.T).mean(axis=0))
 
 
 def differences(z: Array) -> Array:
@@ -88,15 +118,55 @@ def solve_around(slopes, T, x):
                     x[place, node * s + i, c] = value
 
 
-@kernel(i8(vector, matrix, SYSTEM, f8, matrix))
-def march(t, y, s, T, z):
+@helper
+def _bracket(turn, start, off, brackets):
+    """Narrow the brackets of starts between which Newton's method goes to and fro.
+
+    An element that leaks towards its limit sticks with one start and slips much with the next; the
+    start that repeats lies between them, where it slips as much as it has leaked. ``brackets``
+    (5, 2 k) hold the last starts and how far off they were, lower and upper ends, and whether there
+    are any.
+    """
+    k = len(start) // 2
+    for i in range(k):
+        gap = max(abs(off[i]), abs(off[k + i]))
+        if brackets[4, i] > 0.0:
+            ahead = 0.0
+            for entry in (i, k + i):
+                ahead += off[entry] * (brackets[3, entry] - brackets[2, entry])
+            side = 2 if ahead > 0.0 else 3
+            for entry in (i, k + i):
+                brackets[side, entry] = start[entry]
+        elif turn > 1 and gap > brackets[1, i]:
+            for entry in (i, k + i):
+                brackets[2, entry], brackets[3, entry] = brackets[0, entry], start[entry]
+            brackets[4, i] = 1.0
+        for entry in (i, k + i):
+            brackets[0, entry] = start[entry]
+        brackets[1, i] = gap
+
+
+@helper
+def _keep_within(start, brackets):
+    """Halve the brackets that starts have left."""
+    k = len(start) // 2
+    for i in range(k):
+        low, high = brackets[2, i], brackets[3, i]
+        if brackets[4, i] > 0.0 and not min(low, high) < start[i] < max(low, high):
+            for entry in (i, k + i):
+                start[entry] = 0.5 * (brackets[2, entry] + brackets[3, entry])
+
+
+@kernel(i8(vector, matrix, SYSTEM, f8, matrix, matrix))
+def march(t, y, s, T, target, z):
     """Fill z (N, c) with the internal variables that repeat; c = n nodes times their number.
 
     t (N,) are the times of the samples and y (N, d) the states, with the differences of the
-    displacements as velocities. Rounds begin without deflection; after two of them, Newton's method
-    finds the start that repeats. Returns 1 if every node has come to that, 0 if one has not.
+    displacements as velocities; ``target`` (N, c) are the deflections to which they leak. Rounds begin
+    without deflection; after two of them, Newton's method finds the start that repeats. Returns 1
+    if every node has come to that, 0 if one has not.
     """
-    t, y, s, z = borrowed(t), borrowed(y), borrowed(s), borrowed(z)
+    t, y, s, z, target = borrowed(t), borrowed(y), borrowed(s), borrowed(z), borrowed(target)
     N, n = len(t), len(s.Tx)
     states = s.memory.max()
     length, width = force_room(states, in_space(s))
@@ -112,13 +182,16 @@ def march(t, y, s, T, z):
         a, pivots = np.empty((k, k)), np.empty(k, dtype=np.int64)
         ring, ring_pivots = np.empty((2 * k, 2 * k)), np.empty(2 * k, dtype=np.int64)
         start, off, step = np.zeros(2 * k), np.empty(2 * k), np.empty(k)
-        repeats = False
+        last_round = np.empty(k)
+        repeats, largest = False, 0.0
+        brackets = np.zeros((5, 2 * k))
         for turn in range(_ROUNDS):
-            largest = 0.0
+            alike = 0
             for place in range(N):
                 motion, moved = node_motion(j, y[place], s), ground_motion(t[place], s)
                 here = path[place, :k]
                 for i in range(k):
+                    last_round[i] = here[i]
                     here[i] = path[place - 1, i] if place > 0 else start[i]
                 for _ in range(_STEPS):
                     node_forces(j, motion, moved, here, s, force, rates)
@@ -126,7 +199,7 @@ def march(t, y, s, T, z):
                         one = path[place - 1, i] if place > 0 else start[i]
                         two = (path[place - 2, i] if place > 1 else
                                start[i] if place == 1 else start[k + i])
-                        step[i] = (rates[i, 0] - leak * here[i]
+                        step[i] = (rates[i, 0] - leak * (here[i] - target[place, j * states + i])
                                    - rate * (1.5 * here[i] - 2.0 * one + 0.5 * two))
                         for c in range(k):
                             a[i, c] = -rates[i, 3 + c]
@@ -148,6 +221,14 @@ def march(t, y, s, T, z):
                             (1.0 if c == k + i else 0.0))
                         turned[place, i, c] = rate * (2.0 * one - 0.5 * two)
                 solve_rows(a, pivots, turned[place, :k, : 2 * k])
+                # Where two samples are those of the last round, all behind them are.
+                if turn > 0:
+                    moved_by = 0.0
+                    for i in range(k):
+                        moved_by = max(moved_by, abs(here[i] - last_round[i]))
+                    alike = alike + 1 if moved_by <= _SOLVED * largest else 0
+                    if alike == 2:
+                        break
             gap = 0.0
             for i in range(k):
                 for last in range(2):
@@ -160,10 +241,12 @@ def march(t, y, s, T, z):
             if repeats:
                 break
             if turn > 0:
+                _bracket(turn, start, off, brackets)
                 factorise(ring, 2 * k, ring_pivots)
                 solve(ring, ring_pivots, off)
             for i in range(2 * k):
                 start[i] += off[i]
+            _keep_within(start, brackets)
         if not repeats:
             done = 0
         for place in range(N):

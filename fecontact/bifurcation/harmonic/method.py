@@ -6,7 +6,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError, require_positive
 
-_STABILITY = ("transitions", "Koopman-Hill")
+_STABILITY = ("transitions", "Koopman-Hill", None)
 # Samples per harmonic, and at least.
 _PER_HARMONIC, _LEAST = 8, 32
 # Largest number of harmonics or samples.
@@ -35,9 +35,10 @@ class HarmonicBalance:
         half each time, until it is met, up to ``most_harmonics``.
     most_harmonics : int
         Limit for that.
-    stability : 'transitions' or 'Koopman-Hill'
+    stability : 'transitions', 'Koopman-Hill' or None
         How Floquet multipliers are found: from the linearised equations along the orbit, or by the
         projection of Bayer and Leine with 2 H harmonics, which suits smooth systems of few states.
+        None for none: folds alone are found then, but points take a fraction of the time.
 
     Raises
     ------
@@ -49,7 +50,7 @@ class HarmonicBalance:
     samples: int | None = None
     tolerance: float | None = None
     most_harmonics: int = 100
-    stability: str = "transitions"
+    stability: str | None = "transitions"
 
     def __post_init__(self) -> None:
         for name in ("harmonics", "most_harmonics"):
@@ -66,7 +67,7 @@ class HarmonicBalance:
             require_positive("HarmonicBalance", tolerance=self.tolerance)
         if self.stability not in _STABILITY:
             raise InputError(f"HarmonicBalance: stability = {self.stability!r} must be "
-                             f"'transitions' or 'Koopman-Hill'.")
+                             f"'transitions' or 'Koopman-Hill', or None.")
 
     @property
     def count(self) -> int:

@@ -7,9 +7,9 @@ import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients
-from fecontact.bifurcation.harmonic.problem import peaks
-from fecontact.bifurcation.harmonic.series import uniform_basis
+from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.estimates import peaks
+from fecontact.bifurcation.harmonic.series import differentiated, uniform_basis
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
@@ -52,13 +52,23 @@ def observed_values(
     'observed_minimum', 'observed_maximum', half their difference as 'observed_amplitude', and
     'observed_harmonics' (16,), complex.
     """
-    H = len(X) // 2
-    whole = all_coefficients(layout, X, period)
-    observes = whole @ row[: whole.shape[1]]
-    low, high = (float(one[0]) for one in peaks((uniform_basis(_SAMPLES, H) @ observes)[:, None]))
-    harmonics = np.zeros(max(H, _HARMONICS) + 1, dtype=complex)
-    harmonics[0] = observes[0]
-    harmonics[1 : H + 1] = observes[1::2] - 1j * observes[2::2]
-    return {"observed_minimum": low, "observed_maximum": high,
-            "observed_amplitude": (high - low) / 2.0,
-            "observed_harmonics": harmonics[: _HARMONICS + 1]}
+    return observed_of_orbits(layout, X[None], np.array([period]), row)[0]
+
+
+def observed_of_orbits(
+    layout: Layout, X: Array, periods: Array, row: Array
+) -> list[dict[str, Any]]:
+    """Those of K orbits with coefficients X (K, 2 H + 1, b) and periods (K,)."""
+    K, H, m = len(X), X.shape[1] // 2, layout.displacements
+    moved = np.moveaxis(X, 1, 0)
+    observes = moved[..., :m] @ row[:m] + moved[..., m:] @ row[2 * m : m + layout.harmonic]
+    if m and row[m : 2 * m].any():
+        observes = observes + differentiated(moved[..., :m]) @ row[m : 2 * m] / periods
+    low, high = peaks(uniform_basis(_SAMPLES, H) @ observes)
+    harmonics = np.zeros((K, max(H, _HARMONICS) + 1), dtype=complex)
+    harmonics[:, 0] = observes[0]
+    harmonics[:, 1 : H + 1] = (observes[1::2] - 1j * observes[2::2]).T
+    return [{"observed_minimum": least, "observed_maximum": most,
+             "observed_amplitude": (most - least) / 2.0, "observed_harmonics": each}
+            for least, most, each in zip(low.tolist(), high.tolist(),
+                                         harmonics[:, : _HARMONICS + 1], strict=True)]

@@ -7,22 +7,18 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
-from fecontact.bifurcation.continuation.problem import Problem
-from fecontact.bifurcation.harmonic.balance import Balance, Linearised
-from fecontact.bifurcation.harmonic.series import (
-    basis_at,
-    differentiated,
-    shifted,
-    uniform_basis,
-)
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
+from fecontact.bifurcation.harmonic import estimates
+from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
+from fecontact.bifurcation.harmonic.compiled_steps import Equations, evaluate
+from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
+from fecontact.bifurcation.harmonic.strides import Strides
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
 from fecontact.bifurcation.orbits.same_orbit import HALVING, same_place
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
-# Points per harmonic, and at least, among which extremes are looked for.
-_FINE, _LEAST_FINE = 12, 96
 # Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
 # Largest relative size of the odd harmonics of a doubled orbit that is a single one, and smallest
@@ -38,40 +34,70 @@ class HarmonicLinearisation(Linearised):
     @cached_property
     def floquet(self) -> Floquet:
         """Multipliers and stability."""
-        if self.problem.stability == "transitions":
+        if self.problem.stability != "Koopman-Hill":
             return by_transitions(self.problem, self.u, self.memory)
         return by_hill(self.problem, self.u, self.derivatives[1])
 
     @cached_property
     def neglected(self) -> tuple[float, float]:
-        """Estimates of the error: of the orbit, and of its equations.
+        """Estimates of the error: of the orbit, and of its equations; see :mod:`estimates`."""
+        problem, layout = self.problem, self.problem.layout
+        forces, mean = self._samples()
+        error, residual = estimates.neglected(
+            problem.coefficients(self.u)[None], forces[None], mean[None], np.array([self.period]),
+            problem.scales[layout.columns], layout.displacements)
+        return float(error[0]), float(residual[0])
 
-        The neglected harmonics k > H of the rates, f_k, would add x_k = (i k w - J_0)^-1 f_k to
-        the orbit, J_0 the mean derivative. The first number is their root mean square over that of
-        harmonics 1 to H of displacements and other states, in their scales; the second that of f_k,
-        the residual in time, over that of x'.
-        """
-        problem, layout, H = self.problem, self.problem.layout, self.problem.harmonics
-        end, m = layout.states - layout.memory, layout.displacements
-        most = min(3 * H + 2, (problem.samples - 1) // 2)
-        if most <= H:
-            return np.nan, np.nan
-        # Velocities are those of the series: no harmonics of q' are neglected.
-        spectrum = 2.0 * np.fft.rfft(self.rates[:, :end], axis=0) / problem.samples
-        left = spectrum[H + 1 : most + 1].copy()
-        left[:, :m] = 0.0
-        mean = self.derivatives[1][:, :end, :end].mean(axis=0)
-        turns = 2.0j * np.pi / self.period * np.arange(H + 1, most + 1)
-        try:
-            added = np.linalg.solve(turns[:, None, None] * np.eye(end) - mean, left[:, :, None])
-        except np.linalg.LinAlgError:
-            return np.nan, np.nan
-        sizes = problem.scales[layout.columns]
-        kept = np.linalg.norm(problem.coefficients(self.u)[1:] / sizes)
-        rate_sizes = np.abs(spectrum[1:, m:]).max(axis=0) + 1e-300
-        return (float(np.linalg.norm(added[:, layout.columns, 0] / sizes) / (kept or 1.0)),
-                float(np.linalg.norm(left[:, m:] / rate_sizes)
-                      / np.linalg.norm(spectrum[1 : H + 1, m:] / rate_sizes)))
+    def _samples(self) -> tuple[Array, Array]:
+        """Rates (N, b) of velocities and other states, and their mean derivatives."""
+        layout = self.problem.layout
+        m, end = layout.displacements, layout.states - layout.memory
+        return self.rates[:, m:end], self.derivatives[1][:, m:end, :end].mean(axis=0)
+
+
+class CompiledLinearisation(HarmonicLinearisation):
+    """The same of forced contact systems, by compiled code."""
+
+    def __init__(self, problem: "HarmonicProblem", u: Array, e: Equations) -> None:
+        super().__init__(problem, u)
+        self._equations = e
+
+    def _evaluated(self, derivatives: bool) -> tuple[Array, ...]:
+        """Residual, z and forces at the samples; and derivatives, condensed and in the mean."""
+        room, m = self._equations.room, self.problem.layout.displacements
+        forces, mean = np.empty((self.problem.samples, m)), np.empty((m, 2 * m))
+        # The parameter may lie beside the range of the equations, where they hold too.
+        if not evaluate(np.ascontiguousarray(self.u), int(derivatives), self._equations, forces,
+                        mean):
+            raise AnalysisError(UNREPEATED)
+        found = room.residual.copy(), room.z.copy(), forces
+        return (*found, room.condensed.copy(), mean) if derivatives else found
+
+    @cached_property
+    def _values(self) -> tuple[Array, ...]:
+        return self._whole if "_whole" in self.__dict__ else self._evaluated(False)
+
+    @cached_property
+    def _whole(self) -> tuple[Array, ...]:
+        return self._evaluated(True)
+
+    @property
+    def residual(self) -> Array:  # type: ignore[override]
+        """Residual (n,)."""
+        return self._values[0]
+
+    @property
+    def memory(self) -> Array:  # type: ignore[override]
+        """Internal variables (N, c) at the samples."""
+        return self._values[1]
+
+    @property
+    def condensed(self) -> Array:  # type: ignore[override]
+        """Derivatives (n, n + 1) of the residual."""
+        return self._whole[3]
+
+    def _samples(self) -> tuple[Array, Array]:
+        return self._whole[2], self._whole[4]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +107,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     Attributes
     ----------
     stability : str
-        'transitions' or 'Koopman-Hill', see :mod:`fecontact.bifurcation.harmonic.stability`.
+        'transitions' or 'Koopman-Hill', see :mod:`fecontact.bifurcation.harmonic.stability`; None
+        for none.
     before : tuple of (n,) arrays
         u and tangent at the start of the last step, for the curvature of the predictor.
     bend : (n,) array, optional
@@ -91,7 +118,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         scales constant.
     """
 
-    stability: str = "transitions"
+    stability: str | None = "transitions"
     before: tuple[Array, ...] = ()
     bend: Array | None = None
     limits: Array | None = None
@@ -102,7 +129,9 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """Residual and linearisation at u, each computed on demand."""
         if self.autonomous and not u[-2] > 0.0:
             raise AnalysisError("The period became negative.")
-        return HarmonicLinearisation(self, u)
+        e = self.equations(float(u[-1]))
+        return (HarmonicLinearisation(self, u) if e is None
+                else CompiledLinearisation(self, u, e))
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Predictor along the tangent, with the curvature of the last step."""
@@ -134,31 +163,35 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
-        stability = linearisation.floquet
         low, high = self.extremes(u, linearisation.memory)
         error, residual = linearisation.neglected
-        return {"period": self.period(u), "multipliers": stability.multipliers,
-                "unstable": stability.unstable, "stable": stability.stable,
-                "trivial_error": stability.trivial_error, "truncation_error": error,
-                "residual": residual, "minimum": low, "maximum": high,
-                **({"memory": linearisation.memory} if self.layout.memory else {})}
+        found = {"period": self.period(u), "truncation_error": error, "residual": residual,
+                 "minimum": low, "maximum": high}
+        if self.layout.memory:
+            found["memory"] = linearisation.memory
+        if self.stability is not None:
+            known = linearisation.floquet
+            found |= {"multipliers": known.multipliers, "unstable": known.unstable,
+                      "stable": known.stable, "trivial_error": known.trivial_error}
+        return found
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Test functions of the multipliers; none without stability."""
+        return {} if self.stability is None else super().tests(u, linearisation, tangent)
+
+    def strider(self, options: ContinuationOptions) -> Strides | None:
+        """Compiled steps, for forced orbits of contact systems."""
+        return Strides.of(self, options) if type(self) is HarmonicProblem else None
 
     def extremes(self, u: Array, z: Array) -> tuple[Array, Array]:
         """Smallest and largest value (d,) of each state over the orbit."""
-        fine = max(_LEAST_FINE, _FINE * self.harmonics)
-        whole = self.whole(u, self.period(u))
-        x = uniform_basis(fine, self.harmonics) @ whole
-        found = []
-        for sign in (-1.0, 1.0):
-            best, place = _peaks(sign * x)
-            # The series where the parabola has its peak: exact but for the square of its error.
-            there = np.einsum("ik,ki->i", basis_at(place / fine, self.harmonics), whole)
-            best = np.maximum(best, sign * there)
-            found.append(sign * np.append(best, (sign * z).max(axis=0)))
-        return found[0], found[1]
+        low, high = estimates.extremes(self.whole(u, self.period(u))[None], z[None])
+        return low[0], high[0]
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
+        if self.stability is None:
+            return 0, 0
         found: tuple[int, int] = linearisation.floquet.unstable_range
         return found
 
@@ -217,20 +250,3 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
                 break
             shift -= float(self.phase_row @ X.reshape(-1)) / slope
         return moved(shift)
-
-
-def peaks(x: Array) -> tuple[Array, Array]:
-    """Extremes (d,) of samples (N, d) around a period, on parabolas through three of them."""
-    return -_peaks(-x)[0], _peaks(x)[0]
-
-
-def _peaks(x: Array) -> tuple[Array, Array]:
-    """Largest values (d,), and their places (d,) counted in samples."""
-    place, columns = x.argmax(axis=0), np.arange(x.shape[1])
-    here = x[place, columns]
-    left, right = x[place - 1, columns], x[(place + 1) % len(x), columns]
-    bend = left - 2.0 * here + right
-    curved = bend < 0.0
-    safe = np.where(curved, bend, -1.0)
-    return (np.where(curved, here - (right - left) ** 2 / (8.0 * safe), here),
-            np.where(curved, place - (right - left) / (2.0 * safe), place))

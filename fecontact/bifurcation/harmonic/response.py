@@ -16,19 +16,23 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.observed import observed_row, observed_values
+from fecontact.bifurcation.harmonic.observed import observed_of_orbits, observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
+from fecontact.integrate.initial_state import initial_state
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.statics import equilibrium
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import RestState
 
 # Points of a branch at most, and largest step, unless options say so.
 _POINTS, _LARGEST = 2000, 0.03
@@ -111,7 +115,7 @@ def frequency_response(
     parameter: str | None = None, *, levels: Mapping[str, ArrayLike] | None = None,
     observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
     method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
-    start: float | None = None,
+    start: float | None = None, preload: LoadHistory | RestState | Array | None = None,
 ) -> FrequencyResponse:
     """Nonlinear frequency responses by harmonic balance, with stability and special points.
 
@@ -138,6 +142,9 @@ def frequency_response(
         Steps, tolerances; by default up to 2000 points, largest_step 0.03.
     start : float, optional
         Where branches start, by default the lower end; inside, they are followed both ways.
+    preload : LoadHistory, RestState or (d,) array, optional
+        State [q, q', z] that elements keep which never slide; without it they have no deflection
+        where the body rests under the loads' means without friction.
 
     Raises
     ------
@@ -147,27 +154,47 @@ def frequency_response(
     """
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
     require_kind("frequency_response", (HarmonicBalance, type(None)), method=method)
+    held = None if preload is None else _preloaded(system, preload)
     chosen = options_of(
         options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
     level_name, values = levels_of(levels)
     if isinstance(system, ContactSystem):
         name = parameter or _FREQUENCY
         names = dict.fromkeys([name] + ([level_name] if level_name else []))
-        field: VectorField = contact_field(system, names)
+        ranges = {name: chosen.bounds}
+        if level_name:
+            ranges[level_name] = (float(values.min()), float(values.max()))
+        field: VectorField = ContactField(ParametrisedSystem(system, names, ranges))
     else:
         field, name = system, system.parameter_or_only(parameter)
     row, observed = observed_row(field, observe)
     low, high = chosen.bounds
     first = inside(low if start is None else float(start), chosen)
-    found = []
+    found: list[Branch] = []
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
-        branch = branch_of_response(field, given, field.index(name), level_name, first,
-                         method or HarmonicBalance(), chosen, both=low < first < high)
+        try:
+            branch = branch_of_response(field, given, field.index(name), level_name, first,
+                                        method or HarmonicBalance(), chosen, held,
+                                        both=low < first < high)
+        except KeyboardInterrupt:
+            if not found:
+                raise
+            break
         found.append(with_observed(branch, row, observed, level_name, float(value)))
         if branch.status is BranchStatus.INTERRUPTED:
             break
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
+
+
+def _preloaded(
+    system: ContactSystem | VectorField, preload: LoadHistory | RestState | Array
+) -> Array:
+    """State (d,) of a preload."""
+    if not isinstance(system, ContactSystem):
+        raise InputError("preload is for contact systems; a vector field has no springs and "
+                         "sliders that keep a deflection.")
+    return initial_state(system, preload, 0.0)
 
 
 def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array]:
@@ -187,7 +214,7 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
 
 def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: HarmonicBalance, options: ContinuationOptions, both: bool,
+    method: HarmonicBalance, options: ContinuationOptions, held: Array | None, both: bool,
 ) -> Branch:
     """The branch at one level."""
     ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
@@ -196,13 +223,14 @@ def branch_of_response(
         values = values.copy()
         values[free] = begin
         attempts: list[Callable[[], tuple[HarmonicProblem, Array]]] = [
-            lambda values=values: _from_rest(field, values, free, method, options)]  # type: ignore[misc]
+            lambda values=values: _from_rest(  # type: ignore[misc]
+                field, values, free, method, options, held)]
         if level_name is not None:
             attempts.append(lambda values=values: _raised(  # type: ignore[misc]
-                field, values, free, field.index(level_name), method, options))
+                field, values, free, field.index(level_name), method, options, held))
         if isinstance(field, ContactField):
             attempts.append(lambda values=values: _settled(  # type: ignore[misc]
-                field, values, free, method, options))
+                field, values, free, method, options, held))
         for attempt in attempts:
             try:
                 problem, u = attempt()
@@ -217,9 +245,12 @@ def branch_of_response(
 
 def _problem(
     field: VectorField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, sizes: Array,
+    options: ContinuationOptions, held: Array | None,
 ) -> HarmonicProblem:
-    """The problem with scales (d,) of the states that grow with the response."""
+    """The problem with scales of the states that grow with the response.
+
+    Elements that never slide keep the deflection of the state ``held``, or of rest.
+    """
     period = field.forcing_period(values)
     if period is None:
         raise InputError("Nothing excites the system with a period; a frequency response needs a "
@@ -227,21 +258,23 @@ def _problem(
     name = list(field.parameters)[free]
     width = width_of(None, options, float(values[free]))
     problem = starts.problem_for(field, values, free, method,
-                                 np.concatenate([sizes, [period, width]]))
+                                 np.concatenate([np.ones(field.dimension), [period, width]]))
     if not np.isfinite(period):
         raise InputError(f"At {name} = {values[free]:g} the excitation has no period.")
-    return replace(problem, limits=1e4 * sizes)
+    if isinstance(field, ContactField) and problem.layout.memory:
+        state = rest_state(field, values) if held is None else held
+        problem = replace(problem, kept=problem.kept.left_by(state[None]))
+    return replace(problem, limits=np.full(field.dimension, 1e4))
 
 
 def _from_rest(
     field: VectorField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, initial: Array | None = None,
+    options: ContinuationOptions, held: Array | None,
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit that Newton's method finds from rest, and scales of its size."""
-    state = np.zeros(field.dimension) if initial is None else initial
-    if isinstance(field, ContactField) and initial is None:
-        state = rest_state(field, values)
-    problem = _problem(field, values, free, method, options, np.ones(field.dimension))
+    problem = _problem(field, values, free, method, options, held)
+    state = (rest_state(field, values) if isinstance(field, ContactField)
+             else np.zeros(field.dimension))
     u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
     return _scaled(*starts.corrected(problem, u))
 
@@ -258,18 +291,18 @@ def rest_state(field: ContactField, values: Array) -> Array:
 
 
 def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
-    """The problem with scales of the size of an orbit."""
+    """The problem with scales of the size of an orbit, which is found again to their precision."""
     low, high = problem.extremes(u, problem.linearise(u).memory)
     sizes = (high - low) / 2.0
     largest = float(sizes.max()) or 1.0
     sizes = np.maximum(sizes, 1e-3 * largest)
     scales = np.concatenate([sizes, problem.scales[-2:]])
-    return replace(problem, scales=scales, limits=1e4 * sizes), u
+    return starts.corrected(replace(problem, scales=scales, limits=1e4 * sizes), u)
 
 
 def _raised(
     field: VectorField, values: Array, free: int, level: int, method: HarmonicBalance,
-    options: ContinuationOptions,
+    options: ContinuationOptions, held: Array | None,
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit at a level, along a branch from a thousandth of it."""
     wanted = float(values[level])
@@ -277,31 +310,33 @@ def _raised(
     low[level] = 1e-3 * wanted
     bounds = (min(low[level], wanted), max(low[level], wanted))
     plain = replace(method, tolerance=None)
-    problem, u = _from_rest(field, low, level, plain, replace(options, bounds=bounds))
+    problem, u = _from_rest(field, low, level, plain, replace(options, bounds=bounds), held)
     branch = branches.follow(problem, u, None, plain, replace(
         options, bounds=bounds, locate=False, progress=None), direction=np.sign(wanted))
+    if branch.status is BranchStatus.INTERRUPTED:
+        raise KeyboardInterrupt
     last = branch.points[-1]
     if last.parameter != wanted:
         raise AnalysisError(f"No orbit was found at the level {wanted:g}: raised from a thousandth "
                             f"of it, the branch ends at {last.parameter:.4g}.")
-    return _taken(field, values, free, method, options, last.orbit(samples=501).states)
+    return _taken(field, values, free, method, options, last.orbit(samples=501).states, held)
 
 
 def _settled(
     field: ContactField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions,
+    options: ContinuationOptions, held: Array | None,
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit to which a run settles."""
     motion = periodic_motion(field.system(values), longest_period=field.forcing_period(values))
-    return _taken(field, values, free, method, options, motion.states)
+    return _taken(field, values, free, method, options, motion.states, held)
 
 
 def _taken(
     field: VectorField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, states: Array,
+    options: ContinuationOptions, states: Array, held: Array | None,
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit near states (k, d) over a period, both ends included."""
-    problem = _problem(field, values, free, method, options, np.ones(field.dimension))
+    problem = _problem(field, values, free, method, options, held)
     phases = np.linspace(0.0, 1.0, len(states))
     sampled = np.stack([np.interp(problem.series.times, phases, column) for column in states.T],
                        axis=1)
@@ -312,18 +347,34 @@ def with_observed(
     branch: Branch, row: Array, observed: str, level_name: str | None, level: float
 ) -> Branch:
     """The branch with what is observed at its points, and its level as attributes."""
-    points = []
     layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
     if row[layout.states - layout.memory :].any():
         raise InputError("Internal variables of friction cannot be observed; choose a displacement "
                          "or a velocity.")
-    for point in branch.points:
-        X = point.u[: (2 * H + 1) * layout.harmonic].reshape(-1, layout.harmonic)
-        points.append(replace(point, values={**point.values, **observed_values(
-            layout, X, float(point.values["period"]), row)}))
+    b = layout.harmonic
+    X = np.array([point.u[: (2 * H + 1) * b] for point in branch.points]).reshape(-1, 2 * H + 1, b)
+    seen = observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
+    points = [replace(point, values={**point.values, **each})
+              for point, each in zip(branch.points, seen, strict=True)]
     attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
                                   "level_name": level_name or ""}
     return replace(branch, points=tuple(points), attributes=attributes)
+
+
+def continued(
+    system: ContactSystem, branch: Branch, row: Array, options: ContinuationOptions
+) -> Branch:
+    """An interrupted branch of a response followed to its end; ``row`` (d,) of what is observed."""
+    known, name = branch.attributes, branch.parameter_name
+    level_name = str(known["level_name"])
+    field = contact_field(system, dict.fromkeys([name, level_name] if level_name else [name]))
+    rest = branches.goes_on(
+        field, branch.points[-1], None,
+        replace(options, points=max(2, options.points - len(branch) + 1)), None, None, 1.0, False)
+    more = with_observed(rest, row, str(known["observed"]), level_name or None,
+                          float(known["level"]))
+    return replace(branch, points=(*branch.points[:-1], *more.points), status=more.status,
+                   message=more.message)
 
 
 def response_of(branches_by_name: Mapping[str, Branch]) -> FrequencyResponse:

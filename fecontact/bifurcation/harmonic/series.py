@@ -70,9 +70,9 @@ def uniform_basis(count: int, harmonics: int) -> Array:
 
 
 def differentiated(X: Array) -> Array:
-    """Coefficients (2 H + 1, b) of dx/dtau."""
+    """Coefficients (2 H + 1, ...) of dx/dtau."""
     out = np.zeros_like(X)
-    turns = 2.0 * np.pi * np.arange(1, len(X) // 2 + 1)[:, None]
+    turns = 2.0 * np.pi * np.arange(1, len(X) // 2 + 1).reshape(-1, *[1] * (X.ndim - 1))
     np.multiply(turns, X[2::2], out=out[1::2])
     np.multiply(-turns, X[1::2], out=out[2::2])
     return out

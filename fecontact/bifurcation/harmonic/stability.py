@@ -4,13 +4,15 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+from scipy.linalg import eigvals, expm
 
+from fecontact.bifurcation.harmonic import compiled_steps
 from fecontact.bifurcation.harmonic.balance import Balance
 from fecontact.bifurcation.harmonic.layout import around
 from fecontact.bifurcation.harmonic.memory import LEAK
 from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
@@ -18,6 +20,12 @@ from fecontact.core.types import Array
 # Collocation of the linearised equations: degree, intervals per harmonic, at least, and samples for
 # each: who takes more samples, for kinks, gets more intervals too.
 _DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE = 4, 3, 20, 4
+# From so many states on multipliers are those of the product of all transitions, which takes a
+# fraction of the time, unless it has had entries of this size: smaller multipliers than 1e-12 of
+# it are then rounding.
+_MANY, _LARGEST = 16, 1e4
+# Largest size of the derivatives of several orbits that are made at once.
+_NUMBERS = 1_000_000
 
 
 @cache
@@ -53,21 +61,70 @@ def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
     internal variables z (N, c) linear between these: kinks leave errors of the order of 1 / N. An
     element that never slides has the multiplier exp(-1e-6) of the leak that z is marched with.
     """
-    T, values = problem.period(u), problem.parameters(u)
-    N, radau = max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE), False
-    if problem.layout.memory:
-        N, radau = problem.samples, True
-    points, basis, slopes = _collocation(radau)
-    widths = np.full(N, 1.0 / N)
+    T = problem.period(u)
+    N, radau = _intervals(problem)
     tau, series = _grid(N, radau, problem.harmonics)
     x = np.concatenate([series @ problem.whole(u, T), around(z, tau)], axis=1)
     t = np.zeros(len(tau)) if problem.autonomous else tau * T
-    f, J, _ = problem.field.derivatives(t, x, values)
-    for k in range(problem.layout.states - problem.layout.memory, problem.layout.states):
+    f, J, _ = problem.field.derivatives(t, x, problem.parameters(u))
+    return _floquet(problem, T, f, J)
+
+
+def along_orbits(
+    problem: Balance, us: Array, zs: Array, e: compiled_steps.Equations
+) -> list[Floquet]:
+    """As :func:`by_transitions` for K forced orbits us (K, n + 1) with zs (K, N, c)."""
+    intervals, radau = _intervals(problem)
+    tau, series = _grid(intervals, radau, problem.harmonics)
+    d, found = problem.layout.states, []
+    most = max(1, _NUMBERS // (len(tau) * d * d))
+    for first in range(0, len(us), most):
+        part = slice(first, min(first + most, len(us)))
+        f = np.empty((part.stop - first, len(tau), d))
+        J = np.empty((*f.shape, d))
+        compiled_steps.derivatives_along(us[part], zs[part], tau, series, e, f, J)
+        found += [_floquet(problem, problem.period(u), *each)
+                  for u, *each in zip(us[part], f, J, strict=True)]
+    return found
+
+
+def _intervals(problem: Balance) -> tuple[int, bool]:
+    """Number of intervals, and whether Radau's collocation is taken."""
+    if problem.layout.memory:
+        return problem.samples, True
+    return max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE), False
+
+
+def _floquet(problem: Balance, T: float, f: Array, J: Array) -> Floquet:
+    """Multipliers from rates (P, d) and derivatives (P, d, d) at the collocation points."""
+    layout = problem.layout
+    N, radau = _intervals(problem)
+    points, basis, slopes = _collocation(radau)
+    for k in range(layout.states - layout.memory, layout.states):
         J[:, k, k] -= LEAK / T
-    factors = condensation.factors_for(N, len(points), x.shape[1], 1)
-    condensation.condense(J, f, np.zeros((*f.shape, 1)), widths, T, basis, slopes, 0, factors)
-    return floquet_of(factors, problem.autonomous)
+    factors, nothing, widths = _room(N, len(points), layout.states)
+    condensation.condense(J, f, nothing, widths, T, basis, slopes, 0, factors)
+    if problem.autonomous or layout.states < _MANY:
+        return floquet_of(factors, problem.autonomous)
+    M = np.empty((N, layout.states, layout.states))
+    transitions(factors, M)
+    product, largest = M[0], 0.0
+    for step in M[1:]:
+        product = step @ product
+        largest = max(largest, float(np.abs(product).max()))
+    if not largest < _LARGEST:
+        return floquet_of(factors, False)
+    found = np.asarray(eigvals(product), dtype=np.complex128)
+    return Floquet(found[np.argsort(-np.abs(found))], None)
+
+
+@cache
+def _room(
+    intervals: int, points: int, states: int
+) -> tuple[condensation.CondensedFactors, Array, Array]:
+    """Room for factors, and what they are made with: no parameters, and widths."""
+    return (condensation.factors_for(intervals, points, states, 1),
+            np.zeros((intervals * points, states, 1)), np.full(intervals, 1.0 / intervals))
 
 
 def hill_matrix(J: Array, period: float, order: int) -> NDArray[np.complex128]:

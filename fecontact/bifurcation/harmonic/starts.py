@@ -3,8 +3,9 @@
 A start is a problem, its unknowns u and the direction in which the branch leaves.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, size
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic.balance import turn_of
-from fecontact.bifurcation.harmonic.layout import layout_of
+from fecontact.bifurcation.harmonic.compiled_balance import CompiledBalance
+from fecontact.bifurcation.harmonic.layout import element_rows, layout_of
+from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import with_harmonics
@@ -30,13 +33,20 @@ _INTERVALS, _DEGREE = 200, 4
 
 def problem_for(
     field: VectorField, values: Array, free: int, method: HarmonicBalance, scales: Array,
-    periods: int = 1,
+    periods: int = 1, offsets: Array | None = None,
 ) -> HarmonicProblem:
-    """The problem of a field; ``scales`` (d + 2,) of states, period and parameter."""
+    """The problem of a field; ``scales`` (d + 2,) of states, period and parameter.
+
+    ``offsets`` (c,) are those of elements that never slide, see :class:`Kept`.
+    """
     layout = layout_of(field)
-    return HarmonicProblem(field, values.copy(), free, method.harmonics, method.count,
-                           np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout,
-                           periods, turn_of(field, values, free), method.stability)
+    kept = Kept(element_rows(field, layout),
+                np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float))
+    found = HarmonicProblem(
+        field, values.copy(), free, method.harmonics, method.count,
+        np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout, periods,
+        turn_of(field, values, free), kept, stability=method.stability)
+    return replace(found, compiled=CompiledBalance.of(found))
 
 
 def unknowns(problem: HarmonicProblem, states: Array, period: float) -> Array:
@@ -59,6 +69,8 @@ def from_samples(
                                              _INTERVALS, _DEGREE, periods, scales)
     problem = problem_for(field, values, free, method, found.scales, periods)
     sampled = orbit_starts.at_phase(found, nodes, problem.series.times)
+    if problem.layout.memory:
+        problem = replace(problem, kept=problem.kept.left_by(sampled))
     u = unknowns(problem, sampled, found.period(nodes))
     return replace(problem, reference=problem.coefficients(u).copy()), u
 
@@ -95,15 +107,21 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
     if not point.by_harmonics:
         raise InputError(f"{point.place} is no periodic orbit by harmonic balance.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
-    method = HarmonicBalance(int(known["harmonics"]), int(known["samples"]),
-                             stability=str(known["stability"]))
-    problem = problem_for(field, values, free, method, np.asarray(known["scales"], dtype=float),
-                          int(known["periods"]))
+    problem = problem_for(field, values, free, method_of(known),
+                          np.asarray(known["scales"], dtype=float), int(known["periods"]),
+                          known.get("kept_deflections"))
     if len(point.u) != problem.size + problem.common:
         raise InputError(f"{point.place} has {len(point.u)} unknowns, which are not those of this "
                          f"field.")
     return (replace(problem, reference=problem.coefficients(point.u).copy(),
                     limits=known.get("limits")), point.u, point.tangent)
+
+
+def method_of(attributes: Mapping[str, Any]) -> HarmonicBalance:
+    """Harmonic balance as a branch has it, from its attributes."""
+    stability = str(attributes["stability"])
+    return HarmonicBalance(int(attributes["harmonics"]), int(attributes["samples"]),
+                           stability=None if stability == "none" else stability)
 
 
 def corrected(

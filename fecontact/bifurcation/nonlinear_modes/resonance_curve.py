@@ -196,7 +196,7 @@ def _first(
     given = options_of(ContinuationOptions(points=2000, largest_step=_RESPONSE, locate=False),
                        frequencies)
     branch = branch_of_response(field, values, free, None, given.bounds[0],
-                                replace(method, tolerance=None), given, both=False)
+                                replace(method, tolerance=None), given, None, both=False)
     sizes = with_observed(branch, row, "", None, np.nan).column("observed_amplitude")
     place = int(np.argmax(sizes))
     if place in (0, len(sizes) - 1):

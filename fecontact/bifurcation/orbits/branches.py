@@ -23,8 +23,8 @@ from fecontact.bifurcation.harmonic import branches as harmonic_branches
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbits import shooting_branches, starts
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.bifurcation.orbits.restored import rescaled, restored, solver_of
+from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
+from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.shooting import require_segments
 from fecontact.core.checks import require_kind

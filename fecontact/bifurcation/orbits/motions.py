@@ -1,6 +1,9 @@
 """Sampled periodic motions, from runs and from orbits of branches."""
 
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -9,10 +12,17 @@ from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.simulate import simulate
+from fecontact.integrate.solvers import RODAS5P, SetValued, Solver
+from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.powers import BRISTLES, FRICTION, NODE_POWERS, POWERS, powers
 
 # Relative tolerance of the runs that sample an orbit by shooting.
 _RTOL = 1e-7
+# Histories of trajectories, and what they count from their start.
+_WITH_TIME = ("modal_coordinates", "modal_velocities", "memory", "held_normal_force",
+              "held_friction_force")
+_COUNTED = ("work", "node_friction_work", "node_creep_work")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,18 +98,97 @@ def collocated(u: Array, mesh: Array, states: int, period: float, samples: int) 
     return PeriodicMotion(phases * period, interpolate(mesh, nodes, phases), period)
 
 
-def run_again(
-    system: ContactSystem, u: Array, mesh: Array, period: float, samples: int
-) -> PeriodicMotion:
-    """Sample an orbit by shooting over one period by running each segment from its start.
+def solver_text(solver: Solver) -> str | None:
+    """Options of a set-valued solver as text for a branch's attributes; None for the default."""
+    return json.dumps(asdict(solver)) if isinstance(solver, SetValued) else None
 
-    Gives at least the requested number of samples, both ends included.
+
+def solver_of(known: Mapping[str, Any]) -> Solver:
+    """The solver of a branch by shooting, from its attributes."""
+    return SetValued(**json.loads(known["solver"])) if "solver" in known else RODAS5P
+
+
+def run_again(
+    system: ContactSystem, u: Array, mesh: Array, period: float, samples: int, solver: Solver,
+) -> list[Trajectory]:
+    """Run each segment of an orbit by shooting from its start.
+
+    Together they give at least the requested number of samples, all ends included.
     """
     count = len(mesh) - 1
     starts, ends = u[: count * system.size].reshape(count, -1), mesh * period
     each = max(2, -(-samples // count))
-    runs = [simulate(system, float(end), t_start=float(begin), initial=start, outputs=each,
-                     rtol=_RTOL)
+    return [simulate(system, float(end), t_start=float(begin), initial=start, outputs=each,
+                     solver=solver, rtol=_RTOL)
             for start, begin, end in zip(starts, ends[:-1], ends[1:], strict=True)]
+
+
+def of_runs(runs: list[Trajectory], period: float) -> PeriodicMotion:
+    """The motion of runs that follow each other."""
     return PeriodicMotion(np.concatenate([run.time for run in runs]),
                           np.concatenate([run.states for run in runs]), period)
+
+
+def sampled_run(system: ContactSystem, motion: PeriodicMotion) -> Trajectory:
+    """A motion in samples as a trajectory; work by the trapezoidal rule.
+
+    What bristles store follows from their deflections, as their rates jump where they begin to
+    slide.
+    """
+    m, states = system.basis.modes, np.ascontiguousarray(motion.states)
+    run = Trajectory(system, motion.times, states[:, :m], states[:, m : 2 * m],
+                     np.zeros((len(states), len(POWERS))),
+                     memory=states[:, 2 * m :] if system.memory else None)
+    steps = np.diff(motion.times)[:, None]
+    work = _summed(_powers(system, motion.times, states), steps)
+    if not system.memory:
+        return replace(run, work=work)
+    stored = _stored(run)
+    lost = _summed(run.slip_power, steps) - stored
+    work[:, BRISTLES], work[:, FRICTION] = stored.sum(axis=1), lost.sum(axis=1)
+    return replace(run, work=work, node_friction_work=lost)
+
+
+def _summed(power: Array, steps: Array) -> Array:
+    """Integral (N, p) of powers (N, p) over steps (N - 1, 1) of time."""
+    middle = 0.5 * (power[1:] + power[:-1]) * steps
+    return np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(middle, axis=0)])
+
+
+def _stored(run: Trajectory) -> Array:
+    """Energy (N, n) that has gone into the bristles of each node at constant normal force [J]."""
+    assert run.memory is not None
+    fixed, with_force = run.system.arrays.bristle_stiffness
+    n, count = fixed.shape
+    squares = run.memory.reshape(-1, n, count) ** 2
+    stiffness = fixed + with_force * np.abs(run.normal_force)[:, :, None]
+    changes = 0.25 * ((stiffness[1:] + stiffness[:-1]) * np.diff(squares, axis=0)).sum(axis=2)
+    return np.concatenate([np.zeros((1, n)), np.cumsum(changes, axis=0)])
+
+
+def _powers(system: ContactSystem, times: Array, states: Array) -> Array:
+    """Powers (N, p) along a motion [W]."""
+    n, arrays = system.basis.contact_nodes, system.arrays
+    found, of_nodes = np.empty((len(times), len(POWERS))), np.empty(NODE_POWERS * n)
+    stick_speed = np.zeros(n)
+    for t, y, out in zip(times, states, found, strict=True):
+        powers(float(t), y, arrays, stick_speed, out, of_nodes)
+    return found
+
+
+def joined(runs: list[Trajectory]) -> Trajectory:
+    """Runs that follow each other in time as one; the first state of each but the first is left."""
+    first, parts = runs[0], [slice(None), *(slice(1, None) for _ in runs[1:])]
+    kept: dict[str, Any] = {"time": np.concatenate(
+        [run.time[part] for run, part in zip(runs, parts, strict=True)])}
+    for name in _WITH_TIME:
+        if getattr(first, name) is not None:
+            kept[name] = np.concatenate([getattr(run, name)[part]
+                                         for run, part in zip(runs, parts, strict=True)])
+    for name in _COUNTED:
+        if getattr(first, name) is not None:
+            ends = np.cumsum([getattr(run, name)[-1] for run in runs], axis=0)
+            shifts = [np.zeros_like(ends[0]), *ends[:-1]]
+            kept[name] = np.concatenate([getattr(run, name)[part] + shift for run, part, shift in
+                                         zip(runs, parts, shifts, strict=True)])
+    return replace(first, **kept)

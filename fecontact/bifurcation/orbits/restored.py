@@ -1,9 +1,7 @@
 """Continuation problems of orbits, restored from points of branches."""
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, replace
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,10 +10,10 @@ from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
+from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
-from fecontact.integrate.solvers import RODAS5P, SetValued, Solver
 
 P = TypeVar("P", CollocationProblem, ShootingProblem)
 
@@ -65,16 +63,6 @@ def restored_shooting(
                               float(known.get("rtol", 1e-9)), known.get("derivative_rtol"),
                               solver_of(known))
     return problem, point.u, point.tangent
-
-
-def solver_text(solver: Solver) -> str | None:
-    """Options of a set-valued solver as text for a branch's attributes; None for the default."""
-    return json.dumps(asdict(solver)) if isinstance(solver, SetValued) else None
-
-
-def solver_of(known: Mapping[str, Any]) -> Solver:
-    """The solver of a branch by shooting, from its attributes."""
-    return SetValued(**json.loads(known["solver"])) if "solver" in known else RODAS5P
 
 
 def rescaled(problem: P, scales: ArrayLike | None, width: float | None) -> P:

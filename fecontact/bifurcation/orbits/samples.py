@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.harmonic.problem import peaks
+from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate
 from fecontact.bifurcation.orbits.motions import nodes_on_mesh
 from fecontact.core.checks import as_floats, require_kind

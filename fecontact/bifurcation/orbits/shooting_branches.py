@@ -12,8 +12,8 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Continuatio
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting, solver_text
+from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_text
+from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.shooting import (
     ShootingLinearisation,

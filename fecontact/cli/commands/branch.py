@@ -57,7 +57,7 @@ def branch(
             beneath = runs_beneath(system, wanted, described.initial())
         with waiting("Writing"):
             files = write_branch_results(result, wanted, folder, described.name, beneath,
-                                         described.to_toml())
+                                         described.to_toml(), described.folder)
         for name, found in result.found.items():
             echo(f"\n{name}: {found.status.value}")
             if found.message:

@@ -13,7 +13,7 @@ from fecontact.cli.console import (
     waiting,
     warn_if_stale,
 )
-from fecontact.cli.options import Changes, RunFile, Trust
+from fecontact.cli.options import At, AtHz, Branches, Changes, RunFile, Trust, Which
 
 
 def report(
@@ -28,12 +28,20 @@ def report(
     """Write a run as one HTML page that plays it in any browser, without a network.
 
     Of a study its stored run is taken if it has the same values; otherwise it is run first, without
-    storing anything but the page.
+    storing anything but the page. Of a file of branches or responses the page is a diagram whose
+    points play their orbit.
     """
     from fecontact.analysis.run_facts import notes
-    from fecontact.cli.run_files import stored_or_computed_run, write_report
+    from fecontact.cli.orbit_files import holds_branches, write_orbit_page
+    from fecontact.cli.run_files import require_stored, stored_or_computed_run, write_report
     from fecontact.core.files.atomic_write import output_folder
 
+    if holds_branches(file):
+        require_stored(file, set_)
+        target = output or file.with_suffix(".html")
+        with output_folder(target.parent), waiting("Writing"):
+            echo_written(write_orbit_page(file, target, trust))
+        return 0
     stored = stored_or_computed_run(file, set_, trust)
     target = output or stored.path.with_suffix(".html")
     with output_folder(target.parent), waiting("Writing"):
@@ -49,7 +57,8 @@ def report(
 
 def open(
     file: Annotated[Path, Parameter(help=(
-        "A run or its study, frames for ParaView (.pvd, .vtu), or a picture, movie or PDF."))],
+        "A run or its study, frames for ParaView (.pvd, .vtu), branches or a response (.h5), or a "
+        "picture, movie or PDF."))],
     /,
     *,
     set_: Changes = None,
@@ -58,16 +67,25 @@ def open(
 ) -> None:
     """Show a result file in ParaView or in the browser.
 
-    A run is shown in the browser as the page that `fecontact report` writes. No code is run that
-    the file contains or names.
+    A run, branches or a response are shown in the browser as the page that `fecontact report`
+    writes. No code is run that the file contains or names.
     """
     from fecontact.cli import viewers
+    from fecontact.cli.orbit_files import holds_branches, write_orbit_page
     from fecontact.cli.run_files import has_run, stored_run, write_report
 
     shown, study = file, file.suffix.lower() == ".toml"
     if study or file.is_dir() or set_:
         shown = has_run(file, set_)
     viewers.require_kind_of_result(shown)
+    if holds_branches(shown):
+        page = shown.with_suffix(".html")
+        with waiting("Writing"):
+            write_orbit_page(shown, page, trust=False)
+        echo_written(page)
+        viewers.show_in_browser(page)
+        echo(f"{page} is opened in the browser")
+        return
     frames = shown.suffix.lower() in viewers.FRAMES
     program = viewers.paraview() if frames and with_ != "browser" else None
     run = shown.suffix.lower() == ".vtkhdf"
@@ -108,19 +126,27 @@ def render(
         help="Where solids are seen from; from below their contact faces show.")] = None,
     t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
     t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
+    branch: Branches = None,
+    at: At = None,
+    at_hz: AtHz = None,
+    which: Which = 0,
     trust: Trust = False,
 ) -> None:
-    """Render a run as a movie or as numbered pictures; defaults come from [render] of the study."""
+    """Render a run as a movie or as numbered pictures; defaults come from [render] of the study.
+
+    Of a file of branches or responses, one period of an orbit.
+    """
     from dataclasses import replace
 
-    from fecontact.cli.run_files import movie, stored_run, wear_of
+    from fecontact.cli.orbit_files import OrbitChoice, stored_orbit_or_run
+    from fecontact.cli.run_files import movie, wear_of
     from fecontact.core.files.atomic_write import output_folder
 
     changes: dict[str, Any] = {
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
         "view": view,
         "t_start": t_start, "t_end": t_end}
-    stored = stored_run(file, trust, set_)
+    stored = stored_orbit_or_run(file, trust, set_, OrbitChoice(branch, at, at_hz, which))
     from fecontact.core.tables import located
 
     with located("render:", "RenderSettings"):
@@ -136,7 +162,8 @@ def plot(
     file: RunFile,
     kind: Annotated[str, Parameter(
         help="history, phase, contact_map, energies, modes, spectrum, density, spectrogram, "
-        "poincare, friction_work or receptance.")],
+        "poincare, friction_work or receptance; of files NAME.h5 also branches, response or "
+        "mode.")],
     /,
     *,
     set_: Changes = None,
@@ -156,20 +183,36 @@ def plot(
         help="A style of matplotlib, or a file NAME.mplstyle.")] = None,
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
+    branch: Branches = None,
+    at: At = None,
+    at_hz: AtHz = None,
+    which: Which = 0,
     trust: Trust = False,
 ) -> None:
-    """Plot a stored run."""
-    from fecontact.cli.run_files import stored_run
+    """Plot a stored run, branches or a response, or an orbit of these as a run."""
+    from fecontact.cli.orbit_files import (
+        DIAGRAMS,
+        OrbitChoice,
+        holds_branches,
+        plotted,
+        stored_orbit_or_run,
+    )
+    from fecontact.cli.run_files import require_stored
     from fecontact.core.files.atomic_write import output_folder
+    from fecontact.output.plots.figure import styled
 
-    stored = stored_run(file, trust, set_)
+    if kind in DIAGRAMS and holds_branches(file):
+        require_stored(file, set_)
+        target = output or file.with_name(f"{file.stem}-{kind}.png")
+        with output_folder(target.parent), waiting("Drawing"), styled(style or {}):
+            echo_written(plotted(file, kind, target))
+        return
+    stored = stored_orbit_or_run(file, trust, set_, OrbitChoice(branch, at, at_hz, which))
     from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw
 
     choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
                          highest_hz)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
-    from fecontact.output.plots.figure import styled
-
     with output_folder(target.parent), waiting("Drawing"), styled(style or {}):
         redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)
         echo_written(target)

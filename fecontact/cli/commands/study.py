@@ -80,11 +80,19 @@ def modes(
     = False,
     movie: Annotated[int | None, Parameter(help=(
         "Draw the mode of this number as a movie; with --complex, the complex mode."))] = None,
-) -> None:
+    nonlinear: Annotated[int | None, Parameter(help=(
+        "Follow the nonlinear mode of this number, from 1 for the lowest that oscillates, over its "
+        "amplitude."))] = None,
+    amplitudes: Annotated[tuple[float, float] | None, Parameter(help=(
+        "Smallest and largest amplitude of a nonlinear mode [m]."))] = None,
+) -> int:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
     Of several bodies those of each, and how much of the compliance of their interfaces they
-    resolve; --complex and --movie are for all bodies together, with modes that are counted through.
+    resolve; --complex, --movie and --nonlinear are for all bodies together, with modes that are
+    counted through. With --nonlinear, frequency and damping over the amplitude are written
+    (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page whose points play the motion (.html);
+    harmonics and the observed displacement are those of [response].
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import interfaces_of, read_study
@@ -137,6 +145,14 @@ def modes(
             picture = folder / f"{described.name}-convergence.png"
             plot_convergence(result, path=picture)
             echo_written(picture)
+        if nonlinear is None:
+            if amplitudes is not None:
+                raise InputError("--amplitudes is for a nonlinear mode; add --nonlinear with its "
+                                 "number.")
+            return 0
+        from fecontact.cli.mode_results import follow_mode
+
+        return follow_mode(described, nonlinear, amplitudes, folder)
 
 
 def preload(

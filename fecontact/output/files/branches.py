@@ -11,7 +11,7 @@ from fecontact.bifurcation.continuation.points import details_of, special_point
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, response_of
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode, mode_of
 from fecontact.bifurcation.nonlinear_modes.resonance_curve import ResonanceCurve, resonances_of
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.stored import (
     DamagedError,
@@ -24,6 +24,8 @@ from fecontact.core.files.stored import (
     values,
 )
 from fecontact.output.files.hdf5 import new_file, open_file
+from fecontact.output.files.stored_system import store_model
+from fecontact.system.contact_system import ContactSystem
 
 
 def write_branch(path: str | Path, branch: Branch) -> Path:
@@ -52,10 +54,27 @@ def read_branch(path: str | Path) -> Branch:
         return _stored(file["branch"], path)
 
 
-def write_branches(path: str | Path, branches: Mapping[str, Branch]) -> Path:
+def write_branches(
+    path: str | Path, branches: Mapping[str, Branch], *, system: ContactSystem | None = None,
+    study: str | None = None, root: str | Path | None = None,
+) -> Path:
     """Write branches by name into one HDF5 file, whole or not at all.
 
     They are stored as ``branches/0``, ``branches/1``, ... with their names as attributes.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; it is replaced if it exists.
+    branches : mapping of name to Branch
+        At least one.
+    system : ContactSystem, optional
+        What they are branches of; with it reports and movies can be made from the file alone, and
+        :func:`read_system` reads it.
+    study : str, optional
+        The study that described the system, as TOML text.
+    root : str or Path, optional
+        As for :func:`fecontact.write_case`.
 
     Raises
     ------
@@ -64,15 +83,19 @@ def write_branches(path: str | Path, branches: Mapping[str, Branch]) -> Path:
     """
     from h5py import SoftLink
 
+    require_kind("write_branches", (ContactSystem, type(None)), system=system)
     if not branches:
         raise InputError(f"There are no branches to write into {path}.")
+    path = as_path(path, "branches")
     with new_file(path) as file:
+        if system is not None:
+            store_model(file, path, system, study, root)
         for number, (name, branch) in enumerate(branches.items()):
             group = file.create_group(f"branches/{number}")
             group.attrs["name"] = name
             _store(group, branch)
         file["branch"] = SoftLink("/branches/0")
-    return Path(path)
+    return path
 
 
 def read_branches(path: str | Path) -> dict[str, Branch]:
@@ -89,10 +112,13 @@ def read_branches(path: str | Path) -> dict[str, Branch]:
                 for key in sorted(groups, key=int)}
 
 
-def write_response(path: str | Path, response: FrequencyResponse) -> Path:
+def write_response(
+    path: str | Path, response: FrequencyResponse, *, system: ContactSystem | None = None,
+    study: str | None = None, root: str | Path | None = None,
+) -> Path:
     """Write a frequency response into one HDF5 file, whole or not at all.
 
-    Its branches are stored as by :func:`write_branches`.
+    Its branches are stored as by :func:`write_branches`, which describes the other arguments.
 
     Raises
     ------
@@ -101,7 +127,8 @@ def write_response(path: str | Path, response: FrequencyResponse) -> Path:
     """
     require_kind("write_response", FrequencyResponse, response=response)
     return write_branches(path, {f"level {number}": branch
-                                 for number, branch in enumerate(response.branches)})
+                                 for number, branch in enumerate(response.branches)},
+                          system=system, study=study, root=root)
 
 
 def read_response(path: str | Path) -> FrequencyResponse:
@@ -115,10 +142,13 @@ def read_response(path: str | Path) -> FrequencyResponse:
     return response_of(read_branches(path))
 
 
-def write_mode(path: str | Path, mode: NonlinearMode) -> Path:
+def write_mode(
+    path: str | Path, mode: NonlinearMode, *, system: ContactSystem | None = None,
+    study: str | None = None, root: str | Path | None = None,
+) -> Path:
     """Write a nonlinear mode into an HDF5 file, whole or not at all.
 
-    Its branch is stored as by :func:`write_branch`.
+    Its branch is stored as by :func:`write_branches`, which describes the other arguments.
 
     Raises
     ------
@@ -126,7 +156,8 @@ def write_mode(path: str | Path, mode: NonlinearMode) -> Path:
         If the file cannot be written.
     """
     require_kind("write_mode", NonlinearMode, mode=mode)
-    return write_branch(path, mode.branch)
+    return write_branches(path, {f"mode {mode.number}": mode.branch}, system=system, study=study,
+                          root=root)
 
 
 def read_mode(path: str | Path) -> NonlinearMode:

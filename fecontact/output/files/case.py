@@ -1,25 +1,23 @@
 """Case files (HDF5): a run, the model it was computed from, and frames for ParaView."""
 
 import json
-import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tomli_w
 
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.stored import DamagedError, array, from_json, member, reading, text, texts
 from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.laws.registry import UntrustedError, law_files, movable, trusting, with_folder
+from fecontact.laws.registry import UntrustedError, law_files, trusting
 from fecontact.output.files.dataset import to_pandas, to_xarray
 from fecontact.output.files.frames import frame_indices
-from fecontact.output.files.hdf5 import new_file, open_file, store_basis, stored_basis
+from fecontact.output.files.hdf5 import new_file, open_file
+from fecontact.output.files.stored_system import store_model, stored_tables
 from fecontact.output.files.vtkhdf import write_vtkhdf
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
@@ -31,7 +29,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
 _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^0.5 m/s",
           "work": "J"}
 _OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
@@ -109,17 +106,8 @@ def write_case(
     require_kind("write_case", Trajectory, trajectory=trajectory)
     path = as_path(path, "a run")
     indices = frame_indices(trajectory.time, frames)
-    folder = Path(path).parent
-    root = folder if root is None else Path(root)
     with new_file(path) as file:
-        for name, text in library_versions().items():
-            file.require_group("versions").attrs[name] = text
-        store_basis(file.create_group("basis"), trajectory.system.basis)
-        file.create_group("system").attrs["json"] = json.dumps(
-            movable(system_tables(trajectory.system), folder, root))
-        if study is not None:
-            file.create_group("study").attrs["toml"] = _changed(
-                study, lambda table: movable(table, folder, root))
+        store_model(file, path, trajectory.system, study, root)
         _write_trajectory(file.create_group("trajectory"), trajectory)
         if len(indices) and trajectory.system.basis.mode_shapes is not None:
             write_vtkhdf(file, trajectory, indices)
@@ -151,31 +139,26 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
         if "trajectory" not in file:
             raise InputError(f"{path} holds a modal basis but no run; read it with "
                              f"read_basis.")
-        basis = stored_basis(member(file, "basis"))
-        tables = with_folder(from_json(text(member(file, "system"), "json"), dict, "the system"),
-                             Path(path).parent)
+        model = stored_tables(file, path)
+        basis = model.basis
         stored = member(file, "trajectory")
         state = _read_state(stored, basis)
         of_laws = _read_of_laws(stored, basis, len(state["time"]))
         status = Status[text(stored, "status")]
         statistics = from_json(text(stored, "statistics"), dict, "the statistics")
-        study = (_changed(text(member(file, "study"), "toml"),
-                          lambda table: with_folder(table, Path(path).parent))
-                 if "study" in file else None)
-        versions = {name: str(one) for name, one in member(file, "versions").attrs.items()}
     with trusting(trust):
         try:
-            system = system_from_tables(basis, tables, str(path))
+            system = system_from_tables(basis, model.tables, str(path))
         except UntrustedError as error:
             if of_laws is None:
                 raise
             from fecontact.output.files.recorded_laws import recorded_system
 
-            system = recorded_system(basis, tables, str(path), state, *of_laws, str(error))
+            system = recorded_system(basis, model.tables, str(path), state, *of_laws, str(error))
     with reading(path):
         _require_states(system, state)
     return Case(Trajectory(system=system, status=status, statistics=statistics, **state),
-                study, versions)
+                model.study, model.versions)
 
 
 def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
@@ -230,14 +213,6 @@ def _read_of_laws(stored: Any, basis: ModalBasis, count: int) -> tuple[Any, Any,
             array(stored, "contact_energy", (count,)))
 
 
-def _changed(study: str, change: Callable[[Any], Any]) -> str:
-    """Study text with changed tables, except [geometry]; the same text if nothing changes."""
-    tables = tomllib.loads(study)
-    changed = {name: table if name == "geometry" else change(table)
-               for name, table in tables.items()}
-    return study if changed == tables else tomli_w.dumps(changed)
-
-
 def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
     import h5py
 
@@ -269,14 +244,3 @@ def _of_laws(trajectory: Trajectory) -> dict[str, Any]:
     return {"penetration_rate": trajectory.penetration_rate,
             "ground_rate": contact[:, :, GROUND_RATE],
             "contact_energy": trajectory.energies.contact}
-
-
-def library_versions() -> dict[str, str]:
-    """Versions of fecontact and the libraries that compute."""
-    found = {}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found

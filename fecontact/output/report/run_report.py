@@ -14,7 +14,7 @@ from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, round_125
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.output.files.case import library_versions
+from fecontact.output.files.stored_system import library_versions
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.scene import COLOUR_MAPS
 from fecontact.output.report.bodies import PRESSURE, STATE, Motions, bodies_table

@@ -46,10 +46,7 @@ def plot_response(
         For another suffix, or a file that cannot be written.
     """
     require_kind("plot_response", FrequencyResponse, response=response)
-    label = parameter_label(response.parameter_name)
-    factor = 1.0
-    if label.endswith("[rad/s]"):
-        factor, label = 2.0 * np.pi, label.replace("angular ", "").replace("[rad/s]", "[Hz]")
+    factor, label = frequency_axis(response.parameter_name)
     with new_figure(9.0, 6.4, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         marked: dict[str, None] = {}
@@ -82,6 +79,24 @@ def plot_response(
     return figure
 
 
+def frequency_axis(name: str) -> tuple[float, str]:
+    """Factor and label of a parameter's axis; angular frequencies are shown in Hz."""
+    label = parameter_label(name)
+    if name.rpartition(".")[2] == "angular_frequency":
+        words = label.removesuffix(" [rad/s]").replace("angular ", "")
+        return 2.0 * np.pi, f"{words} [Hz]"
+    return 1.0, label
+
+
+def level_texts(name: str, levels: Array) -> tuple[str, list[str]]:
+    """Name of the parameter of the levels, and their values in a unit that suits them."""
+    label = parameter_label(name)
+    words, _, unit = label.rpartition(" [")
+    unit = unit.removesuffix("]") if words else ""
+    factor, symbol = suitable_unit(float(np.abs(levels).max()), unit) if unit else (1.0, "")
+    return words or label, [f"{level / factor:.4g} {symbol}".strip() for level in levels]
+
+
 def _amplitude_label(response: FrequencyResponse) -> str:
     """Displacements of contact systems are lengths; states of a vector field have no unit."""
     names = response.observed.split()
@@ -107,15 +122,10 @@ def _legend(
 
     handles: list[Any] = []
     if response.level_name:
-        label = parameter_label(response.level_name)
-        name, _, unit = label.rpartition(" [")
-        unit = unit.removesuffix("]") if name else ""
-        factor, symbol = (suitable_unit(float(np.abs(response.levels).max()), unit) if unit
-                          else (1.0, ""))
-        handles.append(Line2D([], [], linestyle="none", label=name or label))
-        handles += [Line2D([], [], color=colour, linewidth=1.8,
-                           label=f"{level / factor:.4g} {symbol}".strip())
-                    for level, colour in zip(response.levels, colours, strict=True)]
+        name, texts = level_texts(response.level_name, response.levels)
+        handles.append(Line2D([], [], linestyle="none", label=name))
+        handles += [Line2D([], [], color=colour, linewidth=1.8, label=text)
+                    for text, colour in zip(texts, colours, strict=True)]
     if dashed:
         handles += [Line2D([], [], color="#303030", linewidth=1.8, label="stable"),
                     Line2D([], [], color="#303030", linewidth=1.2, linestyle=DASHES,

@@ -1,14 +1,36 @@
 // The page of branches: a diagram whose points show their orbit.
 
 class Diagram extends Chart {
-  constructor(data, pick) {
-    const lines = data.branches.flatMap((branch) => Array.from({ length: branch.y.columns }, (_, k) => ({
-      ...branch, branch, x: branch.x.values, stable: branch.stable.values,
-      y: branch.y.values.filter((_, at) => at % branch.y.columns === k) })));
-    const longest = max(...lines.map(({ x }) => x.length)) - 1;
-    const set = (chosen) => { this.chosen = chosen; this.point(); pick(chosen.line.branch, chosen.number); };
-    super({ window: () => [0, longest], set }, { title: data.yLabel, xLabel: data.xLabel, lines,
-      legend: data.branches, height: 440, kind: "diagram" });
+  constructor(data, which, pick) {
+    const lines = data.branches.flatMap((branch) => {
+      const x = branch.x[which].values, { columns, values } = branch.y[which];
+      return Array.from({ length: columns }, (_, k) => ({
+        ...branch, branch, x, stable: branch.stable.values, y: values.filter((_, at) => at % columns === k) }));
+    });
+    const longest = max(...lines.map(({ x }) => x.length)) - 1, { xLabel, yLabel, height, decades } = data.diagrams[which];
+    super({ window: () => [0, longest], set: pick }, { title: yLabel, xLabel, lines,
+      legend: which ? [] : data.branches, height, kind: "diagram" });
+    this.decades = decades;
+  }
+
+  // On a logarithmic axis 1, 2, 5 in each decade where there is room, else powers of ten.
+  marks(low, high, most) {
+    if (!this.decades) return super.marks(low, high, most);
+    const digits = high - low < most / 4 ? [1, 2, 5] : [1], found = [];
+    for (let k = floor(low); k <= high; k++) {
+      for (const digit of digits) {
+        const at = k + Math.log10(digit);
+        if (at >= low && at <= high) found.push([at, `${+(digit * 10 ** k).toPrecision(1)}`]);
+      }
+    }
+    return found.length > 1 ? found : super.marks(low, high, most).map(([at]) => [at, `${+(10 ** at).toPrecision(3)}`]);
+  }
+
+  // The point that was picked in this diagram or in another one.
+  mark({ line, index }) {
+    const own = this.lines.includes(line) ? line : this.lines.find(({ branch }) => branch === line.branch);
+    this.chosen = { line: own, index };
+    this.point();
   }
 
   // Unstable parts are dashed.
@@ -37,7 +59,7 @@ class Diagram extends Chart {
         c.beginPath();
         c.arc(px, py, 4.5, 0, 7);
         c.fillStyle = css("--panel");
-        c.strokeStyle = c.strokeStyle = css("--ink");
+        c.strokeStyle = css("--ink");
         c.lineWidth = 1.2;
         c.fill();
         c.stroke();
@@ -82,7 +104,8 @@ async function build(host, data, told) {
   const phase = new Chart(clock, { title: `velocity [${orbits.units[1]}] over displacement [${orbits.units[0]}]`,
     xLabel: "", lines: [{ ...line("x"), y: phases }], height: 220, kind: "phase" });
   const facts = el("div");
-  const choose = (branch, place) => {
+  const choose = (chosen) => {
+    const { line: { branch }, number: place } = chosen;
     const number = branch.first + place;
     clock.load(phases.map((value) => value * orbits.periods.values[number]));
     if (player) data.coordinates.values = part(orbits.coordinates, number);
@@ -93,25 +116,28 @@ async function build(host, data, told) {
     facts.replaceChildren(table([], [["branch", branch.name], ...data.columns.map((name, k) =>
       [name, branch.rows[place][k]]).filter(([, text]) => text)]));
     told.orbit = number;
+    if (orbits.scales) player.magnify(orbits.scales[number]);
+    for (const diagram of diagrams) diagram.mark(chosen);
     player?.draw();
     history.resize();
     phase.resize();
     clock.set(0);
   };
   const player = data.bodies ? new Player(data, clock) : null;
-  const diagram = new Diagram(data, choose);
+  const diagrams = data.diagrams.map((_, which) => new Diagram(data, which, choose));
   const resize = () => { history.resize(); phase.resize(); };
   if (player) data.coordinates.values = part(orbits.coordinates, 0);
   const timing = controls(data, clock, player, resize, 3);
   host.append(head(data), el("main", {},
-    el("div.left", {}, ...section("Diagram", diagram.node)),
+    el("div.left", {}, ...section("Diagram", ...diagrams.map(({ node }) => node))),
     el("div", {}, el("section", {}, ...player ? [player.node] : [], timing.bar, timing.more),
       ...section("Point", facts), ...section("Motion", history.node, phase.node))),
   ...cards("Study", data.study), foot(data));
-  const refresh = () => { player?.resize(); diagram.resize(); resize(); };
+  const refresh = () => { player?.resize(); for (const diagram of diagrams) diagram.resize(); resize(); };
   clock.watchers.push(() => { player?.draw(); history.point(); phase.point(); });
   phase.lines[0].x = part(orbits.displacement, 0);
   refresh();
-  diagram.clock.set({ line: diagram.lines[0], index: diagram.lines[0].kept[0], number: 0 });
+  const [first] = diagrams[0].lines;
+  choose({ line: first, index: first.kept[0], number: 0 });
   return { close: ready(host, told, refresh, player, timing), clock };
 }

@@ -138,6 +138,11 @@ function addPlayer(data, player, more) {
     player.draw();
   });
   magnify.oninput();
+  player.magnify = (scale) => {
+    magnify.max = max(magnify.max, Math.log(scale) + 2.3);
+    magnify.value = Math.log(scale);
+    magnify.oninput();
+  };
   const arrows = el("input", { type: "checkbox", checked: true,
     onchange() { player.arrows = arrows.checked; player.draw(); } });
   more.append(field("deformation", magnify), factor, field("colour", colour),

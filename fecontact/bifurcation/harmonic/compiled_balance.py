@@ -1,0 +1,84 @@
+"""Equations of harmonic balance of contact systems in compiled code."""
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.parametrised_system import AffineArrays
+from fecontact.bifurcation.harmonic import compiled_steps as kernels
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.harmonic.balance import Balance
+
+# Most unknowns for which compiled code without LAPACK is faster.
+_MOST_UNKNOWNS = 160
+
+
+@dataclass(eq=False)
+class CompiledBalance:
+    """What compiled code needs of a field over one parameter, kept for all problems along a branch.
+
+    Attributes
+    ----------
+    contact_field : ContactField
+    affine : AffineArrays or None
+        Arrays of the system about the last value.
+    known : dict
+        Equations by harmonics, samples and periods.
+    """
+
+    contact_field: ContactField
+    affine: AffineArrays | None = None
+    known: dict[tuple[int, int, int], kernels.Equations] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, problem: "Balance") -> "CompiledBalance | None":
+        """None where the period is unknown, or changes with the parameter in an unknown way."""
+        found = problem.field
+        if (not isinstance(found, ContactField) or problem.autonomous
+                or not (problem.turn is not None or found.constant_period)):
+            return None
+        return cls(found)
+
+    def equations(self, problem: "Balance", value: float) -> kernels.Equations | None:
+        """Equations about a value of the parameter; None where its arrays are not affine in it.
+
+        There is one room for all equations of a size: what is found there has to be copied.
+        """
+        if not 0 < problem.size <= _MOST_UNKNOWNS:
+            return None
+        near = self.affine
+        if near is None or not near.low < value < near.high:
+            values = problem.values.copy()
+            values[problem.free] = value
+            near = self.affine = self.contact_field.affine(values, problem.free)
+            self.known.clear()
+        if near is None:
+            return None
+        key = problem.harmonics, problem.samples, problem.periods
+        if key not in self.known:
+            self.known[key] = self._made(problem, near, value)
+        found = self.known[key]
+        if found.offsets is not problem.kept.offsets:
+            found = self.known[key] = found._replace(offsets=problem.kept.offsets)
+        return found
+
+    def _made(
+        self, problem: "Balance", near: AffineArrays, value: float
+    ) -> kernels.Equations:
+        layout, series = problem.layout, problem.series
+        numbers = np.zeros(kernels.ROUNDING + 1)
+        if problem.turn is not None:
+            numbers[kernels.TURN] = problem.periods * problem.turn
+        else:
+            numbers[kernels.PERIOD] = problem.period(np.array([value]))
+        numbers[kernels.LOW], numbers[kernels.HIGH] = near.low, near.high
+        room = kernels.room_for(problem.harmonics, problem.samples, layout.displacements,
+                                layout.memory, layout.nodes)
+        return kernels.Equations(
+            near.arrays, near.flat, near.base, near.slope, series.times, series.values,
+            series.projection, series.cosines, series.sines, problem.kept.rows,
+            problem.kept.offsets, np.full(layout.displacements, np.inf), numbers, layout.nodes,
+            room)

@@ -1,0 +1,105 @@
+"""Extremes of orbits by harmonic balance, and estimates of their errors, for many at once."""
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic.series import basis_at, uniform_basis
+from fecontact.core.types import Array
+
+# Points per harmonic, and at least, among which extremes are looked for.
+_FINE, _LEAST_FINE = 12, 96
+
+
+def neglected(
+    X: Array, forces: Array, mean: Array, periods: Array, sizes: Array, displacements: int
+) -> tuple[Array, Array]:
+    """Estimates (K,) of the errors of K orbits, and of those of their equations.
+
+    The neglected harmonics k > H of the rates, f_k, would add x_k = (i k w - J_0)^-1 f_k to
+    the orbit, J_0 the mean derivative. The first number is their root mean square over that of
+    harmonics 1 to H of displacements and other states, in their scales; the second that of f_k,
+    the residual in time, over that of x'. Velocities are those of the series: none of their
+    harmonics are neglected.
+
+    Parameters
+    ----------
+    X : (K, 2 H + 1, b) array
+        Coefficients of displacements or, without these, of all states.
+    forces : (K, N, b) array
+        Accelerations, or rates, at the samples.
+    mean : (K, b, 2 b) or (K, b, b) array
+        Mean derivatives J_0 of these to displacements and velocities, or states.
+    periods : (K,) array
+        T [s].
+    sizes : (b,) or (K, b) array
+        Scales.
+    displacements : int
+        b or 0: whether X holds displacements.
+    """
+    count, samples, b = forces.shape
+    H = X.shape[1] // 2
+    most = min(3 * H + 2, (samples - 1) // 2)
+    if most <= H:
+        return np.full(count, np.nan), np.full(count, np.nan)
+    spectrum = 2.0 * np.fft.rfft(forces, axis=1) / samples
+    left = spectrum[:, H + 1 : most + 1]
+    turns = 2.0j * np.pi / periods[:, None] * np.arange(H + 1, most + 1)
+    turned = turns[:, :, None, None]
+    mean = mean[:, None]
+    matrix = (turned**2 * np.eye(b) - mean[..., :b] - turned * mean[..., b:] if displacements
+              else turned * np.eye(b) - mean)
+    if b == 1:
+        added = left / matrix[:, :, 0]
+    else:
+        try:
+            added = np.linalg.solve(matrix, left[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            return np.full(count, np.nan), np.full(count, np.nan)
+    sizes = np.broadcast_to(sizes, (count, b))[:, None]
+    kept = _norm(X[:, 1:] / sizes)
+    rate_sizes = np.abs(spectrum[:, 1:]).max(axis=1, keepdims=True) + 1e-300
+    return (_norm(added / sizes) / np.where(kept > 0.0, kept, 1.0),
+            _norm(left / rate_sizes) / _norm(spectrum[:, 1 : H + 1] / rate_sizes))
+
+
+def _norm(x: Array) -> Array:
+    """Norms (K,) of arrays (K, ...)."""
+    return np.sqrt((np.abs(x) ** 2).sum(axis=(1, 2)))
+
+
+def extremes(whole: Array, z: Array) -> tuple[Array, Array]:
+    """Smallest and largest value (K, d) of each state over K orbits.
+
+    ``whole`` (K, 2 H + 1, d - c) are coefficients, z (K, N, c) the states behind at the samples.
+    """
+    H = whole.shape[1] // 2
+    fine = max(_LEAST_FINE, _FINE * H)
+    x = uniform_basis(fine, H) @ whole
+    found = []
+    for sign in (-1.0, 1.0):
+        best, place = _peaks(np.moveaxis(sign * x, 1, 0))
+        # The series where the parabola has its peak: exact but for the square of its error.
+        there = (basis_at(place.reshape(-1) / fine, H).reshape(*place.shape, -1)
+                 * np.moveaxis(whole, 1, 2)).sum(axis=-1)
+        best = np.maximum(best, sign * there)
+        found.append(sign * np.concatenate([best, (sign * z).max(axis=1)], axis=1))
+    return found[0], found[1]
+
+
+def peaks(x: Array) -> tuple[Array, Array]:
+    """Extremes (d,) of samples (N, d) around a period, on parabolas through three of them."""
+    return -_peaks(-x)[0], _peaks(x)[0]
+
+
+def _peaks(x: Array) -> tuple[Array, Array]:
+    """Largest values (...) of samples (N, ...), and their places counted in samples."""
+    place = x.argmax(axis=0)
+
+    def at(index: Array) -> Array:
+        return np.take_along_axis(x, index[None], axis=0)[0]
+
+    here, left, right = at(place), at(place - 1), at((place + 1) % len(x))
+    bend = left - 2.0 * here + right
+    curved = bend < 0.0
+    safe = np.where(curved, bend, -1.0)
+    return (np.where(curved, here - (right - left) ** 2 / (8.0 * safe), here),
+            np.where(curved, place - (right - left) / (2.0 * safe), place))

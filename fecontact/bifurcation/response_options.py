@@ -1,0 +1,188 @@
+"""The section ``[response]`` of a study file."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+from fecontact.core.errors import InputError, require_finite, require_positive
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.continuation.problem import ContinuationOptions
+    from fecontact.bifurcation.harmonic.method import HarmonicBalance
+
+_FREQUENCY = "angular_frequency"
+
+
+@dataclass(frozen=True)
+class ResponseSettings:
+    """``[response]``: frequency responses by harmonic balance.
+
+    See :func:`fecontact.bifurcation.frequency_response`; harmonics, samples and what is observed
+    also hold for nonlinear modes.
+
+    Parameters
+    ----------
+    parameter : str
+        Dotted name of the number of the study that changes along a response, an angular frequency
+        or any other, such as the amplitude of a force.
+    bounds : (float, float), optional
+        Its least and largest value, an angular frequency in rad/s.
+    bounds_hz : (float, float), optional
+        The same of an angular frequency, in Hz, in place of ``bounds``.
+    start : float, optional
+        Where responses start, in the unit of the bounds; the least value by default, inside they
+        are followed both ways.
+    levels : table of one list, optional
+        Another parameter and its values, a response for each:
+        ``levels = { "drive.amplitude_x" = [1e-5, 2e-5] }``.
+    harmonics : int
+        Harmonics of the period of the excitation.
+    samples : int, optional
+        Samples a period, at least 2 harmonics + 2; by default 8 harmonics, at least 32. Kinks of
+        laws need more.
+    tolerance : float, optional
+        Largest truncation error, relative to the orbit, for which harmonics are added.
+    most_harmonics : int
+        Limit for that.
+    stability : 'transitions', 'Koopman-Hill' or 'none'
+        How it is told whether orbits are stable; without it points take a fraction of the time and
+        folds alone are found.
+    preload : bool
+        Whether friction elements that never slide keep what ``[preload]`` has left in them;
+        otherwise they have no deflection at rest.
+    step, largest_step : float
+        First and largest step, in parts of the diagram.
+    points : int
+        Most points of a response.
+    point : str or int, optional
+        What is observed: 'B', 'C', a further named point, or a contact node by its number; B by
+        default, or the middle of the contact where nothing is named B.
+    component : 'x', 'y', 'z', 'phi', 'phi_x', 'phi_y' or 'phi_z', optional
+        Its component; by default that of the drive.
+    """
+
+    parameter: str = "drive.angular_frequency"
+    bounds: tuple[float, float] | None = None
+    bounds_hz: tuple[float, float] | None = None
+    start: float | None = None
+    levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    harmonics: int = 9
+    samples: int | None = None
+    tolerance: float | None = None
+    most_harmonics: int = 100
+    stability: Literal["transitions", "Koopman-Hill", "none"] = "transitions"
+    preload: bool = False
+    step: float = 0.01
+    largest_step: float = 0.03
+    points: int = 2000
+    point: str | int | None = None
+    component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("ResponseSettings", step=self.step, largest_step=self.largest_step,
+                         points=self.points)
+        if self.step > self.largest_step:
+            raise InputError(f"ResponseSettings: step = {self.step:g} must not be above "
+                             f"largest_step = {self.largest_step:g}.")
+        if self.bounds is not None and self.bounds_hz is not None:
+            raise InputError(f"ResponseSettings: bounds = {list(self.bounds)} and bounds_hz = "
+                             f"{list(self.bounds_hz)} mean the same; leave out one of them.")
+        if self.bounds_hz is not None and not self.over_frequency:
+            raise InputError(f"ResponseSettings: bounds_hz = {list(self.bounds_hz)} is for an "
+                             f"angular frequency, but parameter = '{self.parameter}'; give its "
+                             f"bounds by the key 'bounds'.")
+        self._check_levels()
+        self._check_bounds()
+        _ = self.method()
+
+    def _check_levels(self) -> None:
+        if len(self.levels) > 1:
+            raise InputError(f"ResponseSettings: levels names {len(self.levels)} parameters; give "
+                             f"one with its values.")
+        for name, values in self.levels.items():
+            if not values or not all(map(math.isfinite, values)):
+                raise InputError(f"ResponseSettings: levels: {name} = {list(values)} must be a "
+                                 f"list of at least one finite number.")
+            if name == self.parameter:
+                raise InputError(f"ResponseSettings: levels names '{name}', over which the "
+                                 f"responses go; take another parameter for the levels.")
+
+    def _check_bounds(self) -> None:
+        given = self.bounds if self.bounds_hz is None else self.bounds_hz
+        if given is None:
+            return
+        name = "bounds" if self.bounds_hz is None else "bounds_hz"
+        low, high = given
+        require_finite(f"ResponseSettings: {name}", low=low, high=high)
+        if not low < high:
+            raise InputError(f"ResponseSettings: {name} = {list(given)} must be two values, the "
+                             f"smaller one first.")
+        if self.over_frequency and low <= 0.0:
+            raise InputError(f"ResponseSettings: {name} = {list(given)} must be frequencies above "
+                             f"zero.")
+        if self.start is not None:
+            require_finite("ResponseSettings", start=self.start)
+            if not low <= self.start <= high:
+                raise InputError(f"ResponseSettings: start = {self.start:g} must lie in the "
+                                 f"bounds, {low:g} to {high:g}.")
+
+    @property
+    def over_frequency(self) -> bool:
+        """Whether the parameter is an angular frequency."""
+        return self.parameter.rpartition(".")[2] == _FREQUENCY
+
+    @property
+    def _factor(self) -> float:
+        return 1.0 if self.bounds_hz is None else 2.0 * math.pi
+
+    @property
+    def checked_bounds(self) -> tuple[float, float]:
+        """The bounds in the unit of the parameter; InputError where there are none."""
+        given = self.bounds if self.bounds_hz is None else self.bounds_hz
+        if given is None:
+            key, option = (("bounds_hz", "--hz LOW HIGH") if self.over_frequency
+                           else ("bounds", "--bounds LOW HIGH"))
+            raise InputError(f"[response] lacks the key '{key}', the least and largest value of "
+                             f"{self.parameter}; give it, or {option}.")
+        return given[0] * self._factor, given[1] * self._factor
+
+    @property
+    def first(self) -> float:
+        """Where responses start, in the unit of the parameter."""
+        return self.checked_bounds[0] if self.start is None else self.start * self._factor
+
+    @property
+    def level_name(self) -> str | None:
+        """The parameter of the levels."""
+        return next(iter(self.levels), None)
+
+    def method(self) -> "HarmonicBalance":
+        """Harmonic balance as it is asked for."""
+        from fecontact.bifurcation.harmonic.method import HarmonicBalance
+
+        return HarmonicBalance(self.harmonics, self.samples, self.tolerance,
+                               max(self.harmonics, self.most_harmonics),
+                               None if self.stability == "none" else self.stability)
+
+    def options(self) -> "ContinuationOptions":
+        """How responses are followed."""
+        from fecontact.bifurcation.continuation.problem import ContinuationOptions
+
+        return ContinuationOptions(step=self.step, largest_step=self.largest_step,
+                                   points=self.points, bounds=self.checked_bounds)
+
+
+def flat_levels(table: Any) -> Any:
+    """``[response]`` with levels by dotted names, which TOML may have read as nested tables."""
+    if not isinstance(table, Mapping) or not isinstance(table.get("levels"), Mapping):
+        return table
+    return {**table, "levels": dict(_leaves(table["levels"], ""))}
+
+
+def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        found += (_leaves(value, f"{prefix}{key}.") if isinstance(value, Mapping)
+                  else [(f"{prefix}{key}", value)])
+    return found

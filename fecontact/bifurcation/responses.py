@@ -1,0 +1,166 @@
+"""Frequency responses of a study: those of its section ``[response]``, level by level."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fecontact.analysis.histories import usual_component
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.harmonic.response import (
+    FrequencyResponse,
+    continued,
+    frequency_response,
+)
+from fecontact.core.errors import FecontactError
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.response_options import ResponseSettings
+    from fecontact.system.contact_system import ContactSystem
+    from fecontact.system.quasistatic.history import LoadHistory
+
+
+@dataclass
+class Responses:
+    """What was computed of the responses of a study.
+
+    Attributes
+    ----------
+    response : FrequencyResponse or None
+        Levels in the order of the study; None where no level has one.
+    notes : list of str
+        Sentences on levels that could not be followed.
+    interrupted : bool
+        Whether Ctrl-C ended it.
+    """
+
+    response: FrequencyResponse | None = None
+    notes: list[str] = field(default_factory=list)
+    interrupted: bool = False
+
+
+def observed_point(
+    system: "ContactSystem", wanted: "ResponseSettings"
+) -> tuple[str | int, str]:
+    """Point and component that are observed; InputError if they do not exist."""
+    basis, point = system.basis, wanted.point
+    if point is None:
+        point = "B" if basis.T[0].any() else basis.contact_nodes // 2
+    component = wanted.component or usual_component(system)
+    _ = basis.point_row(point, component)
+    return point, component
+
+
+def follow_responses(
+    system: "ContactSystem", wanted: "ResponseSettings",
+    progress: Callable[[str, float], None] | None = None,
+    earlier: FrequencyResponse | None = None,
+    keep: Callable[[FrequencyResponse], object] | None = None,
+    preload: "LoadHistory | None" = None,
+) -> Responses:
+    """Follow the responses at all levels, one after the other.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        What vibrates.
+    wanted : ResponseSettings
+        Range, levels, method.
+    progress : callable, optional
+        Told the level that is being followed, and which part of its range is done.
+    earlier : FrequencyResponse, optional
+        What an interrupted computation of the same has left: finished levels are taken from it, the
+        one that was interrupted goes on at its last point.
+    keep : callable, optional
+        Given what there is after each level.
+    preload : LoadHistory, optional
+        Whose end elements that never slide keep.
+
+    Raises
+    ------
+    FecontactError
+        If no level has a response.
+    """
+    observe, result = observed_point(system, wanted), Responses()
+    failed: FecontactError | None = None
+    for value in next(iter(wanted.levels.values()), (np.nan,)):
+        title = "Response" if wanted.level_name is None else f"{wanted.level_name} = {value:g}"
+        known = _level_of(earlier, value)
+        try:
+            options = _settings(wanted, title, progress)
+            if known is not None and _goes_on(known, wanted):
+                found = _with_rest(system, known, observe, options)
+            elif known is not None and known.branches[0].status is not BranchStatus.INTERRUPTED:
+                found = known
+            else:
+                found = frequency_response(
+                    system, wanted.checked_bounds, wanted.parameter, observe=observe,
+                    levels=None if wanted.level_name is None else {wanted.level_name: [value]},
+                    method=wanted.method(), options=options,
+                    start=None if wanted.start is None else wanted.first, preload=preload)
+        except KeyboardInterrupt:
+            if result.response is None:
+                raise
+            result.interrupted = True
+            break
+        except FecontactError as error:
+            failed = error
+            result.notes.append(f"{title}: no response was followed: {error}")
+            continue
+        result.response = found if result.response is None else _joined(result.response, found)
+        if keep is not None:
+            keep(result.response)
+        if found.branches[0].status is BranchStatus.INTERRUPTED:
+            result.interrupted = True
+            break
+    if result.response is None and failed is not None:
+        raise failed
+    return result
+
+
+def _settings(
+    wanted: "ResponseSettings", title: str, progress: Callable[[str, float], None] | None
+) -> ContinuationOptions:
+    options = wanted.options()
+    if progress is None:
+        return options
+    progress(title, 0.0)
+    return replace(options, progress=lambda points: progress(title, points / options.points))
+
+
+def _level_of(earlier: FrequencyResponse | None, value: float) -> FrequencyResponse | None:
+    """The response at one level of an earlier computation."""
+    if earlier is None:
+        return None
+    for branch, level in zip(earlier.branches, earlier.levels, strict=True):
+        if level == value or (np.isnan(level) and np.isnan(value)):
+            return replace(earlier, branches=(branch,), levels=np.array([level]))
+    return None
+
+
+def _goes_on(known: FrequencyResponse, wanted: "ResponseSettings") -> bool:
+    """Whether an interrupted level is continued; otherwise it is followed anew.
+
+    Followed to both sides it has parts on one of them only, and with a tolerance of its own the
+    number of harmonics may still change.
+    """
+    low, high = wanted.checked_bounds
+    return (known.branches[0].status is BranchStatus.INTERRUPTED
+            and not low < wanted.first < high and wanted.tolerance is None)
+
+
+def _with_rest(
+    system: "ContactSystem", known: FrequencyResponse, observe: tuple[str | int, str],
+    options: ContinuationOptions,
+) -> FrequencyResponse:
+    branch: Branch = known.branches[0]
+    row = contact_field(system, [known.parameter_name]).displacement_row(*observe)
+    return replace(known, branches=(continued(system, branch, row, options),))
+
+
+def _joined(one: FrequencyResponse, other: FrequencyResponse) -> FrequencyResponse:
+    return replace(one, branches=(*one.branches, *other.branches),
+                   levels=np.concatenate([one.levels, other.levels]))

@@ -1,0 +1,166 @@
+"""The command ``response``: nonlinear frequency responses of a study."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, show, waiting
+from fecontact.cli.options import Changes, Folder, StudyFile
+from fecontact.core.errors import InputError
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.harmonic.response import FrequencyResponse
+    from fecontact.bifurcation.response_options import ResponseSettings
+    from fecontact.study.study import Study
+
+
+def response(
+    study: StudyFile,
+    parameter: Annotated[str | None, Parameter(
+        help="What changes along a response; overrides `[response]`. By default "
+        "`drive.angular_frequency`.")] = None,
+    /,
+    *,
+    hz: Annotated[tuple[float, float] | None, Parameter(
+        help="Lowest and highest frequency [Hz]; overrides `[response]`.")] = None,
+    bounds: Annotated[tuple[float, float] | None, Parameter(
+        help="Least and largest value of another parameter; overrides `[response]`.")] = None,
+    levels: Annotated[str | None, Parameter(
+        help="Another parameter and its values, `drive.amplitude_x=1e-5,2e-5`; a response for "
+        "each.")] = None,
+    harmonics: Annotated[int | None, Parameter(
+        help="Harmonics; overrides `[response]`.")] = None,
+    samples: Annotated[int | None, Parameter(
+        help="Samples a period; overrides `[response]`.")] = None,
+    tolerance: Annotated[float | None, Parameter(
+        help="Largest truncation error; overrides `[response]`.")] = None,
+    set_: Changes = None,
+    output: Folder = None,
+    resume: Annotated[bool, Parameter(
+        negative=(), help="Go on with an interrupted response.")] = False,
+) -> int:
+    """Steady vibration over the frequency of the excitation, by harmonic balance.
+
+    The section [response] of the study gives range, levels and harmonics. Writes the responses
+    (NAME-response.h5, NAME-response.csv), a picture of amplitude and phase, and a page whose
+    diagram plays the orbit of a point that is clicked (NAME-response.html). Each level is stored
+    when it is done. Ctrl-C stops it; --resume goes on where it was.
+    """
+    from fecontact.cli.run_files import read_study
+    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.locks import locked
+    from fecontact.core.progress import titled_bar
+    from fecontact.core.tables import located
+
+    described = read_study(study, set_)
+    with located(f"{described.title}: [response]:", "ResponseSettings"):
+        wanted = _wanted(described.response, parameter, hz, bounds, levels, harmonics, samples,
+                         tolerance)
+    with located(f"{described.title}:"):
+        _ = wanted.checked_bounds
+    described = replace(described, response=wanted)
+    from fecontact.bifurcation.responses import follow_responses, observed_point
+    from fecontact.cli.response_results import (
+        keep_response,
+        response_file,
+        response_table,
+        write_response_results,
+    )
+
+    with (output_folder(output or described.results) as folder,
+          locked(folder / f".{described.name}-response.lock",
+                 f"Another response is writing {folder / described.name}-response.h5; wait for "
+                 f"it, or choose another folder with -o.")):
+        with waiting("Computing modes"):
+            system = described.system()
+        with located(f"{described.title}: [response]:"):
+            observe = observed_point(system, wanted)
+        earlier = _earlier(described, response_file(described, folder)) if resume else None
+        with titled_bar() as progress:
+            found = follow_responses(
+                system, wanted, progress, earlier,
+                lambda part: keep_response(described, part, folder),
+                described.load_history() if wanted.preload else None)
+        assert found.response is not None
+        with waiting("Writing"):
+            files = write_response_results(described, found.response, observe, folder)
+        show(response_table(found.response))
+        for branch in found.response.branches:
+            if branch.message:
+                echo(f"note: the last step failed: {branch.message}")
+        for note in found.notes:
+            echo(f"note: {note}")
+        echo_written(*files)
+    if found.interrupted:
+        return INTERRUPTED
+    stalled = [f"{level:g}" for level, branch in zip(found.response.levels,
+                                                     found.response.branches, strict=True)
+               if branch.status.name == "STALLED"]
+    if stalled:
+        which = "" if found.response.level_name is None else f" at the levels {', '.join(stalled)}"
+        return fail(f"the steps{which} became too small to go on; what was computed is written.", 1)
+    return 1 if found.notes else 0
+
+
+def _wanted(
+    given: "ResponseSettings", parameter: str | None, hz: tuple[float, float] | None,
+    bounds: tuple[float, float] | None, levels: str | None, harmonics: int | None,
+    samples: int | None, tolerance: float | None,
+) -> "ResponseSettings":
+    """The section [response] with the options of the command line."""
+    changes: dict[str, object] = {name: value for name, value in (
+        ("parameter", parameter), ("harmonics", harmonics), ("samples", samples),
+        ("tolerance", tolerance)) if value is not None}
+    if hz is not None and bounds is not None:
+        raise InputError("--hz and --bounds mean the same; give one of them.")
+    if hz is not None or bounds is not None:
+        changes |= {"bounds": bounds, "bounds_hz": hz, "start": None}
+    elif parameter is not None and parameter != given.parameter:
+        changes |= {"bounds": None, "bounds_hz": None, "start": None}
+    if levels is not None:
+        changes["levels"] = _levels(levels)
+    if harmonics is not None and samples is None:
+        changes["samples"] = None
+    return replace(given, **changes)  # type: ignore[arg-type]
+
+
+def _levels(text: str) -> dict[str, tuple[float, ...]]:
+    """A parameter and its values from ``name=1,2``."""
+    name, equals, listed = (part.strip() for part in text.partition("="))
+    try:
+        values = tuple(float(part) for part in listed.split(","))
+    except ValueError:
+        equals = ""
+    if not (name and equals):
+        raise InputError(f"--levels {text} must have the form KEY=VALUE,VALUE, like "
+                         f"drive.amplitude_x=1e-5,2e-5.")
+    return {name: values}
+
+
+def _earlier(study: "Study", file: Path) -> "FrequencyResponse":
+    """The interrupted response of a study.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is one of other values.
+    """
+    from fecontact.laws.registry import law_files
+    from fecontact.output.files.branches import read_response
+    from fecontact.output.files.stored_system import read_model
+    from fecontact.study.study import Study
+
+    if not file.is_file():
+        raise InputError(f"There is no interrupted response to go on with: {file} does not exist; "
+                         f"leave out --resume.")
+    text = read_model(file, law_files(study.tables())).study
+    stored = Study.from_toml(text or "", study.path)
+    kept = ("output", "render", "sweep", "branch", "simulation", "wear")
+    same = replace(stored, **{name: getattr(study, name) for name in kept},
+                   response=replace(stored.response, levels=study.response.levels))
+    if same != study:
+        raise InputError(f"{file} was computed with other values than {study.title} has now; "
+                         f"leave out --resume.")
+    return read_response(file)

@@ -1,0 +1,112 @@
+"""Nonlinear modes of ``fecontact modes --nonlinear``: files, table and plots."""
+
+import csv
+import io
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, show, waiting
+from fecontact.core.errors import InputError
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
+    from fecontact.study.study import Study
+
+_COLUMNS = ("kind", "amplitude", "frequency_hz", "damping_ratio", "loss", "energy", "stable",
+            "truncation_error")
+_SHOWN = 8  # rows of the table
+
+
+def follow_mode(
+    study: "Study", number: int, amplitudes: tuple[float, float] | None, folder: Path
+) -> int:
+    """Follow a nonlinear mode of a study and write its files; returns the exit code.
+
+    Raises
+    ------
+    InputError
+        Without amplitudes, or for a mode or point that does not exist.
+    """
+    if amplitudes is None:
+        raise InputError("--nonlinear needs the smallest and largest amplitude of the mode in m; "
+                         "give --amplitudes LOW HIGH.")
+    from fecontact.bifurcation.continuation.problem import ContinuationOptions
+    from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import nonlinear_mode
+    from fecontact.bifurcation.responses import observed_point
+    from fecontact.core.progress import progress_bar
+    from fecontact.core.tables import located
+
+    wanted, system = study.response, study.system()
+    with located(f"{study.title}: [response]:"):
+        observe = observed_point(system, wanted)
+    options = ContinuationOptions(points=wanted.points, step=0.02, largest_step=0.1)
+    with (progress_bar(f"Mode {number}", wanted.points) as tell,
+          located("--nonlinear:", "nonlinear_mode")):
+        mode = nonlinear_mode(system, amplitudes, number, observe=observe, method=wanted.method(),
+                              options=replace(options, progress=tell))
+    with waiting("Writing"):
+        files = write_mode_results(study, mode, observe, folder)
+    echo(f"\nnonlinear mode {number}: {mode.branch.status.value}")
+    if mode.branch.message:
+        echo(f"The last step failed: {mode.branch.message}")
+    show(mode_table(mode))
+    echo_written(*files)
+    if mode.branch.status.name == "INTERRUPTED":
+        return INTERRUPTED
+    if mode.branch.status.name == "STALLED":
+        return fail("the steps became too small to go on; what was computed is written.", 1)
+    return 0
+
+
+def write_mode_results(
+    study: "Study", mode: "NonlinearMode", observe: tuple[str | int, str], folder: Path
+) -> list[Path]:
+    """Write a nonlinear mode as HDF5, CSV, picture and page; returns the files."""
+    from fecontact.core.files.atomic_write import write_text
+    from fecontact.output.files.branches import write_mode
+    from fecontact.output.plots.responses.nonlinear_modes import plot_nonlinear_mode
+    from fecontact.output.report.mode_report import report_modes
+
+    system, text, name = study.system(), study.to_toml(), f"{study.name}-mode-{mode.number}"
+    files = [folder / f"{name}.{ending}" for ending in ("h5", "csv", "png", "html")]
+    write_mode(files[0], mode, system=system, study=text, root=study.folder)
+    write_text(files[1], mode_csv(mode))
+    plot_nonlinear_mode(mode, path=files[2])
+    report_modes(mode, system, files[3], observe=observe, study=text,
+                 title=f"{study.name}, nonlinear mode {mode.number}")
+    return files
+
+
+def mode_csv(mode: "NonlinearMode") -> str:
+    """All points of a nonlinear mode as CSV, in SI units."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    energy, stable = mode.energy, mode.stable
+    for place, point in enumerate(mode.branch.points):
+        writer.writerow([
+            point.kind or "",
+            *(repr(float(column[place])) for column in (
+                mode.amplitude, mode.frequency, mode.damping_ratio, mode.loss)),
+            "" if energy is None else repr(float(energy[place])),
+            "" if stable is None else int(stable[place]),
+            repr(float(point.values["truncation_error"]))])
+    return text.getvalue()
+
+
+def mode_table(mode: "NonlinearMode") -> Any:
+    """Some points along a mode, ends and special points among them."""
+    from fecontact.cli.tables import table
+    from fecontact.core.units import quantity
+
+    unit = "rad" if mode.observed.rpartition(" ")[2].startswith("phi") else "m"
+    last = len(mode) - 1
+    chosen = {round(last * part / (_SHOWN - 1)) for part in range(_SHOWN)}
+    chosen |= {place for place, point in enumerate(mode.branch.points) if point.kind is not None}
+    return table(
+        "", f"amplitude of {mode.observed}", "frequency [Hz]", "damping ratio",
+        rows=((mode.branch.points[place].kind or "",
+               quantity(float(mode.amplitude[place]), unit, 5), f"{mode.frequency[place]:.6g}",
+               "none" if mode.conservative else f"{mode.damping_ratio[place]:.4g}")
+              for place in sorted(chosen)))

@@ -1,0 +1,221 @@
+"""Orbits, plots and pages of files that ``fecontact branch`` and ``response`` write."""
+
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fecontact.cli.run_files import StoredRun
+from fecontact.core.errors import FecontactError, InputError, choices
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.continuation.branch import Branch
+    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.bifurcation.fields.contact_field import ContactField
+    from fecontact.integrate.trajectory import Trajectory
+    from fecontact.output.files.stored_system import StoredModel
+    from fecontact.study.sections import RenderSettings
+
+DIAGRAMS = ("branches", "response", "mode")  # plots of whole files
+_TURN, _FREQUENCY = 2.0 * np.pi, "angular_frequency"
+_OUTPUTS = 1001  # of an orbit
+
+
+@dataclass(frozen=True)
+class OrbitChoice:
+    """Which orbit of a file is meant.
+
+    Attributes
+    ----------
+    branch : str or None
+        Name or number of a branch.
+    at, at_hz : float or None
+        Value of the parameter, or of an angular frequency in Hz.
+    which : int
+        Which of several there, counted along the branch.
+    """
+
+    branch: str | None = None
+    at: float | None = None
+    at_hz: float | None = None
+    which: int = 0
+
+
+def holds_branches(file: Path) -> bool:
+    """Whether a file is one of branches, by its name."""
+    return file.suffix.lower() in (".h5", ".hdf5")
+
+
+def stored_orbit_or_run(
+    file: Path, trust: bool, changes: Iterable[str] | None, choice: OrbitChoice
+) -> "StoredRun":
+    """The chosen orbit of a file of branches as a run over one period, or a stored run.
+
+    Raises
+    ------
+    InputError
+        If the file has no such branch or orbit, or an orbit is chosen of what has none.
+    """
+    from fecontact.cli.run_files import require_stored, stored_run
+
+    if not holds_branches(file):
+        if choice != OrbitChoice():
+            raise InputError(f"--branch, --at, --at-hz and --which choose an orbit of a file of "
+                             f"branches, NAME-branch.h5 or NAME-response.h5, but {file} is none.")
+        return stored_run(file, trust, changes)
+    require_stored(file, changes)
+    from fecontact.output.files.branches import read_branches
+    from fecontact.output.files.stored_system import read_model
+
+    named, model = read_branches(file), read_model(file, trust)
+    name, branch = _branch(file, named, choice.branch)
+    point, run = _motion(file, branch, model, choice)
+    settings = _settings(model)
+    if settings.title is None:
+        period = float(point.values["period"])
+        place = ("" if branch.parameter_name.endswith((_FREQUENCY, "xi"))
+                 else f"{branch.parameter_name} = {point.parameter:.5g}, ")
+        settings = replace(settings, title=f"{_called(name, branch)}{place}{1.0 / period:.5g} Hz")
+    return StoredRun(file, run, settings, True, model.study, model.versions)
+
+
+def _motion(
+    file: Path, branch: "Branch", model: "StoredModel", choice: OrbitChoice
+) -> "tuple[BranchPoint, Trajectory]":
+    """The chosen point of a branch or a nonlinear mode, and its motion."""
+    if "mode_number" not in branch.attributes:
+        field = field_of(branch, model)
+        point = _point(file, branch, field, choice)
+        return point, point.trajectory(field, _OUTPUTS)
+    from fecontact.bifurcation.nonlinear_modes.linear_start import unforced, with_mass_damping
+    from fecontact.bifurcation.orbits.motions import sampled_run
+
+    if choice.at_hz is not None:
+        raise InputError(f"--at-hz = {choice.at_hz:g} is for branches over an angular frequency, "
+                         f"but {file} holds a nonlinear mode; give its amplitude by --at.")
+    amplitudes = np.asarray(branch.column("observed_amplitude"))
+    wanted = amplitudes.max() if choice.at is None else choice.at
+    point = branch.points[int(np.argmin(np.abs(amplitudes - wanted)))]
+    # What makes the motion periodic is a damping of the sign reversed.
+    system = with_mass_damping(unforced(model.system), point.parameter)
+    return point, sampled_run(system, point.orbit(samples=_OUTPUTS))
+
+
+def field_of(branch: "Branch", model: "StoredModel") -> "ContactField":
+    """The system of a file as a field of the parameters of a branch."""
+    from fecontact.bifurcation.fields.contact_field import contact_field
+
+    names = branch.attributes.get("parameter_names", [branch.parameter_name])
+    return contact_field(model.system, dict.fromkeys(map(str, names)))
+
+
+def _branch(file: Path, named: "dict[str, Branch]", wanted: str | None) -> "tuple[str, Branch]":
+    names = list(named)
+    orbits = [name for name in names if any(point.is_orbit for point in named[name].points)]
+    if wanted is None:
+        if len(orbits) != 1:
+            raise InputError(f"{file} holds {len(orbits) or 'no'} branches of orbits"
+                             f"{'; choose one with --branch: ' * bool(orbits)}"
+                             f"{choices(_numbered(named))}.")
+        return orbits[0], named[orbits[0]]
+    name = names[int(wanted)] if wanted.isdigit() and int(wanted) < len(names) else wanted
+    if name not in named:
+        raise InputError(f"{file} has no branch '{wanted}'; there are: "
+                         f"{choices(_numbered(named))}.")
+    return name, named[name]
+
+
+def _numbered(named: "dict[str, Branch]") -> list[str]:
+    """Numbers and names of branches, of responses with their level."""
+    return [f"{number} ({_called(name, branch).removesuffix(', ') or name})"
+            for number, (name, branch) in enumerate(named.items())]
+
+
+def _called(name: str, branch: "Branch") -> str:
+    """What a branch is called before the place of a point on it."""
+    if "level" not in branch.attributes:
+        return f"{name}, "
+    level_name = str(branch.attributes["level_name"])
+    return f"{level_name} = {float(branch.attributes['level']):g}, " if level_name else ""
+
+
+def _point(
+    file: Path, branch: "Branch", field: "ContactField", choice: OrbitChoice
+) -> "BranchPoint":
+    """The orbit that is chosen; of the largest observed amplitude where nothing is."""
+    name = branch.parameter_name
+    if choice.at is not None and choice.at_hz is not None:
+        raise InputError("--at and --at-hz mean the same; give one of them.")
+    if choice.at_hz is not None and not name.endswith(_FREQUENCY):
+        raise InputError(f"--at-hz = {choice.at_hz:g} is for branches over an angular frequency, "
+                         f"but those of {file} are over {name}; give --at.")
+    value = choice.at if choice.at_hz is None else _TURN * choice.at_hz
+    if value is None:
+        amplitudes = [float(point.values.get("observed_amplitude", 0.0)) if point.is_orbit else -1.0
+                      for point in branch.points]
+        return branch.points[int(np.argmax(amplitudes))]
+    return branch.at(field, value, choice.which)
+
+
+def _settings(model: "StoredModel") -> "RenderSettings":
+    """The section [render] of the study of a file, without times, which belong to its run."""
+    from fecontact.core.tables import from_table
+    from fecontact.study.sections import RenderSettings
+
+    try:
+        found = from_table(RenderSettings, tomllib.loads(model.study or "").get("render", {}),
+                           "[render]")
+    except FecontactError:
+        # An orbit can be drawn even if this version cannot read its study.
+        return RenderSettings()
+    return replace(found, t_start=None, t_end=None)
+
+
+def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
+    """Write the page of a file of branches or responses."""
+    from fecontact.bifurcation.harmonic.response import response_of
+    from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import mode_of
+    from fecontact.output.files.branches import read_branches
+    from fecontact.output.files.stored_system import read_model
+    from fecontact.output.report.branch_report import report_branches
+    from fecontact.output.report.mode_report import report_modes
+    from fecontact.output.report.response_report import report_response
+
+    named, model = read_branches(file), read_model(file, trust)
+    first = next(iter(named.values()))
+    title = file.stem.removesuffix("-branch").removesuffix("-response")
+    if "observed" in first.attributes:
+        seen, _, component = str(first.attributes["observed"]).rpartition(" ")
+        place = int(seen) if seen.isdigit() else seen
+        write: Any = report_response if "level" in first.attributes else report_modes
+        shown: Any = (response_of(named) if "level" in first.attributes
+                      else [mode_of(one) for one in named.values()])
+        return Path(write(shown, model.system, target, title=title, observe=(place, component),
+                          study=model.study))
+    settings = tomllib.loads(model.study or "").get("branch", {})
+    basis, point = model.system.basis, settings.get("point")
+    if point is None:
+        point = "B" if basis.T[0].any() else basis.contact_nodes // 2
+    return report_branches(named, field_of(first, model), target, title=title, study=model.study,
+                           observe=(point, settings.get("component", "x")),
+                           y=f"observed_{settings.get('show', 'maximum')}")
+
+
+def plotted(file: Path, kind: str, target: Path) -> Path:
+    """Draw branches, amplitude and phase of a response, or frequency and damping of a mode."""
+    from fecontact.output.files.branches import read_branches, read_mode, read_response
+    from fecontact.output.plots.bifurcation_diagram import plot_branches
+    from fecontact.output.plots.responses.nonlinear_modes import plot_nonlinear_mode
+    from fecontact.output.plots.responses.response import plot_response
+
+    if kind == "response":
+        plot_response(read_response(file), path=target)
+    elif kind == "mode":
+        plot_nonlinear_mode(read_mode(file), path=target)
+    else:
+        named = read_branches(file)
+        plot_branches(list(named.values()), "observed_amplitude", names=list(named), path=target)
+    return target

@@ -1,0 +1,108 @@
+"""Results of the command ``response``: files, tables and plots."""
+
+import csv
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic.response import FrequencyResponse
+from fecontact.core.files.atomic_write import write_text
+from fecontact.output.files.branches import write_response
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.study.study import Study
+
+_COLUMNS = ("level", "kind", "parameter", "frequency_hz", "stable", "amplitude", "minimum",
+            "maximum", "first_harmonic", "phase", "third_harmonic", "truncation_error",
+            "parameter_error")
+
+
+def response_file(study: "Study", folder: Path) -> Path:
+    """Where the response of a study is stored."""
+    return folder / f"{study.name}-response.h5"
+
+
+def keep_response(study: "Study", response: FrequencyResponse, folder: Path) -> Path:
+    """Store a response with its system and study."""
+    return write_response(response_file(study, folder), response, system=study.system(),
+                          study=study.to_toml(), root=study.folder)
+
+
+def write_response_results(
+    study: "Study", response: FrequencyResponse, observe: tuple[str | int, str], folder: Path,
+) -> list[Path]:
+    """Write a response as HDF5, CSV, picture and page; returns the files."""
+    from fecontact.output.plots.responses.response import plot_response
+    from fecontact.output.report.response_report import report_response
+
+    name = f"{study.name}-response"
+    files = [keep_response(study, response, folder),
+             *(folder / f"{name}.{ending}" for ending in ("csv", "png", "html"))]
+    write_text(files[1], response_csv(response))
+    plot_response(response, path=files[2])
+    report_response(response, study.system(), files[3], observe=observe, title=study.name,
+                    study=study.to_toml())
+    return files
+
+
+def response_csv(response: FrequencyResponse) -> str:
+    """All points of a response as CSV, special points with their kind; SI units, phases in rad."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    for level, branch in enumerate(response.branches):
+        first, phase = np.abs(response.harmonic(1, level)), response.phase(level)
+        third = _third(response, level)
+        for place, point in enumerate(branch.points):
+            values = point.values
+            writer.writerow([
+                "" if response.level_name is None else repr(float(response.levels[level])),
+                point.kind or "", repr(point.parameter), repr(1.0 / float(values["period"])),
+                int(values["stable"]) if "stable" in values else "", repr(float(values["observed_amplitude"])),
+                repr(float(values["observed_minimum"])), repr(float(values["observed_maximum"])),
+                repr(float(first[place])), repr(float(phase[place])), third[place],
+                repr(float(values["truncation_error"])),
+                "" if math.isnan(point.parameter_error) else repr(point.parameter_error)])
+    return text.getvalue()
+
+
+def _stability(point: "BranchPoint") -> str:
+    """Empty where the stability was left out."""
+    stable = point.values.get("stable")
+    return "" if stable is None else "stable" if stable else "unstable"
+
+
+def _third(response: FrequencyResponse, level: int) -> list[str]:
+    stored = response.branches[level].column("observed_harmonics").shape[1]
+    if 3 * int(response.branches[level].attributes["periods"]) >= stored:
+        return [""] * len(response.branches[level])
+    return [repr(float(one)) for one in np.abs(response.harmonic(3, level))]
+
+
+def response_table(response: FrequencyResponse) -> Any:
+    """Table of peaks and special points of all levels."""
+    from fecontact.cli.tables import table
+    from fecontact.core.units import quantity
+
+    unit = "rad" if response.observed.rpartition(" ")[2].startswith("phi") else "m"
+    # An angular frequency is told in Hz; the frequency of the response is then the same.
+    over_frequency = response.parameter_name.endswith("angular_frequency")
+    rows = []
+    for level, branch in enumerate(response.branches):
+        amplitude, peak = response.amplitude(level), response.peak(level)
+        for place, point in enumerate(branch.points):
+            if point is not peak and point.kind is None:
+                continue
+            words = ", ".join(filter(None, ("peak" if point is peak else "", point.kind)))
+            rows.append((*([f"{response.levels[level]:.6g}"] if response.level_name else []), words,
+                         *([] if over_frequency else [f"{point.parameter:.7g}"]),
+                         f"{1.0 / float(point.values['period']):.7g}",
+                         quantity(float(amplitude[place]), unit, 5),
+                         _stability(point)))
+    return table(*([response.level_name] if response.level_name else []), "point",
+                 *([] if over_frequency else [response.parameter_name]), "frequency [Hz]",
+                 f"amplitude of {response.observed}", "", rows=rows, left=2)

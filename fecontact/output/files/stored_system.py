@@ -1,0 +1,128 @@
+"""The model in a file of results: basis, parameters, study, and the versions that computed it."""
+
+import json
+import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from fecontact.core.checks import as_path
+from fecontact.core.errors import InputError
+from fecontact.core.files.stored import from_json, member, text
+from fecontact.laws.registry import movable, trusting, with_folder
+from fecontact.output.files.hdf5 import open_file, store_basis, stored_basis
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.tables import system_from_tables, system_tables
+
+_PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
+
+
+@dataclass(frozen=True)
+class StoredTables:
+    """A model as its file has it, before code of its laws is loaded."""
+
+    basis: ModalBasis
+    tables: dict[str, Any]
+    study: str | None
+    versions: dict[str, str]
+
+
+@dataclass(frozen=True)
+class StoredModel:
+    """A model read from a file of results."""
+
+    system: ContactSystem
+    study: str | None
+    versions: dict[str, str]
+
+
+def store_model(
+    file: Any, path: Path, system: ContactSystem, study: str | None, root: str | Path | None,
+) -> None:
+    """Write a model into a new HDF5 file that will be ``path``.
+
+    Files of user laws below ``root``, by default the folder of the file, are named relative to it.
+    """
+    folder = path.parent
+    root = folder if root is None else Path(root)
+    for name, number in library_versions().items():
+        file.require_group("versions").attrs[name] = number
+    store_basis(file.create_group("basis"), system.basis)
+    file.create_group("system").attrs["json"] = json.dumps(
+        movable(system_tables(system), folder, root))
+    if study is not None:
+        file.create_group("study").attrs["toml"] = _changed(
+            study, lambda table: movable(table, folder, root))
+
+
+def stored_tables(file: Any, path: Path) -> StoredTables:
+    """Read what :func:`store_model` has written."""
+    basis = stored_basis(member(file, "basis"))
+    tables = with_folder(from_json(text(member(file, "system"), "json"), dict, "the system"),
+                         path.parent)
+    study = (_changed(text(member(file, "study"), "toml"),
+                      lambda table: with_folder(table, path.parent)) if "study" in file else None)
+    versions = {name: str(one) for name, one in member(file, "versions").attrs.items()}
+    return StoredTables(basis, tables, study, versions)
+
+
+def read_model(path: str | Path, trust: bool | Iterable[Path] = False) -> StoredModel:
+    """The model of a file of branches or responses.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it holds no model or needs code that is not trusted.
+    """
+    path = as_path(path, "a file of results")
+    with open_file(path, "branches") as file:
+        if "system" not in file:
+            raise InputError(f"{path} holds branches alone, without the system that they are of; "
+                             f"write it with the argument system, or by a command.")
+        stored = stored_tables(file, path)
+    with trusting(trust):
+        system = system_from_tables(stored.basis, stored.tables, str(path))
+    return StoredModel(system, stored.study, stored.versions)
+
+
+def read_system(path: str | Path, *, trust: bool | Iterable[Path] = False) -> ContactSystem:
+    """Read the system that was written with branches or a frequency response.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file of :func:`write_branches` or :func:`write_response`, or of the commands ``branch``
+        and ``response``.
+    trust : bool or files
+        Whether to execute code of laws that the file names, as for :func:`read_case`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it holds no system, or needs code that is not trusted.
+    """
+    return read_model(path, trust).system
+
+
+def _changed(study: str, change: Callable[[Any], Any]) -> str:
+    """Study text with changed tables, except [geometry]; the same text if nothing changes."""
+    tables = tomllib.loads(study)
+    changed = {name: table if name == "geometry" else change(table)
+               for name, table in tables.items()}
+    return study if changed == tables else tomli_w.dumps(changed)
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of fecontact and the libraries that compute."""
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

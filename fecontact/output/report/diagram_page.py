@@ -1,0 +1,217 @@
+"""Pages with diagrams over a parameter, whose points show their motion."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array
+from fecontact.core.units import UNITS, count, round_125, suitable_unit
+from fecontact.output.files.stored_system import library_versions
+from fecontact.output.plots.bifurcation_diagram import LETTERS, stable_pieces
+from fecontact.output.plots.style import distinct_colours
+from fecontact.output.report.bodies import Motions, bodies_table
+from fecontact.output.report.drawing import drawn_bodies
+from fecontact.output.report.page import write_page
+from fecontact.output.report.payload import SMALLEST, Payload
+from fecontact.output.report.run_report import colour_maps, study_tables
+from fecontact.reduction.modal_basis import ModalBasis
+
+SAMPLES = 129  # of a motion, both ends included
+_ORBITS = 240  # of all branches together
+_ORBITS_RUN = 60  # by shooting, which are run again
+_STEP = 1e-4  # of curves, of their largest value
+_VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
+
+Motion = tuple[float, Array]  # period [s], and states (SAMPLES, d) at equal distances in time
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """What is drawn of all branches: x (N,) and y (N, ...) of each, in the units of the labels.
+
+    With ``decades`` x are common logarithms, which the axis shows as the numbers themselves.
+    """
+
+    x_label: str
+    y_label: str
+    x: Sequence[Array]
+    y: Sequence[Array]
+    height: int = 440
+    decades: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What is shown when a point is chosen.
+
+    Attributes
+    ----------
+    basis : ModalBasis
+    row : (m,) array
+        Of the displacement that is drawn over time.
+    observed : str
+        Its name.
+    motion : callable
+        The motion of a point.
+    columns : tuple of str
+        Headings of what is told of a point.
+    texts : callable
+        That, in the same order.
+    alike : bool
+        Whether all motions are magnified to the same size, as shapes of modes are.
+    """
+
+    basis: ModalBasis
+    row: Array
+    observed: str
+    motion: Callable[[BranchPoint], Motion]
+    columns: tuple[str, ...]
+    texts: Callable[[BranchPoint], list[str]]
+    alike: bool = False
+
+
+def write_diagrams(
+    path: Path, title: str, named: Mapping[str, Branch], diagrams: Sequence[Diagram], shown: Shown,
+    study: str | None = None,
+) -> Path:
+    """Write a page with diagrams above each other; a click on a point of one shows its motion.
+
+    Raises
+    ------
+    InputError
+        If there is no branch, or one without points.
+    """
+    if not named or not all(len(branch) for branch in named.values()):
+        raise InputError("A report needs branches with at least one point each.")
+    payload, kept = Payload(), _kept(named)
+    motions = [shown.motion(named[name].points[index]) for name, index in kept]
+    header: dict[str, Any] = {
+        "format": 1, "title": title, "units": UNITS,
+        "status": _status(named),
+        "good": all(branch.status.name != "STALLED" for branch in named.values()),
+        "notes": [f"{name}: {branch.message}" for name, branch in named.items() if branch.message],
+        "diagrams": [{"xLabel": one.x_label, "yLabel": one.y_label, "height": one.height,
+                      "decades": one.decades}
+                     for one in diagrams],
+        "columns": shown.columns,
+        "branches": _branch_tables(named, diagrams, kept, shown.texts, payload),
+        "samples": SAMPLES,
+        "observed": shown.observed,
+        "study": study_tables(study),
+        "versions": list(map(list, library_versions().items())),
+        "contact": None, "ground": None,
+    }
+    header["orbits"], q = _orbit_tables(motions, shown.row, payload)
+    if shown.basis.mode_shapes is not None:
+        seen = Motions(drawn_bodies(shown.basis), q)
+        largest = seen.largest_displacement
+        scale = max(1.0, round_125(_VISIBLE * seen.bodies.extent / largest)) if largest else 1.0
+        header |= {"bodies": bodies_table(seen, payload), "scale": scale, "maps": colour_maps(),
+                   "box": seen.box(scale)}
+        if shown.alike:
+            header["orbits"]["scales"] = _scales(seen, len(motions))
+        header["orbits"]["coordinates"] = payload.add(q, seen.coordinate_steps())
+    return write_page(path, title, payload.block(header), "branches")
+
+
+def _scales(seen: Motions, count: int) -> list[float]:
+    """Factor of each of the motions, with which its largest is as well visible."""
+    found = [Motions(seen.bodies, q).largest_displacement
+             for q in np.split(seen.coordinates, count)]
+    return [max(1.0, round_125(_VISIBLE * seen.bodies.extent / one)) if one else 1.0
+            for one in found]
+
+
+def _status(named: Mapping[str, Branch]) -> str:
+    """How the branches ended: one sentence where all ended alike."""
+    ends = {branch.status for branch in named.values()}
+    if len(ends) == 1 and len(named) > 1:
+        return f"All branches: {ends.pop().value}"
+    return "; ".join(f"{name}: {branch.status.value.removesuffix('.')}"
+                     for name, branch in named.items()) + "."
+
+
+def sampled(times: Array, states: Array) -> Motion:
+    """A motion over one period in the samples of a page."""
+    period = float(times[-1] - times[0])
+    at = times[0] + period * np.linspace(0.0, 1.0, SAMPLES)
+    return period, np.column_stack([np.interp(at, times, one) for one in states.T])
+
+
+def _kept(named: Mapping[str, Branch]) -> list[tuple[str, int]]:
+    """Names of branches and indices of points whose orbits are stored."""
+    found, total = [], sum(map(len, named.values()))
+    for name, branch in named.items():
+        most = _ORBITS_RUN if any(point.by_shooting for point in branch.points) else _ORBITS
+        count = min(len(branch), max(2, most * len(branch) // total))
+        chosen = set(np.linspace(0, len(branch) - 1, count).astype(int).tolist())
+        chosen |= {index for index, point in enumerate(branch.points) if point.kind is not None}
+        found += [(name, index) for index in sorted(chosen)]
+    return found
+
+
+def _orbit_tables(
+    motions: list[tuple[float, Array]], row: Array, payload: Payload
+) -> tuple[dict[str, Any], Array]:
+    """Curves of all orbits, one after the other, and their modal coordinates (O k, m)."""
+    m = len(row)
+    states = np.concatenate([one for _, one in motions])
+    moved = {"displacement": (states[:, :m] @ row, "m"),
+             "velocity": (states[:, m : 2 * m] @ row, "m/s")}
+    found: dict[str, Any] = {"units": []}
+    for name, (values, unit) in moved.items():
+        largest = float(np.abs(values).max())
+        factor, symbol = suitable_unit(largest, unit)
+        found[name] = payload.add(values / factor, max(_STEP * largest / factor, SMALLEST))
+        found["units"].append(symbol)
+    # Equilibria last a second, so that time has a length.
+    periods = np.array([period or 1.0 for period, _ in motions])
+    found["periods"] = payload.add(periods, 1e-9 * float(periods.min()))
+    return found, states[:, :m]
+
+
+def _branch_tables(
+    named: Mapping[str, Branch], diagrams: Sequence[Diagram], kept: list[tuple[str, int]],
+    texts: Callable[[BranchPoint], list[str]], payload: Payload,
+) -> list[dict[str, Any]]:
+    places = {place: number for number, place in enumerate(kept)}
+    found = []
+    for number, ((name, branch), colour) in enumerate(
+            zip(named.items(), distinct_colours(len(named)), strict=True)):
+        indices = [index for other, index in kept if other == name]
+        curves = [_curve(one.x[number], one.y[number], payload) for one in diagrams]
+        found.append({
+            "name": name, "colour": colour,
+            "x": [x for x, _ in curves], "y": [y for _, y in curves],
+            "stable": payload.add(np.append(stable_pieces(branch), True)),
+            "special": [[index, LETTERS.get(point.kind, point.kind)]
+                        for index, point in enumerate(branch.points) if point.kind is not None],
+            "kept": indices, "first": places[name, indices[0]],
+            "rows": [texts(branch.points[index]) for index in indices],
+        })
+    return found
+
+
+def _curve(x: Array, y: Array, payload: Payload) -> tuple[Any, Any]:
+    heights = np.asarray(y, dtype=float).reshape(len(x), -1)
+    size = max(float(np.ptp(x)), 1e-6 * float(np.abs(x).max()))
+    return (payload.add(x, max(1e-6 * size, SMALLEST)),
+            payload.add(heights, max(1e-5 * float(np.abs(heights).max()), SMALLEST)))
+
+
+def point_texts(point: BranchPoint) -> list[str]:
+    """What is told of a point of a branch: kind, parameter, period, frequency, stability."""
+    period = point.period if isinstance(point, HopfPoint) else point.values.get("period")
+    unstable = point.values.get("unstable")
+    kind = point.kind or ("orbit" if point.is_orbit else "steady sliding")
+    return [kind + (f", {point.criticality}" if point.criticality else ""),
+            f"{point.parameter:.7g}", "" if period is None else f"{float(period):.6g} s",
+            "" if period is None else f"{1.0 / float(period):.6g} Hz",
+            "" if unstable is None
+            else count(int(unstable), "unstable direction") if unstable else "stable"]

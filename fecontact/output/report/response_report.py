@@ -1,0 +1,89 @@
+"""The report of a frequency response: a page with amplitude and phase whose points show orbits."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.harmonic.response import FrequencyResponse
+from fecontact.core.checks import as_path, require_kind
+from fecontact.core.units import quantity, suitable_unit
+from fecontact.output.plots.responses.response import frequency_axis, level_texts
+from fecontact.output.report.branch_report import COLUMNS, shown_of
+from fecontact.output.report.diagram_page import Diagram, point_texts, write_diagrams
+from fecontact.output.report.run_report import require_page
+from fecontact.system.contact_system import ContactSystem
+
+
+def report_response(
+    response: FrequencyResponse, system: ContactSystem, path: str | Path, *,
+    observe: tuple[str | int, str] = ("B", "x"), title: str | None = None,
+    study: str | None = None,
+) -> Path:
+    """Write a frequency response as one HTML file; a click on a point plays its orbit.
+
+    Above the amplitude, below the phase of the first harmonic against a sine drive, a colour for
+    each level; unstable parts are dashed, angular frequencies in Hz. The orbit is played by the
+    deformed bodies and drawn over time and in the phase plane.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+        Of a contact system.
+    system : ContactSystem
+        What vibrates.
+    path : str or Path
+        The .html file; it is replaced if it exists.
+    observe : (point, component)
+        The displacement whose orbits are drawn.
+    title : str, optional
+        Heading; the name of the file by default.
+    study : str, optional
+        The study that described the system, as TOML text.
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        For a response of another system, another suffix, or a file that cannot be written.
+    """
+    require_kind("report_response", FrequencyResponse, response=response)
+    require_kind("report_response", ContactSystem, system=system)
+    path = require_page(as_path(path, "a report"))
+    names = [response.parameter_name, *([response.level_name] if response.level_name else [])]
+    field = contact_field(system, dict.fromkeys(names))
+    named = dict(zip(_names(response), response.branches, strict=True))
+    factor, x_label = frequency_axis(response.parameter_name)
+    x = [branch.parameter / factor for branch in response.branches]
+    amplitudes = [response.amplitude(level) for level in range(len(named))]
+    unit = "rad" if observe[1].startswith("phi") else "m"
+    scale, symbol = suitable_unit(max(float(one.max()) for one in amplitudes), unit)
+    diagrams = [
+        Diagram("", f"amplitude of {response.observed} [{symbol}]", x,
+                [one / scale for one in amplitudes], height=330),
+        Diagram(x_label, "phase [°]", x,
+                [np.degrees(response.phase(level)) for level in range(len(named))], height=170)]
+    shown = shown_of(field, observe)
+
+    def texts(point: BranchPoint) -> list[str]:
+        size = quantity(float(point.values["observed_amplitude"]), unit, 5)
+        return [*point_texts(point), size, f"{float(point.values['truncation_error']):.1e}"]
+
+    shown = replace(shown, columns=(*COLUMNS, "amplitude", "truncation error"), texts=texts)
+    return write_diagrams(path, path.stem if title is None else title, named, diagrams, shown,
+                          study)
+
+
+def _names(response: FrequencyResponse) -> list[str]:
+    """Names of the levels, each once."""
+    if response.level_name is None:
+        return ["response"]
+    words, texts = level_texts(response.level_name, response.levels)
+    return [f"{words} {text}" + f" ({number})" * (text in texts[:number])
+            for number, text in enumerate(texts)]

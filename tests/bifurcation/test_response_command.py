@@ -1,0 +1,201 @@
+"""The command `fecontact response` and the section [response] of a study."""
+
+import csv
+
+import numpy as np
+import pytest
+from response_study import STUDY, linear_amplitude, study
+
+from fecontact import Study
+from fecontact.bifurcation import BranchStatus, ResponseSettings, contact_field
+from fecontact.bifurcation.responses import follow_responses
+from fecontact.cli.response_results import keep_response
+from fecontact.core.errors import InputError
+from fecontact.io import read_response, read_system
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "block.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def test_response_of_a_block_held_by_friction(cli, file):
+    code, said, _ = cli("response", file)
+    assert code == 0
+    results = file.parent / "results"
+    found, described = read_response(results / "block-response.h5"), Study.read(file)
+    assert found.level_name == "drive.amplitude_x"
+    assert found.levels == pytest.approx([2e-5, 3e-4])
+    assert found.observed == "B x"
+    w = found.branches[0].parameter
+    assert w[[0, -1]] / (2.0 * np.pi) == pytest.approx([8.0, 13.0])
+    # The small drive never makes it slide.
+    assert found.amplitude(0) == pytest.approx(linear_amplitude(w, 2e-5, described), rel=2e-4)
+    assert found.amplitude(1).max() < 0.5 * linear_amplitude(w, 3e-4, described).max()
+    for level in range(2):
+        frequency = found.peak(level).parameter / (2.0 * np.pi)
+        assert f"{frequency:.7g}" in said
+    with (results / "block-response.csv").open() as table:
+        rows = list(csv.DictReader(table))
+    assert len(rows) == sum(map(len, found.branches))
+    stored = [float(row["amplitude"]) for row in rows if float(row["level"]) == 2e-5]
+    assert stored == pytest.approx(found.amplitude(0), rel=1e-12)
+    frequencies = [float(row["frequency_hz"]) for row in rows if float(row["level"]) == 2e-5]
+    assert frequencies == pytest.approx(w / (2.0 * np.pi), rel=1e-12)
+    for ending in ("png", "html"):
+        assert (results / f"block-response.{ending}").stat().st_size > 10_000
+    assert read_system(results / "block-response.h5").drive.stiffness_x == 5610.0
+
+
+def test_command_line_overrides_the_section(cli, file):
+    code, _, _ = cli("response", file, "--hz", 9, 10, "--levels", "load.normal=10,20",
+                     "--harmonics", 1, "--samples", 64, "-o", "there")
+    assert code == 0
+    found = read_response(file.parent / "there" / "block-response.h5")
+    assert found.level_name == "load.normal"
+    assert found.levels == pytest.approx([10.0, 20.0])
+    assert found.branches[0].attributes["harmonics"] == 1
+    assert found.branches[0].attributes["samples"] == 64
+    assert found.branches[0].parameter[[0, -1]] / (2.0 * np.pi) == pytest.approx([9.0, 10.0])
+
+
+def test_another_parameter_than_the_frequency(cli, file):
+    code, said, _ = cli("response", file, "drive.amplitude_x", "--bounds", 1e-5, 1e-4, "--set",
+                        "response.levels={}")
+    assert code == 0
+    found = read_response(file.parent / "results" / "block-response.h5")
+    exact = linear_amplitude(50.0, found.branches[0].parameter, Study.read(file))
+    assert found.amplitude() == pytest.approx(exact, rel=2e-4)
+    assert "drive.amplitude_x" in said
+
+
+class _Interrupts:
+    """A progress that presses Ctrl-C at a point of a level."""
+
+    def __init__(self, title, points):
+        self.title, self.points, self.count = title, points, 0
+
+    def __call__(self, title, part):
+        self.count += title == self.title
+        if self.count > self.points:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("points", [0, 5])
+def test_interrupted_response_goes_on_where_it_was(points, file, cli):
+    """Before the second level has a point, and in the middle of it."""
+    described = study()
+    system, wanted = described.system(), described.response
+    parts = []
+    found = follow_responses(system, wanted, _Interrupts("drive.amplitude_x = 0.0003", points),
+                             keep=parts.append)
+    assert found.interrupted
+    assert len(found.response.branches) == (2 if points else 1)
+    assert len(parts[0].branches) == 1
+    if points:
+        assert found.response.branches[1].status is BranchStatus.INTERRUPTED
+        assert len(found.response.branches[1]) == points
+    (file.parent / "results").mkdir()
+    stored = keep_response(Study.read(file), found.response, file.parent / "results")
+    before = found.response.branches[0]
+    code, _, _ = cli("response", file, "--resume")
+    assert code == 0
+    resumed, whole = read_response(stored), follow_responses(system, wanted).response
+    assert resumed.levels == pytest.approx(whole.levels)
+    assert np.array_equal(resumed.branches[0].parameter, before.parameter)
+    assert resumed.branches[1].status is BranchStatus.BOUND
+    field = contact_field(system, [wanted.parameter, wanted.level_name])
+    for w in (55.0, 62.0, 75.0):
+        one, other = (response.branches[1].at(field, w).values["maximum"][0]
+                      for response in (resumed, whole))
+        assert one == pytest.approx(other, rel=1e-5)
+
+
+def test_going_on_needs_the_same_values(cli, file):
+    assert cli("response", file, "--hz", 9, 9.5)[0] == 0
+    code, _, said = cli("response", file, "--hz", 9, 9.5, "--set", "load.normal=15.0", "--resume")
+    assert code == 1
+    assert "was computed with other values" in said
+    code, _, said = cli("response", file, "--resume", "-o", "nowhere")
+    assert code == 1
+    assert "no interrupted response to go on with" in said
+
+
+def test_a_level_that_fails_leaves_the_others(monkeypatch):
+    from fecontact.bifurcation import responses as module
+    from fecontact.core.errors import AnalysisError
+
+    described, follow = study(), module.frequency_response
+
+    def fails(system, bounds, parameter, *, levels, **rest):
+        if levels["drive.amplitude_x"] == [2e-5]:
+            raise AnalysisError("No orbit was found.")
+        return follow(system, bounds, parameter, levels=levels, **rest)
+
+    monkeypatch.setattr(module, "frequency_response", fails)
+    found = follow_responses(described.system(), described.response)
+    assert found.response.levels == pytest.approx([3e-4])
+    assert found.notes == ["drive.amplitude_x = 2e-05: no response was followed: No orbit was "
+                           "found."]
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--hz", "2", "1"], "[response]: bounds_hz = [2.0, 1.0] must be two values"),
+    (["--hz", "0", "1"], "bounds_hz = [0.0, 1.0] must be frequencies above zero"),
+    (["--hz", "1", "2", "--bounds", "1", "2"], "--hz and --bounds mean the same"),
+    (["load.normal"], "[response] lacks the key 'bounds', the least and largest value of "
+                      "load.normal; give it, or --bounds LOW HIGH"),
+    (["load.normal", "--hz", "1", "2"], "give its bounds by the key 'bounds'"),
+    (["drive.stifness_x", "--bounds", "1", "2"], "did you mean 'drive.stiffness_x'"),
+    (["--levels", "load.normal"], "must have the form KEY=VALUE,VALUE"),
+    (["--levels", "drive.angular_frequency=1"], "take another parameter for the levels"),
+    (["--samples", "5"], "samples = 5 must be a whole number from 8"),
+    (["--set", "response.point=D"], "'D'"),
+    (["--set", "response.component=z"], "z"),
+    (["--set", "drive.amplitude_x=0", "--set", "response.levels={}"], "excites"),
+])
+def test_errors_are_one_line(cli, file, arguments, message):
+    code, _, said = cli("response", file, *arguments)
+    assert code != 0
+    assert message in said
+    assert said.count("\n") == 1
+    assert not list(file.parent.rglob("*.h5"))
+
+
+def test_settings_are_written_and_read_again():
+    described = study()
+    assert Study.from_toml(described.to_toml()) == described
+    changed = described.with_(**{"response.levels.drive.amplitude_x": [1.0]})
+    assert changed.response.levels == {"drive.amplitude_x": (1.0,)}
+    assert changed.response.checked_bounds == pytest.approx((16.0 * np.pi, 26.0 * np.pi))
+    with pytest.raises(InputError, match="start = 20 must lie in the bounds, 8 to 13"):
+        ResponseSettings(bounds_hz=(8.0, 13.0), start=20.0)
+    assert ResponseSettings(bounds_hz=(8.0, 13.0), start=10.0).first == pytest.approx(20.0 * np.pi)
+
+
+def test_orbits_of_the_file_are_drawn_and_reported(cli, file):
+    assert cli("response", file)[0] == 0
+    stored = file.parent / "results" / "block-response.h5"
+    for kind in ("phase", "energies", "response"):
+        assert cli("plot", stored, kind, "--branch", 1, "--at-hz", 9.8)[0] == 0
+        assert stored.with_name(f"block-response-{kind}.png").stat().st_size > 10_000
+    assert cli("report", stored, "-o", "page.html")[0] == 0
+    page = stored.with_suffix(".html").read_text()
+    assert len((file.parent / "page.html").read_text()) == pytest.approx(len(page), rel=0.05)
+    for arguments, message in (
+            (["phase"], "holds 2 branches of orbits; choose one with --branch: '0 "
+                        "(drive.amplitude_x = 2e-05)'"),
+            (["phase", "--branch", 2], "has no branch '2'"),
+            (["phase", "--branch", 0, "--at-hz", 99], "has 0 solutions"),
+            (["phase", "--branch", 0, "--at-hz", 9, "--at", 9], "mean the same"),
+            (["mode"], "not that of a nonlinear mode"),
+            (["phase", "--branch", 0, "--set", "load.normal=1"], "is a stored result")):
+        code, _, said = cli("plot", stored, *arguments)
+        assert code == 1
+        assert message in said
+    code, _, said = cli("render", file, "--at", 3)
+    assert code == 1
+    assert "choose an orbit of a file of branches" in said
