@@ -62,7 +62,8 @@ def response_csv(response: FrequencyResponse) -> str:
             writer.writerow([
                 "" if response.level_name is None else repr(float(response.levels[level])),
                 point.kind or "", repr(point.parameter), repr(1.0 / float(values["period"])),
-                int(values["stable"]) if "stable" in values else "", repr(float(values["observed_amplitude"])),
+                int(values["stable"]) if "stable" in values else "",
+                repr(float(values["observed_amplitude"])),
                 repr(float(values["observed_minimum"])), repr(float(values["observed_maximum"])),
                 repr(float(first[place])), repr(float(phase[place])), third[place],
                 repr(float(values["truncation_error"])),
