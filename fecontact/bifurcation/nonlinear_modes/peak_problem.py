@@ -73,7 +73,8 @@ class PeakProblem(Problem):
         """The problem of orbits over the frequency at the parameter in u."""
         values = self.orbit.values.copy()
         values[self.second] = u[-1]
-        found = replace(self.orbit, values=values)
+        # Compiled equations hold all values but that of the frequency.
+        found = replace(self.orbit, values=values, compiled=None)
         # As it is known to be forced, the system need not be made to find out.
         vars(found)["autonomous"] = False
         return found
