@@ -176,13 +176,18 @@ def test_settings_are_written_and_read_again():
     assert ResponseSettings(bounds_hz=(8.0, 13.0), start=10.0).first == pytest.approx(20.0 * np.pi)
 
 
-def test_orbits_of_the_file_are_drawn_and_reported(cli, file):
+def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
     assert cli("response", file)[0] == 0
     stored = file.parent / "results" / "block-response.h5"
     for kind in ("phase", "energies", "response"):
         assert cli("plot", stored, kind, "--branch", 1, "--at-hz", 9.8)[0] == 0
         assert stored.with_name(f"block-response-{kind}.png").stat().st_size > 10_000
     assert cli("report", stored, "-o", "page.html")[0] == 0
+    shown = []
+    monkeypatch.setattr("webbrowser.open", lambda url: shown.append(url) or True)
+    stored.with_suffix(".html").unlink()
+    assert cli("open", stored)[0] == 0
+    assert shown == [stored.with_suffix(".html").resolve().as_uri()]
     page = stored.with_suffix(".html").read_text()
     assert len((file.parent / "page.html").read_text()) == pytest.approx(len(page), rel=0.05)
     for arguments, message in (
