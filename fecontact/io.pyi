@@ -1,9 +1,13 @@
 from .output.files.branches import (
     read_branch,
     read_branches,
+    read_mode,
+    read_resonance_curve,
     read_response,
     write_branch,
     write_branches,
+    write_mode,
+    write_resonance_curve,
     write_response,
 )
 from .output.files.case import Case
@@ -34,6 +38,8 @@ __all__ = [
     "read_branch",
     "read_branches",
     "read_matrix",
+    "read_mode",
+    "read_resonance_curve",
     "read_response",
     "read_table",
     "read_uff",
@@ -48,6 +54,8 @@ __all__ = [
     "write_basis",
     "write_branch",
     "write_branches",
+    "write_mode",
+    "write_resonance_curve",
     "write_response",
     "write_wear",
 ]

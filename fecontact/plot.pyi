@@ -13,7 +13,8 @@ from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.preload import plot_loop, plot_shear
-from .output.plots.response import plot_response
+from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
+from .output.plots.responses.response import plot_response
 from .output.plots.run import plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
@@ -41,9 +42,11 @@ __all__ = [
     "plot_history",
     "plot_loop",
     "plot_modes",
+    "plot_nonlinear_mode",
     "plot_phase",
     "plot_poincare",
     "plot_receptance",
+    "plot_resonance_curve",
     "plot_response",
     "plot_shear",
     "plot_sobol",

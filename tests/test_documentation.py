@@ -292,9 +292,21 @@ def check_faces_in_space(names, printed, folder):
 def check_frequency_responses(names, printed, folder):
     assert (folder / "response.png").stat().st_size > 10000
     peaks = [[float(word) for word in line.split()[:3]] for line in printed.splitlines()]
-    assert [force for force, *_ in peaks] == [1.0, 1.2]
+    assert len(peaks) == 6
+    assert [force for force, *_ in peaks[:2]] == [1.0, 1.2]
     # Above the frequency at which the element slides all the time, below that of a stuck one.
-    assert all(1.0 < w < 1.2247 for _, w, _ in peaks)
+    assert all(1.0 < w < 1.2247 for _, w, _ in peaks[:2])
+    stuck, slides, ratio = peaks[2]
+    assert 2.0 * np.pi * stuck == pytest.approx(np.sqrt(1.5), rel=1e-5)
+    assert 2.0 * np.pi * slides == pytest.approx(1.0, abs=0.01)
+    assert ratio == pytest.approx(0.0738, abs=1e-3)
+    assert len(fc.io.read_mode(folder / "mode.h5")) == len(names["mode"])
+    for synthesised, w, largest in peaks[3:5]:
+        assert synthesised == pytest.approx(largest, rel=3e-3)
+        assert 1.0 < w < 1.2247
+    assert peaks[5] == pytest.approx([0.5 * np.pi, 2.0 * np.pi], rel=1e-3)
+    for name in ("mode", "resonances"):
+        assert (folder / f"{name}.png").stat().st_size > 10000
     found = fc.io.read_response(folder / "response.h5")
     assert found.amplitude(1) == pytest.approx(names["response"].amplitude(1), rel=1e-12)
 

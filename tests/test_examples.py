@@ -78,6 +78,18 @@ EXAMPLES = {
     "frequency_response": (("out",), [(r"^  1\.00 +\S+ +(\S+)$", 6.23, 0.03),
                                       (r"^  0\.18 .* (\S+)$", 1.115700, 1e-5)],
                            {"out/friction_damper_response.png", "out/hardening_response.png"}),
+    # A stuck and a sliding damper of 2000 N/m on one mode of the mass m / 4 and 92.806 Hz.
+    "nonlinear_modes": (("out",), [(r"^beam: (\S+) Hz sticking", 95.09, 0.1),
+                                   (r"sticking, (\S+) Hz sliding", 92.806, 0.03),
+                                   (r"^free decay: frequency off by (\S+) %", 0.0, 0.01),
+                                   (r"damping by (\S+) %", 0.0, 1.5),
+                                   (r"^ 0\.10 N: peak (\S+) mm", 0.1580, 5e-4),
+                                   (r"of the mode (\S+) mm", 0.1580, 5e-4),
+                                   (r"^best load (\S+) N", 0.3927, 0.03),
+                                   (r"resonance at (\S+) Hz", 0.2240, 1e-3)],
+                        {f"out/{name}.png" for name in (
+                            "damped_beam_mode", "damped_beam_responses", "damper_load",
+                            "internal_resonance")}),
     "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
                                      (r"fold at B = (\S+)", 0.890687, 1e-4),
                                      (r"doubling at B = (\S+)", 8.092192, 1e-4)],

@@ -19,7 +19,7 @@ GROUPS = {
     "Contact pressure and partial slip": (
         "line_contact", "two_bodies", "two_spheres", "stacked_blocks", "contact_convergence"),
     "Joints and dampers": ("lap_joint", "bolted_plate", "clamped_layers", "friction_damper",
-                           "frequency_response"),
+                           "frequency_response", "nonlinear_modes"),
     "Solids": ("sliding_box", "thrown_block", "dithered_friction", "tipping_pad"),
     "Own laws, other programs, many computers": (
         "own_law", "from_other_programs", "sweep_on_dask"),

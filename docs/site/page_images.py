@@ -151,12 +151,20 @@ def responses(folder: Path) -> dict[str, Path]:
                                                       "hardening_response")}
 
 
+def modes(folder: Path) -> dict[str, Path]:
+    """Nonlinear modes of a beam with a damper, and of two masses."""
+    example(folder, "nonlinear_modes", ".")
+    return {name: folder / f"{name}.png" for name in ("damped_beam_mode", "damped_beam_responses",
+                                                      "internal_resonance")}
+
+
 MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     beam: ("beam_on_wavy_ground", "contact_map", "report"),
     solid: ("solid_on_belt", "report-solid"), squeal: ("flutter_modes",),
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
-    responses: ("friction_damper_response", "hardening_response")}
+    responses: ("friction_damper_response", "hardening_response"),
+    modes: ("damped_beam_mode", "damped_beam_responses", "internal_resonance")}
 
 
 def main(names: set[str]) -> None:

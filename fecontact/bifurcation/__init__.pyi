@@ -25,6 +25,9 @@ from .fields.function_field import vector_field
 from .fields.vector_field import VectorField
 from .harmonic.method import HarmonicBalance
 from .harmonic.response import FrequencyResponse, frequency_response
+from .nonlinear_modes.mode_response import ModeResponse, Resonance, mode_response
+from .nonlinear_modes.nonlinear_mode import NonlinearMode, nonlinear_mode
+from .nonlinear_modes.resonance_curve import ResonanceCurve, resonance_curve
 from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
@@ -50,10 +53,14 @@ __all__ = [
     "HarmonicBalance",
     "HopfPoint",
     "LyapunovExponents",
+    "ModeResponse",
     "NeimarkSackerPoint",
+    "NonlinearMode",
     "PeriodDoublingPoint",
     "PeriodicMotion",
     "PoincareScan",
+    "Resonance",
+    "ResonanceCurve",
     "Shooting",
     "StabilityMap",
     "UnresolvedPoint",
@@ -67,11 +74,14 @@ __all__ = [
     "find_equilibrium",
     "frequency_response",
     "lyapunov_exponents",
+    "mode_response",
+    "nonlinear_mode",
     "observe",
     "orbit_branch",
     "periodic_motion",
     "poincare_scan",
     "quantity_range",
+    "resonance_curve",
     "stability_map",
     "vector_field",
 ]

@@ -120,7 +120,8 @@ def _rescaled(
     return replace(problem, scales=changed, limits=limits)
 
 
-def _attributes(problem: HarmonicProblem) -> dict[str, Any]:
+def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
+    """What a branch stores of its problem, so that its points can be restored."""
     field, layout = problem.field, problem.layout
     found = {} if problem.limits is None else {"limits": problem.limits}
     return {**found, "state_names": list(field.state_names),
@@ -149,7 +150,7 @@ def follow(
     ended = replace(options, stop_at=[*stops, HALVING])
     while True:
         branch = continue_branch(problem, u, ended, name=name, tangent=tangent,
-                                 attributes=_attributes(problem), **how)
+                                 attributes=attributes_of(problem), **how)
         if branch.points[-1].kind == HALVING and HALVING not in stops:
             branch = replace(branch, status=BranchStatus.CLOSED)
         if method.tolerance is None or branch.status is BranchStatus.INTERRUPTED:

@@ -173,9 +173,10 @@ def frequency_response(
     found = []
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
-        branch = _branch(field, given, field.index(name), level_name, first,
-                         method or HarmonicBalance(), chosen, held, both=low < first < high)
-        found.append(_with_observed(branch, row, observed, level_name, float(value)))
+        branch = branch_of_response(field, given, field.index(name), level_name, first,
+                                    method or HarmonicBalance(), chosen, held,
+                                    both=low < first < high)
+        found.append(with_observed(branch, row, observed, level_name, float(value)))
         if branch.status is BranchStatus.INTERRUPTED:
             break
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
@@ -206,11 +207,12 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
     return name, values
 
 
-def _branch(
+def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: HarmonicBalance, options: ContinuationOptions, held: Array | None, both: bool,
+    method: HarmonicBalance, options: ContinuationOptions, held: Array | None = None, *,
+    both: bool,
 ) -> Branch:
-    """The branch at one level."""
+    """The branch at one level; ``held`` (d,) is the state of a preload."""
     ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
     told: FecontactError = AnalysisError("No orbit was found to start from.")
     for begin in ends:
@@ -335,7 +337,7 @@ def _taken(
     return _scaled(*starts.corrected(problem, starts.unknowns(problem, sampled, 0.0)))
 
 
-def _with_observed(
+def with_observed(
     branch: Branch, row: Array, observed: str, level_name: str | None, level: float
 ) -> Branch:
     """The branch with what is observed at its points, and its level as attributes."""

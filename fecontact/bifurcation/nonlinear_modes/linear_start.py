@@ -1,6 +1,8 @@
 """Where a nonlinear mode begins: the system without excitation, and its linear mode at rest."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,13 +16,18 @@ from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import NORMAL_FORCE
 
 XI = "xi"
 # Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
 _ZERO = 1e-7
+# Part of the largest stiffness that is rounding.
+_LOOSE = 1e-14
 _ITERATIONS = 60
 # Relative change of xi at which the search for the undamped motion ends.
 _SETTLED = 1e-13
+
+_Part = TypeVar("_Part", BoundaryLoad, Drive, Load)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +44,8 @@ class LinearStart:
         Of the state, of length one.
     angular_frequency, xi : float
         w [rad/s] and xi [1/s], which may be below zero.
+    loose : (r, m) array
+        Orthonormal directions in which no stiffness holds the displacements.
     """
 
     field: ContactField
@@ -44,6 +53,7 @@ class LinearStart:
     shape: ComplexArray
     angular_frequency: float
     xi: float
+    loose: Array
 
 
 def unforced(system: ContactSystem) -> ContactSystem:
@@ -53,20 +63,20 @@ def unforced(system: ContactSystem) -> ContactSystem:
             for axis, motion in zip("xyz", (drive.motion_x, drive.motion_y, drive.motion_z),
                                     strict=True)}
     none = {f"amplitude_{axis}": 0.0 for axis in "xyz"}
-    boundaries = [replace(one, **{name: _constant(getattr(one, name))
-                                  for name in BOUNDARY_STRESSES})
+    boundaries = [_changed(one, {name: _constant(getattr(one, name))
+                                 for name in BOUNDARY_STRESSES})
                   for one in load.boundaries if _remains(one)]
+    forces = [one for one in load.forces if isinstance(one.signal, Constant)]
+    accelerations = {f"base_acceleration_{axis}": signal if isinstance(signal, Constant) else None
+                     for axis, signal in zip("xyz", load.base_accelerations, strict=True)}
     return system.with_(
-        drive=_drive(drive, {**none, **kept}),
-        load=replace(
-            load, forces=tuple(one for one in load.forces if isinstance(one.signal, Constant)),
-            boundaries=tuple(boundaries),
-            **{name: None for name, signal in _accelerations(load).items()
-               if not isinstance(signal, Constant)}))
+        drive=_changed(drive, {"angular_frequency": 0.0, **none, **kept}),
+        load=_changed(load, {"forces": tuple(forces), "boundaries": tuple(boundaries),
+                             **accelerations}))
 
 
-def _drive(drive: Drive, changes: dict[str, object]) -> Drive:
-    return replace(drive, angular_frequency=0.0, **changes)  # type: ignore[arg-type]
+def _changed(part: _Part, changes: Mapping[str, Any]) -> _Part:
+    return replace(part, **changes)
 
 
 def _constant(given: float | Signal) -> float | Signal:
@@ -77,11 +87,6 @@ def _remains(load: BoundaryLoad) -> bool:
     """Whether a constant part of a boundary load is left."""
     return any(isinstance(value, Constant) or bool(value)
                for value in (_constant(getattr(load, name)) for name in BOUNDARY_STRESSES))
-
-
-def _accelerations(load: Load) -> dict[str, Signal | None]:
-    names = [f"base_acceleration_{axis}" for axis in "xyz"]
-    return dict(zip(names, load.base_accelerations, strict=True))
 
 
 def with_mass_damping(system: ContactSystem, xi: float) -> ContactSystem:
@@ -108,6 +113,7 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
                          "ground, or ground at rest.")
     moves = free.prescribed_motion.largest_speed(0.0, 1.0) > 0.0
     state = (steady_sliding if moves else rest_state)(field, field.values)
+    state = _sliding_where_open(free, state)
     A = field.derivatives(np.zeros(1), state[None], field.values)[1][0]
     modes = ComplexModes.of(A, zero=_ZERO)
     count = len(modes.eigenvalues)
@@ -116,10 +122,26 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
         found = listed_frequencies(modes) if count else "none"
         raise InputError(f"mode = {number!r} must be the number of an oscillating mode, from 1 to "
                          f"{count}; the frequencies at rest are: {found}.")
-    value, shape, xi = _undamped(A, free.basis.modes, complex(modes.eigenvalues[number - 1]))
+    m = free.basis.modes
+    value, shape, xi = _undamped(A, m, complex(modes.eigenvalues[number - 1]))
+    _, sizes, rows = np.linalg.svd(A[m : 2 * m, :m])
+    loose = rows[sizes <= _LOOSE * m * sizes[0]]
     # The parameter's own scale is that of the mode.
     field = contact_field(free, {XI: (xi, with_mass_damping)})
-    return LinearStart(field, state, shape, value, xi)
+    return LinearStart(field, state, shape, value, xi, loose)
+
+
+def _sliding_where_open(system: ContactSystem, state: Array) -> Array:
+    """The state with friction that slides at nodes without normal force.
+
+    There the limit of an element is zero, and at zero deflection it would count as stuck.
+    """
+    found, s = state.copy(), system.memory
+    if s:
+        force = system.contact_history(np.zeros(1), state[None])[0, :, NORMAL_FORCE]
+        z = found[2 * system.basis.modes :].reshape(-1, s)
+        z[force == 0.0] = np.finfo(float).tiny
+    return found
 
 
 def listed_frequencies(modes: ComplexModes) -> str:

@@ -9,6 +9,8 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.points import details_of, special_point
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, response_of
+from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode, mode_of
+from fecontact.bifurcation.nonlinear_modes.resonance_curve import ResonanceCurve, resonances_of
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.stored import (
@@ -111,6 +113,56 @@ def read_response(path: str | Path) -> FrequencyResponse:
         If there is no such file, it is damaged, or it holds no response.
     """
     return response_of(read_branches(path))
+
+
+def write_mode(path: str | Path, mode: NonlinearMode) -> Path:
+    """Write a nonlinear mode into an HDF5 file, whole or not at all.
+
+    Its branch is stored as by :func:`write_branch`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    require_kind("write_mode", NonlinearMode, mode=mode)
+    return write_branch(path, mode.branch)
+
+
+def read_mode(path: str | Path) -> NonlinearMode:
+    """Read a nonlinear mode written by :func:`write_mode`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is damaged, or it holds no mode.
+    """
+    return mode_of(read_branch(path))
+
+
+def write_resonance_curve(path: str | Path, curve: ResonanceCurve) -> Path:
+    """Write a curve of resonances into an HDF5 file, whole or not at all.
+
+    Its branch is stored as by :func:`write_branch`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    require_kind("write_resonance_curve", ResonanceCurve, curve=curve)
+    return write_branch(path, curve.branch)
+
+
+def read_resonance_curve(path: str | Path) -> ResonanceCurve:
+    """Read a curve of resonances written by :func:`write_resonance_curve`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is damaged, or it holds no such curve.
+    """
+    return resonances_of(read_branch(path))
 
 
 def _store(group: Any, branch: Branch) -> None:

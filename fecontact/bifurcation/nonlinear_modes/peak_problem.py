@@ -1,0 +1,236 @@
+"""Continuation problem of resonances: forced orbits at the peak of their response.
+
+The unknowns are u = [coefficients, frequency, parameter]: to the equations G(y) = 0 of a forced
+orbit, y = [coefficients, frequency], comes one of two conditions.
+
+Amplitude: along the response, whose direction v is ``[[G_y], [border]] v = [0, 1]``, the observed
+amplitude a does not change, g = a_y v = 0. With ``[[G_y], [border]]^T z = [a_y]`` its derivative is
+``dg = da_y v - z dG_y v``, by differences along v alone.
+
+Phase: the given force does no work in phase with the displacements, Re(P^H X_1) = 0.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.newton import weighted_norm
+from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.observed import observed_values
+from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
+from fecontact.bifurcation.harmonic.series import basis_at, differentiated, uniform_basis
+from fecontact.bifurcation.nonlinear_modes.given_force import given_force
+from fecontact.core.types import Array
+
+# Steps of differences: relative in a parameter, and along the response in its inner product.
+_PARAMETER_STEP, _ALONG_STEP = 1e-5, 1e-4
+_SAMPLES, _REFINED = 512, 4
+
+
+@dataclass(frozen=True, eq=False)
+class PeakProblem(Problem):
+    """Forced orbits at resonance over a parameter.
+
+    Attributes
+    ----------
+    orbit : HarmonicProblem
+        Orbits over the frequency.
+    second : int
+        Index of the parameter.
+    width : float
+        Its scale in the step length.
+    row : (d,) array
+        What is observed.
+    condition : str
+        'amplitude' or 'phase'.
+    border : (n + 1,) array
+        Row that normalises the direction of the response.
+    rest : (d,) array
+        State at which the given force is evaluated.
+    size : float
+        Scale of the condition: an amplitude, or that times a force.
+    """
+
+    orbit: HarmonicProblem
+    second: int
+    width: float
+    row: Array
+    condition: str
+    border: Array
+    rest: Array
+    size: float = 1.0
+
+    keeps_matrix: ClassVar[bool] = True
+
+    def linearise(self, u: Array) -> "PeakLinearised":
+        """Residual and derivative at u, on demand."""
+        return PeakLinearised(self, u)
+
+    def at(self, u: Array) -> HarmonicProblem:
+        """The problem of orbits over the frequency at the parameter in u."""
+        values = self.orbit.values.copy()
+        values[self.second] = u[-1]
+        found = replace(self.orbit, values=values)
+        # As it is known to be forced, the system need not be made to find out.
+        vars(found)["autonomous"] = False
+        return found
+
+    def weights(self) -> Array:
+        """Those of the orbit, and of the parameter."""
+        return np.append(self.orbit.weights(), self.width**-2.0)
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[PeakProblem, Array, Array]":
+        """The problem for the next step: border along the response at u, scales of its orbit."""
+        orbit, _, _ = self.at(u).adapted(u[:-1], tangent[:-1])
+        orbit = replace(orbit, before=(), bend=None)
+        along = self.linearise(u).along
+        weights = orbit.weights()
+        return replace(self, orbit=orbit,
+                       border=weights * along / weighted_norm(weights, along)), u, tangent
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Period, stability, truncation error, what is observed, and its change along the curve."""
+        orbit, inner = linearisation.orbit, linearisation.inner
+        X, T = orbit.coefficients(u[:-1]), orbit.period(u[:-1])
+        error, residual = inner.neglected
+        floquet = inner.floquet
+        found = observed_values(orbit.layout, X, T, self.row)
+        low, high = orbit.extremes(u[:-1], inner.memory)
+        rate = float(linearisation.gradient @ tangent[:-1]) / found["observed_amplitude"]
+        return {"period": T, "angular_frequency": float(u[-2]), "stable": floquet.stable,
+                "multipliers": floquet.multipliers, "truncation_error": error,
+                "residual": residual, "minimum": low, "maximum": high, "amplitude_rate": rate,
+                **found, **({"memory": inner.memory} if orbit.layout.memory else {})}
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """The change of the amplitude along the curve, zero at extrema."""
+        X, T = self.orbit.coefficients(u[:-1]), linearisation.inner.period
+        amplitude = observed_values(self.orbit.layout, X, T, self.row)["observed_amplitude"]
+        return {"extremum": float(linearisation.gradient @ tangent[:-1]) / amplitude}
+
+
+class PeakLinearised:
+    """Residual of orbit and condition, and solutions of systems with their derivative."""
+
+    def __init__(self, problem: PeakProblem, u: Array) -> None:
+        self.problem, self.u = problem, u
+        self.orbit = problem.at(u)
+        self.inner: HarmonicLinearisation = self.orbit.linearise(u[:-1])
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual (n + 1,)."""
+        return np.append(self.inner.residual, self._condition)
+
+    @cached_property
+    def gradient(self) -> Array:
+        """Derivative (n + 1,) of the observed amplitude to [coefficients, frequency]."""
+        return self._gradient(self.u[:-1])
+
+    def _gradient(self, y: Array) -> Array:
+        orbit, row = self.orbit, self.problem.row
+        X, by_column = orbit.coefficients(y), row[orbit.layout.columns]
+        x = X @ by_column
+        ends = np.array([_extreme(-x), _extreme(x)])
+        low, high = basis_at(ends, orbit.harmonics)
+        return np.append(np.outer(0.5 * (high - low), by_column).reshape(-1), 0.0)
+
+    @cached_property
+    def _bordered(self) -> Array:
+        return np.vstack([self.inner.condensed, self.problem.border])
+
+    @cached_property
+    def along(self) -> Array:
+        """Direction (n + 1,) of the response."""
+        unit = np.zeros(len(self._bordered))
+        unit[-1] = 1.0
+        return np.asarray(np.linalg.solve(self._bordered, unit))
+
+    @cached_property
+    def force_row(self) -> Array:
+        """Row (n,) of Re(P^H X_1) over the coefficients."""
+        return self._force_rows(float(self.u[-2]), float(self.u[-1]))
+
+    def _force_rows(self, frequency: float, parameter: float) -> Array:
+        problem, orbit = self.problem, self.orbit
+        assert isinstance(orbit.field, ContactField)
+        values = orbit.values.copy()
+        values[orbit.free], values[problem.second] = frequency, parameter
+        period = orbit.period(np.append(self.u[:-2], frequency))
+        P = given_force(orbit.field, values, problem.rest, period)
+        row = np.zeros(orbit.reference.shape)
+        row[1, : len(P)], row[2, : len(P)] = P.real, -P.imag
+        return np.asarray(row.reshape(-1))
+
+    @cached_property
+    def _condition(self) -> float:
+        if self.problem.condition == "phase":
+            return float(self.force_row @ self.u[:-2]) / self.problem.size
+        return float(self.gradient @ self.along) / self.problem.size
+
+    @cached_property
+    def _step(self) -> float:
+        return _PARAMETER_STEP * max(abs(float(self.u[-1])), 1e-3 * self.problem.width)
+
+    def _by_parameter(self, y: Array) -> Array:
+        """Derivative (n,) of the equations of the orbit to the parameter, at y."""
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = np.append(y, self.u[-1] + sign * self._step)
+            sides.append(self.problem.at(moved).linearise(y).residual)
+        return np.asarray((sides[0] - sides[1]) / (2.0 * self._step))
+
+    @cached_property
+    def _last_row(self) -> Array:
+        """Derivative (n + 2,) of the condition."""
+        if self.problem.condition == "phase":
+            frequency, parameter, X = float(self.u[-2]), float(self.u[-1]), self.u[:-2]
+            h = _PARAMETER_STEP * frequency
+            by_frequency = (self._force_rows(frequency + h, parameter)
+                            - self._force_rows(frequency - h, parameter)) @ X / (2.0 * h)
+            by_parameter = (self._force_rows(frequency, parameter + self._step)
+                            - self._force_rows(frequency, parameter - self._step)) @ X
+            return np.concatenate([self.force_row, [
+                by_frequency, by_parameter / (2.0 * self._step)]]) / self.problem.size
+        y, v = self.u[:-1], self.along
+        z = np.linalg.solve(self._bordered.T, self.gradient)[:-1]
+        h = _ALONG_STEP / weighted_norm(self.orbit.weights(), v)
+        sides = [(self._gradient(end), self.orbit.linearise(end).condensed,
+                  self._by_parameter(end)) for end in (y + h * v, y - h * v)]
+        bent = [(one - other) / (2.0 * h) for one, other in zip(*sides, strict=True)]
+        return np.append(bent[0] - z @ bent[1], -z @ bent[2]) / self.problem.size
+
+    @cached_property
+    def matrix(self) -> Array:
+        """Derivative (n + 1, n + 2) of the residual."""
+        n = self.orbit.size
+        found = np.empty((n + 1, n + 2))
+        found[:n, :-1] = self.inner.condensed
+        found[:n, -1] = self._by_parameter(self.u[:-1])
+        found[n] = self._last_row
+        return found
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        try:
+            return np.asarray(np.linalg.solve(np.vstack([self.matrix, row]), rhs))
+        except np.linalg.LinAlgError:
+            return np.full(len(rhs), np.nan)
+
+
+def _extreme(x: Array) -> float:
+    """Time tau of the largest value of a series (2 H + 1,)."""
+    H = len(x) // 2
+    tau = float(np.argmax(uniform_basis(_SAMPLES, H) @ x)) / _SAMPLES
+    slope = differentiated(x[:, None])
+    bend = differentiated(slope)
+    for _ in range(_REFINED):
+        row = basis_at(np.array([tau]), H)[0]
+        curvature = float(row @ bend[:, 0])
+        if curvature >= 0.0:
+            break
+        tau -= float(np.clip(row @ slope[:, 0] / curvature, -1.0 / _SAMPLES, 1.0 / _SAMPLES))
+    return tau

@@ -1,0 +1,221 @@
+"""Curves of resonances over a parameter: backbones over the force, peaks over a normal load."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, width_of
+from fecontact.bifurcation.continuation.pseudo_arclength import inside
+from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.vector_field import VectorField
+from fecontact.bifurcation.harmonic import starts
+from fecontact.bifurcation.harmonic.branches import attributes_of
+from fecontact.bifurcation.harmonic.layout import layout_of
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.observed import observed_row
+from fecontact.bifurcation.harmonic.response import branch_of_response, rest_state, with_observed
+from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError, InputError, require_choice
+from fecontact.core.types import Array, ArrayLike, ComplexArray
+from fecontact.core.units import Summarised, listed, span
+from fecontact.system.contact_system import ContactSystem
+
+# Points at most and largest step, unless options say so; largest step on the first response.
+_POINTS, _LARGEST, _RESPONSE = 400, 0.05, 0.03
+_CONDITIONS = ("amplitude", "phase")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ResonanceCurve(Summarised):
+    """Resonances of forced responses over a parameter.
+
+    Points of the branch store 'angular_frequency', 'stable', 'amplitude_rate' (relative change of
+    the amplitude along the curve) and what a :class:`~fecontact.bifurcation.FrequencyResponse`
+    stores. Points of kind 'extremum' are those of the amplitude over the parameter, 'fold' those
+    where the parameter turns.
+
+    Attributes
+    ----------
+    branch : Branch
+        The resonances, in their order.
+    observed : str
+        What is observed, such as 'B x'.
+    condition : str
+        'amplitude' or 'phase'.
+    """
+
+    branch: Branch
+    observed: str
+    condition: str
+
+    def __len__(self) -> int:
+        return len(self.branch)
+
+    @property
+    def parameter_name(self) -> str:
+        """Name of the parameter."""
+        return self.branch.parameter_name
+
+    @property
+    def parameter(self) -> Array:
+        """Its values (N,)."""
+        return self.branch.parameter
+
+    @property
+    def amplitude(self) -> Array:
+        """Half the range (N,) of the observed displacement at resonance."""
+        return np.asarray(self.branch.column("observed_amplitude"))
+
+    @property
+    def angular_frequency(self) -> Array:
+        """Frequency (N,) of the resonance [rad/s]."""
+        return np.asarray(self.branch.column("angular_frequency"))
+
+    @property
+    def frequency(self) -> Array:
+        """Frequency (N,) of the resonance [Hz]."""
+        return np.asarray(self.angular_frequency / (2.0 * np.pi))
+
+    def harmonic(self, k: int = 1) -> ComplexArray:
+        """Complex harmonic X_k (N,) of the observed displacement, x_k = Re(X_k exp(i k w t))."""
+        return np.asarray(self.branch.column("observed_harmonics")[:, k])
+
+    def optimum(self) -> BranchPoint:
+        """The point of smallest amplitude, such as the optimum of a damper."""
+        return self.branch.points[int(np.argmin(self.amplitude))]
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Parameter, amplitudes and frequencies, special points, and how the curve ended."""
+        special = [f"{point.kind} at {point.parameter:.5g}" for point in self.branch.special]
+        return [("parameter", self.parameter_name), ("range", span(self.parameter)),
+                ("observed", self.observed), ("condition", self.condition),
+                ("amplitude", span(self.amplitude)), ("frequency", span(self.frequency, "Hz")),
+                ("points", f"{len(self)}"), ("special", listed(special, 5)),
+                ("end", self.branch.status.name.lower())]
+
+
+def resonance_curve(
+    system: ContactSystem | VectorField, bounds: tuple[float, float], parameter: str,
+    frequencies: tuple[float, float], *, frequency: str = "drive.angular_frequency",
+    observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
+    condition: Literal["amplitude", "phase"] = "amplitude",
+    method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
+    start: float | None = None,
+) -> ResonanceCurve:
+    """The peak of the frequency response over a parameter, by harmonic balance.
+
+    Over the level of a force it is a resonance backbone; over the normal load of a friction damper
+    it shows the optimum. The peak at the start is that of a frequency response; from there the
+    condition of the peak is solved with the orbit. Folds are followed around.
+
+    Parameters
+    ----------
+    system : ContactSystem or VectorField
+        Excited with a common period.
+    bounds : (float, float)
+        Range of the parameter.
+    parameter : str
+        Dotted name, such as 'drive.amplitude_x' or 'normal.force'.
+    frequencies : (float, float)
+        Range of the frequency in which the first peak lies [rad/s].
+    frequency : str
+        Dotted name of the angular frequency of the excitation.
+    observe : (point, component) or (d,) sequence
+        As for :func:`fecontact.bifurcation.frequency_response`.
+    condition : 'amplitude' or 'phase'
+        The peak of the observed amplitude, for smooth laws; or phase resonance of a contact system,
+        where the force does no work in phase with the displacements: also with kinks.
+    method, options
+        As for :func:`fecontact.bifurcation.frequency_response`; by default up to 400 points,
+        largest_step 0.05.
+    start : float, optional
+        Value of the parameter at which the curve starts, by default the lower bound.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        For a parameter or point that does not exist, no excitation with a period, or no resonance
+        found to start from.
+    """
+    require_kind("resonance_curve", (ContactSystem, VectorField), system=system)
+    require_kind("resonance_curve", (HarmonicBalance, type(None)), method=method)
+    require_choice("resonance_curve", "condition", condition, _CONDITIONS)
+    chosen = options_of(
+        options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
+    field = system if isinstance(system, VectorField) else contact_field(
+        system, [frequency, parameter])
+    free, second = field.index(frequency), field.index(parameter)
+    if free == second:
+        raise InputError(f"resonance_curve: parameter and frequency are both {parameter!r}; take "
+                         f"another parameter.")
+    if condition == "phase" and not isinstance(field, ContactField):
+        raise InputError("resonance_curve: condition = 'phase' needs a contact system, whose given "
+                         "forces are known; take 'amplitude'.")
+    if condition == "amplitude" and layout_of(field).memory:
+        raise InputError("resonance_curve: friction with memory has kinks, at which the condition "
+                         "of the largest amplitude is not smooth; take condition = 'phase'.")
+    row, observed = observed_row(field, observe)
+    low, high = chosen.bounds
+    values = field.values
+    values[second] = inside(low if start is None else float(start), chosen)
+    problem, u = _first(field, values, free, second, frequencies, row, condition,
+                        method or HarmonicBalance(), chosen)
+    branch = continue_branch(
+        problem, u, chosen, name=parameter, direction=1.0 if u[-1] < high else -1.0,
+        both=low < u[-1] < high, attributes={
+            **attributes_of(problem.orbit), "parameters": [parameter, frequency],
+            "observed": observed, "condition": condition})
+    return ResonanceCurve(branch, observed, condition)
+
+
+def resonances_of(branch: Branch) -> ResonanceCurve:
+    """A curve of resonances from its branch, such as that of a file.
+
+    Raises
+    ------
+    InputError
+        If it is not that of resonances.
+    """
+    known = branch.attributes
+    if not {"condition", "observed"} <= set(known) or not len(branch):
+        raise InputError("The branch is no curve of resonances; make one with resonance_curve.")
+    return ResonanceCurve(branch, str(known["observed"]), str(known["condition"]))
+
+
+def _first(
+    field: VectorField, values: Array, free: int, second: int, frequencies: tuple[float, float],
+    row: Array, condition: str, method: HarmonicBalance, options: ContinuationOptions,
+) -> tuple[PeakProblem, Array]:
+    """The problem, and the peak of a response."""
+    # Kinks jump the stability, which does not matter here.
+    given = options_of(ContinuationOptions(points=2000, largest_step=_RESPONSE, locate=False),
+                       frequencies)
+    branch = branch_of_response(field, values, free, None, given.bounds[0],
+                                replace(method, tolerance=None), given, both=False)
+    sizes = with_observed(branch, row, "", None, np.nan).column("observed_amplitude")
+    place = int(np.argmax(sizes))
+    if place in (0, len(sizes) - 1):
+        raise AnalysisError(f"The response has no peak between the frequencies "
+                            f"{given.bounds[0]:.6g} and {branch.points[-1].parameter:.6g}; choose "
+                            f"others.")
+    orbit, u, tangent = starts.restored(field, branch.points[place])
+    rest = (rest_state(field, values) if isinstance(field, ContactField)
+            else np.zeros(field.dimension))
+    width = width_of(None, options, float(values[second]))
+    problem = PeakProblem(orbit, second, width, row, condition, orbit.weights() * tangent, rest,
+                          float(sizes[place]))
+    start = np.append(u, values[second])
+    if condition == "phase":
+        problem = replace(problem, size=_work(problem, start))
+    return problem, start
+
+
+def _work(problem: PeakProblem, u: Array) -> float:
+    """Scale of the work of the given force."""
+    row: Any = problem.linearise(u).force_row
+    return float(np.abs(row) @ np.abs(u[:-2])) or 1.0
