@@ -2,19 +2,19 @@
 
     python benchmarks/continuation.py [repetitions] [--quick]
 
-The branch from the first Hopf point to B = 12, multipliers at each point, special points located.
-AUTO-07p 0.9.3, compiled with gfortran -O, one thread, took on two shared cores of the same machine
-0.13, 0.25 and 0.49 s for 139 points with 50, 100 and 200 intervals of 4 points; with 100 its fold
-is good to 1e-11 and its doubling to 1e-8. CPU time of this process is shown, the median of the
-repetitions, and per point.
+The branch from the first Hopf point to B = 12, multipliers at each point, special points located,
+in intervals of 4 collocation points. Shown is the CPU time, the median of the repetitions; where
+AUTO-07p is installed, also its own for the same branch, one thread, in the same run.
 """
 
 import statistics
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+from continuation_peer import auto
 
 from fecontact import ContactSystem, Ground, basis_from_matrices
 from fecontact.bifurcation import (
@@ -28,8 +28,6 @@ from fecontact.bifurcation import (
 )
 from fecontact.laws import PrescribedForce, ProductFriction
 
-AUTO = {50: 0.13, 100: 0.25, 200: 0.49}
-AUTO_POINTS = 139
 FOLD, DOUBLING = 0.890686833041, 8.0921923844629
 
 
@@ -69,6 +67,12 @@ def timed(task: Callable[[], Branch], repetitions: int) -> tuple[float, Branch]:
     return statistics.median(times), branch
 
 
+def row(name: str, seconds: float, points: int, fold: float, doubling: float) -> str:
+    """A line of the table."""
+    return (f"{name:14} {points:7}  {seconds:6.3f} s  {1e3 * seconds / points:6.2f} ms"
+            f"   {fold / FOLD - 1.0:9.1e} {doubling / DOUBLING - 1.0:9.1e}")
+
+
 def main(repetitions: int = 5, quick: bool = False) -> None:
     """Print the table; quickly its first row once, and few points of the chain."""
     if quick:
@@ -76,24 +80,22 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
     field = two_masses()
     sliding = equilibrium_branch(field, parameter="B", bounds=(0.3, 12.0))
     hopf = sliding.of_kind("Hopf")[0]
-    print("intervals  points  CPU time  per point   AUTO per point   error of fold, doubling")
-    for intervals in (50,) if quick else (50, 70, 100, 200):
-        settings = ContinuationOptions(step=0.002, largest_step=0.065, points=1000)
-
-        def task(intervals: int = intervals, settings: ContinuationOptions = settings) -> Branch:
-            return orbit_branch(field, hopf, method=Collocation(intervals=intervals),
-                                options=settings, bounds=(0.3, 12.0), scales=np.ones(4))
-
-        if not quick:
-            task()
-        seconds, branch = timed(task, repetitions)
-        fold = branch.of_kind("fold")[0].parameter / FOLD - 1.0
-        doubling = branch.of_kind("period doubling")[0].parameter / DOUBLING - 1.0
-        each = 1e3 * seconds / len(branch)
-        other = (f"{1e3 * AUTO[intervals] / AUTO_POINTS:11.2f} ms" if intervals in AUTO
-                 else f"{'':14}")
-        print(f"{intervals:9}  {len(branch):6}  {seconds:6.3f} s  {each:6.2f} ms   {other}"
-              f"   {fold:9.1e} {doubling:9.1e}")
+    with auto() as peer:
+        print("intervals, by   points  CPU time  per point   error of fold, doubling   of its time")
+        for intervals in (50,) if quick else (50, 70, 100, 200):
+            task = partial(
+                orbit_branch, field, hopf, method=Collocation(intervals=intervals),
+                options=ContinuationOptions(step=0.002, largest_step=0.065, points=1000),
+                bounds=(0.3, 12.0), scales=np.ones(4))
+            if not quick:
+                task()
+            seconds, branch = timed(task, repetitions)
+            print(row(f"{intervals:4} fecontact", seconds, len(branch),
+                      branch.of_kind("fold")[0].parameter,
+                      branch.of_kind("period doubling")[0].parameter))
+            if peer is not None:
+                other = peer.branch(intervals, repetitions)
+                print(row(f"{intervals:4} AUTO-07p", *other) + f"   {seconds / other.seconds:6.2f}")
     large = chain(20)
     sliding = equilibrium_branch(large, parameter="B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]

@@ -12,9 +12,9 @@ from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
 from .output.plots.modes import plot_convergence, plot_modes
-from .output.plots.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
 from .output.plots.preload import plot_loop, plot_shear
-from .output.plots.response import plot_response
+from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
+from .output.plots.responses.response import plot_response
 from .output.plots.run import plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS

@@ -7,12 +7,15 @@ from scripts_for_tests import ROOT, check_numbers, run_script
 BENCHMARKS = {
     "bodies": ((), [(r"^ (2) bodies of 20 modes", 2.0, 0.0)]),
     "contact_kernels": ((), [(r"^ +400 +(\d+)", 40.0, 0.0)]),
-    "continuation": ((), [(r"^ +50 .* (\S+) +\S+$", 0.0, 1e-9),
-                           (r"^ +50 .* \S+ +(\S+)$", 0.0, 1e-6)]),
+    "continuation": ((), [(r"^ +50 fecontact .* (\S+) +\S+$", 0.0, 1e-9),
+                          (r"^ +50 fecontact .* \S+ +(\S+)$", 0.0, 1e-6)]),
     "eigen": ((), [(r"^square 13 x 13, P2.* (\S+)$", 0.0, 1e-12),
                    (r"^cube .* iterative .* (\S+)$", 0.0, 1e-8),
                    (r"^plate .* direct .* (\S+)$", 0.0, 1e-8)]),
     "ensemble": (("4", "3"), [(r"1 thread +rtol 1e-05 .* error (\S+)$", 0.0, 1e-3)]),
+    "harmonic": ((), [(r"^Duffing .* peak +(\S+)$", 0.0, 1e-3),
+                      (r"^Jenkins .* peak +(\S+)$", 0.0, 3e-3),
+                      (r"^harmonic balance .* error (\S+)$", 0.0, 1e-5)]),
     "laws": ((), [(r"lugre .* us, (\d) internal", 1.0, 0.0),
                    (r"iwan .* us, (\d) internal", 8.0, 0)]),
     "output": ((), [(r"^(\d+) nodes", 205.0, 50.0)]),
@@ -22,7 +25,7 @@ BENCHMARKS = {
     "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
-HELPERS = {"integrator", "integrator_peers", "integrator_problems"}
+HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems"}
 
 
 def test_every_benchmark_is_here():

@@ -12,6 +12,9 @@ from site_modules import SITE, site_module
 TUTORIALS = sorted(path.stem for path in (SITE.parent / "tutorials").glob("*.md")
                    if path.stem != "index")
 
+# The site is built once, not by every process that runs tests.
+one_process = pytest.mark.xdist_group("site")
+
 
 def need_sphinx():
     for name in ("sphinx", "myst_parser", "furo", "jupytext", "ziamath"):
@@ -29,17 +32,20 @@ def site(tmp_path_factory):
     return folder / "html"
 
 
+@one_process
 def test_site_builds_without_warnings_and_links_lead_somewhere(site):
     assert (site / "index.html").exists()
     assert list(site_module("check_links").problems(site)) == []
 
 
+@one_process
 def test_equations_are_mathml(site):
     text = (site / "theory" / "contact.html").read_text(encoding="utf-8")
     assert text.count("<math") > 10
     assert not re.search(r"<script[^>]*(mathjax|katex)", text, re.IGNORECASE)
 
 
+@one_process
 def test_every_public_name_has_an_entry(site):
     names = site_module("public_names")
     for space in names.NAMESPACES:
@@ -48,6 +54,7 @@ def test_every_public_name_has_an_entry(site):
             assert f'id="{space}.{name}"' in page
 
 
+@one_process
 def test_notebooks_are_offered(site):
     pytest.importorskip("nbformat", reason="needs nbformat")
     import nbformat

@@ -36,7 +36,7 @@ def write_response_results(
     study: "Study", response: FrequencyResponse, observe: tuple[str | int, str], folder: Path,
 ) -> list[Path]:
     """Write a response as HDF5, CSV, picture and page; returns the files."""
-    from fecontact.output.plots.response import plot_response
+    from fecontact.output.plots.responses.response import plot_response
     from fecontact.output.report.response_report import report_response
 
     name = f"{study.name}-response"

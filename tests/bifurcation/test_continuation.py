@@ -124,6 +124,25 @@ def test_events_and_stops():
     assert plain.special == ()
 
 
+def test_the_tangent_at_a_crossing_is_that_of_the_branch():
+    """Of x (x - p) = 0; at the crossing rounding alone gives the matrix, along the other line."""
+    class Crossing(Plane):
+        def linearise(self, u):
+            found = super().linearise(u)
+            if np.abs(u).max() < 1e-9:
+                found.matrix = np.array([[1e-17, -1e-17]])
+            return found
+
+        def tests(self, u, linearisation, tangent):
+            return {"branch point": 2.0 * u[0] - u[1]}
+
+    lines = Crossing(lambda x, p: x * (x - p), lambda x, p: (2.0 * x - p, -x))
+    branch = continue_branch(lines, np.array([0.0, -1.0]), ContinuationOptions(bounds=(-1.0, 1.0)))
+    crossing, = branch.of_kind("branch point")
+    assert crossing.u == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert crossing.tangent == pytest.approx([0.0, 1.0], abs=1e-6)
+
+
 def test_poles_are_no_special_points():
     class Pole(Plane):
         def tests(self, u, linearisation, tangent):

@@ -7,15 +7,29 @@ import pytest
 from oscillators import jenkins_system, one_mode
 from scipy.interpolate import CubicSpline
 from scipy.special import ellipk
+from systems import two_mass_field, two_mass_system
 
 import fecontact as fc
 from fecontact import io, plot
-from fecontact.bifurcation import ContinuationOptions, HarmonicBalance, nonlinear_mode
+from fecontact.bifurcation import (
+    ContinuationOptions,
+    HarmonicBalance,
+    equilibrium_branch,
+    nonlinear_mode,
+    orbit_branch,
+)
+from fecontact.bifurcation.nonlinear_modes.linear_start import unforced
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import FourParameterIwanFriction, Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.reduction import CubicSpring, point_masses
+from fecontact.system.forcing_period import common_period
 
 UP = (0.0, 1.0)
+
+
+def forcing_free(system):
+    """Whether nothing excites a system."""
+    return common_period(system) is None
 
 
 def masses(first=0.0, second=0.0, between=0.0, damping=0.0, **parts):
@@ -176,6 +190,52 @@ def test_static_loads_stay_and_loads_in_time_go():
     assert np.abs(mode.harmonic(2)[-1]) > 0.02
 
 
+def test_free_bodies_vibrate_about_where_they_are():
+    """Nothing holds their mean; without losses the mode is that of half the spring each."""
+    system = fc.ContactSystem(
+        bodies={"a": point_masses({"p": 1.0}), "b": point_masses({"p": 1.0})},
+        links={"ab": CubicSpring("a.p", "b.p", 1.0, 0.5, direction=UP)})
+    mode = nonlinear_mode(system, (1e-2, 2.0), observe=("a.p", "y"), method=HarmonicBalance(15))
+    assert mode.angular_frequency == pytest.approx(
+        duffing_frequency(2.0, 4.0, mode.amplitude), rel=2e-8)
+    assert np.abs(mode.coordinates(0)).max() < 1e-12
+    assert mode.conservative
+    assert mode.stable.all()
+
+
+def test_what_depends_on_time_is_left_out_and_the_rest_kept():
+    rows = np.zeros((3, 1))
+    rows[0, 0] = 1.0
+    basis = fc.basis_from_matrices([[2.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
+                                   translations=[[1.0], [0.0]])
+    given = fc.ContactSystem(
+        basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0, 1e-6),
+        drive=fc.Drive(stiffness_x=3.0, motion_x=fc.laws.Constant(0.1), angular_frequency=2.0),
+        load=fc.Load(gravity=(0.4, 0.0), base_acceleration_x=Harmonic(1.0, 3.0), forces=(
+            fc.PointLoad("C", "x", signal=fc.laws.Constant(0.5)),
+            fc.PointLoad("C", "x", signal=fc.laws.Pulse("half-sine", 1.0, 1.0)))))
+    free = unforced(given)
+    assert forcing_free(free)
+    state = np.zeros(3)
+    # Gravity, the constant force and the displaced spring remain, in modal forces.
+    assert free.rhs(0.3, state)[1] == pytest.approx((2.0 * 0.4 + 0.5 + 0.3) / np.sqrt(2.0))
+    assert (free.rhs(0.3, state) == free.rhs(0.7, state)).all()
+    assert given.rhs(0.3, state)[1] != given.rhs(0.7, state)[1]
+
+
+def test_elements_at_nodes_without_normal_force_slide_in_the_linear_mode():
+    """A gap opens one of two nodes: its spring has no part in the frequency."""
+    rows = np.zeros((2, 3, 2))
+    rows[:, 0, 0] = rows[:, 1, 1] = 1.0
+    basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {
+        "contact": rows, "B": rows[0], "C": rows[0]})
+    system = fc.ContactSystem(
+        basis, normal=fc.laws.LinearContact(1e4, 0.0), friction=JenkinsFriction(8.0, 1.0, 1e-6),
+        drive=fc.Drive(stiffness_x=1.0), load=fc.Load(normal=1.0), gap=(0.0, 1.0))
+    mode = nonlinear_mode(system, (1e-6, 1e-4), method=HarmonicBalance(1, 64))
+    assert mode.angular_frequency == pytest.approx(np.sqrt(1.0 + 4.0), rel=1e-6)
+
+
 @pytest.mark.parametrize(("samples", "within"), [(512, 4e-5), (4096, 1e-6)])
 def test_one_harmonic_of_a_jenkins_element(samples, within):
     """w^2 = k + f_c / X and xi = c + f_s / (w X) with its describing function f_c, f_s."""
@@ -254,6 +314,34 @@ def test_beam_with_a_friction_damper_decays_as_its_mode_says():
     # The damper doubles the damping and more, and the frequency falls as it slides.
     assert np.ptp(ratio) > 8e-4
     assert np.ptp(frequency) > 0.1
+
+
+def test_self_excited_mode_passes_the_limit_cycle_where_xi_is_zero():
+    """Two masses on a belt: steady sliding grows, xi < 0, up to the cycle that remains."""
+    method = HarmonicBalance(25)
+    mode = nonlinear_mode(two_mass_system(B=7.3), (0.05, 1.6), observe=(0, "x"), method=method,
+                          options=ContinuationOptions(points=200, largest_step=0.1))
+    assert mode.xi[0] < -0.1
+    assert (mode.damping_ratio < 0.0).any()
+    last = int(np.flatnonzero(mode.xi < 0.0)[-1])
+    assert 0 < last < len(mode) - 2
+    near = slice(last - 2, last + 4)
+    period = CubicSpline(mode.xi[near], 1.0 / mode.frequency[near])(0.0)
+    amplitude = CubicSpline(mode.xi[near], mode.amplitude[near])(0.0)
+    field = two_mass_field()
+    hopf = equilibrium_branch(field, parameter="B", bounds=(0.3, 9.6)).of_kind("Hopf")[0]
+    cycle = orbit_branch(field, hopf, method=method, bounds=(0.3, 7.5)).at(field, 7.3)
+    assert cycle.values["stable"]
+    assert period == pytest.approx(cycle.values["period"], rel=1e-5)
+    motion = cycle.orbit(samples=2000).states @ field.displacement_row(0)
+    assert amplitude == pytest.approx(0.5 * np.ptp(motion), rel=1e-5)
+
+
+def test_tolerance_takes_as_many_harmonics_as_it_needs():
+    mode = nonlinear_mode(masses(between=0.5), (1e-2, 1.0), 2, observe=("a.p", "y"),
+                          method=HarmonicBalance(2, tolerance=1e-5))
+    assert mode.branch.attributes["harmonics"] > 3
+    assert mode.branch.column("truncation_error").max() <= 1e-5
 
 
 def test_files_give_back_what_was_written(resonant, tmp_path):

@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.slow,
 
 KILLS = 20
 # Driven, so that it never comes to rest: most of the time goes into steps.
-LONG = TINY.replace("t_end = 5e-4, outputs = 11", "t_end = 1.5, outputs = 201").replace(
+LONG = TINY.replace("t_end = 5e-4, outputs = 11", "t_end = 0.6, outputs = 201").replace(
     "frames = 3", "frames = 0") + """
 [drive]
 stiffness_x = 1e5

@@ -163,6 +163,8 @@ def _on_finer_meshes(
             continue
         found, u, confirmed = finer, finer.u, True
         coefficient, own_error = _normal_form(found)
+        if own_error > before:  # Rounding on this mesh is more than the last change.
+            continue
         coefficients.append(coefficient)
         if len(coefficients) == 1:
             continue

@@ -81,6 +81,8 @@ def _zeros(step: Step, strict: bool) -> list[BranchPoint] | None:
         if zero is None:
             continue
         at, bracket = zero
+        if name == "branch point":
+            at = step.with_own_direction(at)
         details = {} if event else problem.examine(name, at.u, at.linearisation, at.tangent)
         if details is not None:
             kind = str(details.get("kind", name))

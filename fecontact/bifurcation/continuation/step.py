@@ -1,11 +1,17 @@
 """One step along a branch: the piece between two regular points, and zeros on it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, corrected, finished
+from fecontact.bifurcation.continuation.newton import (
+    Solution,
+    corrected,
+    finished,
+    weighted_norm,
+    weighted_product,
+)
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
@@ -15,6 +21,8 @@ _EXACT = 1e-10
 # Precision from which test functions are smooth enough for the search to end without a bracket, and
 # the factor by which the last value must have fallen.
 _SMOOTH, _FALLS = 1e-6, 0.1
+# Cosine between a tangent and the cubic above which both are directions of the same branch.
+_SAME = 0.98
 # Neighbours from whose tangents Newton's method starts if it fails from the cubic.
 _NEIGHBOURS = 3
 # Brent's method takes at most so many steps.
@@ -60,6 +68,20 @@ class Step:
             self.here.u + length * x * (1.0 - x) ** 2 * first
             + x * x * (3.0 - 2.0 * x) * (self.there.u - self.here.u)
             + length * x * x * (x - 1.0) * last)
+
+    def with_own_direction(self, at: Solution) -> Solution:
+        """A solution on the step, with the tangent of the cubic where its own is another one's.
+
+        Where two branches cross, the equations have two directions, and rounding decides between
+        them.
+        """
+        weights, x = self.problem.weights(), self.along(at.u) / self.length
+        near = 1e-3 if x < 0.5 else -1e-3
+        ahead = self.cubic((x + near) * self.length) - self.cubic(x * self.length)
+        ahead *= np.sign(near) / weighted_norm(weights, ahead)
+        if weighted_product(weights, ahead, at.tangent) > _SAME:
+            return at
+        return replace(at, tangent=ahead)
 
     def parameter_rate(self) -> float:
         """Largest change of the parameter per length along the row."""

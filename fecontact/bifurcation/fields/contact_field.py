@@ -71,10 +71,6 @@ class ContactField(VectorField):
         """Whether no parameter of the field changes the period of the forcing."""
         return self._constant_period
 
-    def affine(self, values: Array, index: int) -> AffineArrays | None:
-        """Arrays over one parameter; see :meth:`ParametrisedSystem.affine`."""
-        return self._family.affine(values, index)
-
     def rates(self, t: Array, x: Array, values: Array) -> Array:
         """Rates (N, d); see :meth:`VectorField.rates`."""
         f = np.empty_like(x)
@@ -135,6 +131,11 @@ class ContactField(VectorField):
         row = np.zeros(self.dimension)
         row[: basis.modes] = basis.point_row(point, component)
         return row
+
+
+def affine_arrays(field: ContactField, values: Array, index: int) -> AffineArrays | None:
+    """Arrays of a field over one parameter; see :meth:`ParametrisedSystem.affine`."""
+    return field._family.affine(values, index)
 
 
 def contact_field(

@@ -2,15 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dgetrf, dgetrs
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.harmonic.compiled_balance import CompiledBalance
-from fecontact.bifurcation.harmonic.compiled_steps import Equations
+from fecontact.bifurcation.harmonic.compiled.arrays import Equations
+from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
+from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
@@ -141,6 +140,11 @@ class Balance:
         return values
 
     @cached_property
+    def directions(self) -> Array | None:
+        """Columns (m, r) of what contact nodes see, where these are few; see FewContacts."""
+        return contact_directions(self.field, self.values, self.harmonics)
+
+    @cached_property
     def _weights(self) -> Array:
         sizes = self.scales[self.layout.columns] ** -2.0
         over = np.full((2 * self.harmonics + 1, 1), 0.5)
@@ -202,7 +206,7 @@ class Linearised:
     def __init__(self, problem: Balance, u: Array) -> None:
         self.problem, self.u = problem, u
         self.period = problem.period(u)
-        self._factors: tuple[Any, Array] | None = None
+        self._factors: tuple[Factors | FewContacts, Array] | None = None
 
     @cached_property
     def times(self) -> Array:
@@ -356,12 +360,19 @@ class Linearised:
 
     def _coupled(self, z: Array) -> Array:
         """Change (n, columns) of the balance with a change (N, c, columns) of z."""
-        layout, transforms = self.problem.layout, self.problem.series
+        problem, layout, transforms = self.problem, self.problem.layout, self.problem.series
         by_memory = self.derivatives[1][:, layout.displacements : layout.states - layout.memory,
                                         layout.states - layout.memory :]
-        forces = np.matmul(by_memory, z)
-        found = np.tensordot(transforms.projection, forces, axes=(1, 0))
-        return -np.asarray(found.reshape(self.problem.size, -1))
+        # Few contact displacements take part: project before, not behind.
+        directions = None if problem.autonomous else problem.directions
+        if directions is not None:
+            by_memory = directions.T @ by_memory
+        L, columns = len(problem.reference), z.shape[2]
+        weighted = np.einsum("kn,nic->kinc", transforms.projection, by_memory)
+        found = weighted.reshape(L * by_memory.shape[1], -1) @ z.reshape(-1, columns)
+        if directions is not None:
+            found = directions @ found.reshape(L, -1, columns)
+        return -np.asarray(found.reshape(problem.size, columns))
 
     @cached_property
     def condensed(self) -> Array:
@@ -381,14 +392,16 @@ class Linearised:
         if self._factors is None:
             square = np.empty((len(row), len(row)))
             square[:-1], square[-1] = self.condensed, row
-            factors, pivots, failed = dgetrf(square.T, overwrite_a=1)
-            if failed:
+            directions = None if self.problem.autonomous else self.problem.directions
+            made = (Factors.of(square) if directions is None
+                    else FewContacts.of(square, directions))
+            if made is None:
                 return np.full(len(row), np.nan)
-            self._factors = (factors, pivots), row
-        (factors, pivots), first = self._factors
-        found = dgetrs(factors, pivots, rhs, trans=1)[0]
+            self._factors = made, row
+        factors, first = self._factors
+        found = factors.solve(rhs)
         if first is row or np.array_equal(first, row):
             return np.asarray(found)
         # Another last row: add what solves the homogeneous equations.
-        along = dgetrs(factors, pivots, np.append(np.zeros(len(row) - 1), 1.0), trans=1)[0]
+        along = factors.solve(np.append(np.zeros(len(row) - 1), 1.0))
         return np.asarray(found + (rhs[-1] - row @ found) / (row @ along) * along)

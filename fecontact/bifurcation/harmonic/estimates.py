@@ -3,7 +3,7 @@
 import numpy as np
 
 from fecontact.bifurcation.harmonic.series import basis_at, uniform_basis
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 
 # Points per harmonic, and at least, among which extremes are looked for.
 _FINE, _LEAST_FINE = 12, 96
@@ -94,7 +94,7 @@ def _peaks(x: Array) -> tuple[Array, Array]:
     """Largest values (...) of samples (N, ...), and their places counted in samples."""
     place = x.argmax(axis=0)
 
-    def at(index: Array) -> Array:
+    def at(index: Integers) -> Array:
         return np.take_along_axis(x, index[None], axis=0)[0]
 
     here, left, right = at(place), at(place - 1), at((place + 1) % len(x))

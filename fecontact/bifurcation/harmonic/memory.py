@@ -162,9 +162,9 @@ def march(t, y, s, T, target, z):
     """Fill z (N, c) with the internal variables that repeat; c = n nodes times their number.
 
     t (N,) are the times of the samples and y (N, d) the states, with the differences of the
-    displacements as velocities; ``target`` (N, c) are the deflections to which they leak. Rounds begin
-    without deflection; after two of them, Newton's method finds the start that repeats. Returns 1
-    if every node has come to that, 0 if one has not.
+    displacements as velocities; ``target`` (N, c) are the deflections to which they leak. Rounds
+    begin without deflection; after two of them, Newton's method finds the start that repeats.
+    Returns 1 if every node has come to that, 0 if one has not.
     """
     t, y, s, z, target = borrowed(t), borrowed(y), borrowed(s), borrowed(z), borrowed(target)
     N, n = len(t), len(s.Tx)

@@ -7,8 +7,8 @@ import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.vector_field import VectorField
-from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.estimates import peaks
+from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.series import differentiated, uniform_basis
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError

@@ -10,10 +10,11 @@ from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
-from fecontact.bifurcation.harmonic.compiled_steps import Equations, evaluate
+from fecontact.bifurcation.harmonic.compiled.arrays import Equations
+from fecontact.bifurcation.harmonic.compiled.evaluation import evaluate
+from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
-from fecontact.bifurcation.harmonic.strides import Strides
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
 from fecontact.bifurcation.orbits.same_orbit import HALVING, same_place
 from fecontact.core.errors import AnalysisError
@@ -82,17 +83,17 @@ class CompiledLinearisation(HarmonicLinearisation):
         return self._evaluated(True)
 
     @property
-    def residual(self) -> Array:  # type: ignore[override]
+    def residual(self) -> Array:
         """Residual (n,)."""
         return self._values[0]
 
     @property
-    def memory(self) -> Array:  # type: ignore[override]
+    def memory(self) -> Array:
         """Internal variables (N, c) at the samples."""
         return self._values[1]
 
     @property
-    def condensed(self) -> Array:  # type: ignore[override]
+    def condensed(self) -> Array:
         """Derivatives (n, n + 1) of the residual."""
         return self._whole[3]
 

@@ -214,9 +214,10 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
 
 def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: HarmonicBalance, options: ContinuationOptions, held: Array | None, both: bool,
+    method: HarmonicBalance, options: ContinuationOptions, held: Array | None = None, *,
+    both: bool,
 ) -> Branch:
-    """The branch at one level."""
+    """The branch at one level; ``held`` (d,) is the state of a preload."""
     ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
     told: FecontactError = AnalysisError("No orbit was found to start from.")
     for begin in ends:

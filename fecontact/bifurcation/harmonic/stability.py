@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigvals, expm
 
-from fecontact.bifurcation.harmonic import compiled_steps
 from fecontact.bifurcation.harmonic.balance import Balance
+from fecontact.bifurcation.harmonic.compiled.arrays import Equations
+from fecontact.bifurcation.harmonic.compiled.evaluation import derivatives_along
 from fecontact.bifurcation.harmonic.layout import around
 from fecontact.bifurcation.harmonic.memory import LEAK
 from fecontact.bifurcation.harmonic.series import basis_at
@@ -71,7 +72,7 @@ def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
 
 
 def along_orbits(
-    problem: Balance, us: Array, zs: Array, e: compiled_steps.Equations
+    problem: Balance, us: Array, zs: Array, e: Equations
 ) -> list[Floquet]:
     """As :func:`by_transitions` for K forced orbits us (K, n + 1) with zs (K, N, c)."""
     intervals, radau = _intervals(problem)
@@ -82,7 +83,7 @@ def along_orbits(
         part = slice(first, min(first + most, len(us)))
         f = np.empty((part.stop - first, len(tau), d))
         J = np.empty((*f.shape, d))
-        compiled_steps.derivatives_along(us[part], zs[part], tau, series, e, f, J)
+        derivatives_along(us[part], zs[part], tau, series, e, f, J)
         found += [_floquet(problem, problem.period(u), *each)
                   for u, *each in zip(us[part], f, J, strict=True)]
     return found
@@ -104,10 +105,15 @@ def _floquet(problem: Balance, T: float, f: Array, J: Array) -> Floquet:
         J[:, k, k] -= LEAK / T
     factors, nothing, widths = _room(N, len(points), layout.states)
     condensation.condense(J, f, nothing, widths, T, basis, slopes, 0, factors)
-    if problem.autonomous or layout.states < _MANY:
+    if problem.autonomous or not layout.displacements or layout.states < _MANY:
         return floquet_of(factors, problem.autonomous)
     M = np.empty((N, layout.states, layout.states))
     transitions(factors, M)
+    # Velocities in the scale of displacements, by the stiffness of each coordinate.
+    m, scale = layout.displacements, np.ones(layout.states)
+    stiffness = -J[:, m : 2 * m, :m].mean(axis=0).diagonal()
+    scale[m : 2 * m] = np.sqrt(np.maximum(stiffness, (2.0 * np.pi / T) ** 2))
+    M *= scale / scale[:, None]
     product, largest = M[0], 0.0
     for step in M[1:]:
         product = step @ product

@@ -14,7 +14,7 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, size
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic.balance import turn_of
-from fecontact.bifurcation.harmonic.compiled_balance import CompiledBalance
+from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.layout import element_rows, layout_of
 from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.method import HarmonicBalance

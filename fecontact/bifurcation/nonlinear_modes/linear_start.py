@@ -16,10 +16,13 @@ from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.kernels import NORMAL_FORCE
 
 XI = "xi"
 # Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
 _ZERO = 1e-7
+# Part of the largest stiffness that is rounding.
+_LOOSE = 1e-14
 _ITERATIONS = 60
 # Relative change of xi at which the search for the undamped motion ends.
 _SETTLED = 1e-13
@@ -41,6 +44,8 @@ class LinearStart:
         Of the state, of length one.
     angular_frequency, xi : float
         w [rad/s] and xi [1/s], which may be below zero.
+    loose : (r, m) array
+        Orthonormal directions in which no stiffness holds the displacements.
     """
 
     field: ContactField
@@ -48,6 +53,7 @@ class LinearStart:
     shape: ComplexArray
     angular_frequency: float
     xi: float
+    loose: Array
 
 
 def unforced(system: ContactSystem) -> ContactSystem:
@@ -107,6 +113,7 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
                          "ground, or ground at rest.")
     moves = free.prescribed_motion.largest_speed(0.0, 1.0) > 0.0
     state = (steady_sliding if moves else rest_state)(field, field.values)
+    state = _sliding_where_open(free, state)
     A = field.derivatives(np.zeros(1), state[None], field.values)[1][0]
     modes = ComplexModes.of(A, zero=_ZERO)
     count = len(modes.eigenvalues)
@@ -115,10 +122,26 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
         found = listed_frequencies(modes) if count else "none"
         raise InputError(f"mode = {number!r} must be the number of an oscillating mode, from 1 to "
                          f"{count}; the frequencies at rest are: {found}.")
-    value, shape, xi = _undamped(A, free.basis.modes, complex(modes.eigenvalues[number - 1]))
+    m = free.basis.modes
+    value, shape, xi = _undamped(A, m, complex(modes.eigenvalues[number - 1]))
+    _, sizes, rows = np.linalg.svd(A[m : 2 * m, :m])
+    loose = rows[sizes <= _LOOSE * m * sizes[0]]
     # The parameter's own scale is that of the mode.
     field = contact_field(free, {XI: (xi, with_mass_damping)})
-    return LinearStart(field, state, shape, value, xi)
+    return LinearStart(field, state, shape, value, xi, loose)
+
+
+def _sliding_where_open(system: ContactSystem, state: Array) -> Array:
+    """The state with friction that slides at nodes without normal force.
+
+    There the limit of an element is zero, and at zero deflection it would count as stuck.
+    """
+    found, s = state.copy(), system.memory
+    if s:
+        force = system.contact_history(np.zeros(1), state[None])[0, :, NORMAL_FORCE]
+        z = found[2 * system.basis.modes :].reshape(-1, s)
+        z[force == 0.0] = np.finfo(float).tiny
+    return found
 
 
 def listed_frequencies(modes: ComplexModes) -> str:

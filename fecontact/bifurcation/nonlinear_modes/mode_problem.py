@@ -1,17 +1,53 @@
 """Continuation problem of a nonlinear mode: periodic motion under negative damping."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from fecontact.bifurcation.harmonic.observed import observed_values
-from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 
+# Relative size of Newton steps that is rounding where elements stick: only the leak of memory holds
+# their mean deflection, and so the mean of bodies that little else holds.
+_ROUNDING_OF_MEANS = 1e-5
 # Distance of a multiplier from the unit circle beyond which a perturbation grows.
 _GROWS = 1e-6
+
+
+class ModeLinearisation(HarmonicLinearisation):
+    """As that of any orbit; means of coordinates that nothing holds stay where they are.
+
+    Their balance is without stiffness and met by itself, as the forces within a free body are.
+    """
+
+    problem: "ModeProblem"
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual (n + 1,)."""
+        found, loose = super().residual, self.problem.loose
+        if len(loose):
+            m = loose.shape[1]
+            held = self._stiffness * loose.T @ (loose @ (self.u[:m] - self.problem.home))
+            found = np.concatenate([found[:m] + held, found[m:]])
+        return found
+
+    @cached_property
+    def condensed(self) -> Array:
+        """Derivatives (n + 1, n + 2) of the residual."""
+        found, loose = super().condensed, self.problem.loose
+        m = loose.shape[1]
+        found[:m, :m] += self._stiffness * loose.T @ loose
+        return found
+
+    @property
+    def _stiffness(self) -> float:
+        return float((2.0 * np.pi / self.problem.scales[-2]) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +63,27 @@ class ModeProblem(HarmonicProblem):
         What is observed.
     conservative : bool
         Whether xi is zero but for rounding where the mode begins, and no friction has memory.
+    loose : (r, m) array
+        Orthonormal directions of displacements without any stiffness: rigid motions.
+    home : (m,) array
+        Displacements at rest, where the means of these stay.
     """
 
     row: Array = field(default_factory=lambda: np.zeros(0))
     conservative: bool = False
+    loose: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    home: Array = field(default_factory=lambda: np.zeros(0))
+
+    def linearise(self, u: Array) -> ModeLinearisation:
+        """Residual and linearisation at u, each computed on demand."""
+        if not u[-2] > 0.0:
+            raise AnalysisError("The period became negative.")
+        return ModeLinearisation(self, u)
+
+    @property
+    def rounding(self) -> float:
+        """Relative size of Newton steps below which growing steps are rounding."""
+        return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, velocities, truncation errors, and what is observed."""
@@ -45,7 +98,7 @@ class ModeProblem(HarmonicProblem):
         if self.conservative:
             floquet = linearisation.floquet
             found |= {"multipliers": floquet.multipliers, "stable": _none_grows(
-                floquet.multipliers), "trivial_error": floquet.trivial_error}
+                floquet.multipliers, 1 + len(self.loose)), "trivial_error": floquet.trivial_error}
         if self.layout.memory:
             found["memory"] = linearisation.memory
         return found
@@ -77,10 +130,10 @@ class ModeProblem(HarmonicProblem):
         return {}
 
 
-def _none_grows(multipliers: ComplexArray) -> bool:
-    """Whether no multiplier (d,) lies outside the unit circle, but for the double one at one.
+def _none_grows(multipliers: ComplexArray, pairs: int) -> bool:
+    """Whether no multiplier (d,) lies outside the unit circle, but for double ones at one.
 
-    It belongs to the phase and to the amplitude, and rounding parts it.
+    They belong to phase and amplitude, and to rigid motions; rounding parts them.
     """
-    rest = multipliers[np.argsort(np.abs(multipliers - 1.0))[2:]]
+    rest = multipliers[np.argsort(np.abs(multipliers - 1.0))[2 * pairs :]]
     return bool(np.abs(rest).max(initial=0.0) <= 1.0 + _GROWS)

@@ -22,7 +22,7 @@ from fecontact.bifurcation.nonlinear_modes.linear_start import LinearStart, line
 from fecontact.bifurcation.nonlinear_modes.mode_problem import ModeProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.contact_system import ContactSystem
@@ -35,7 +35,7 @@ _PERIOD_SCALE, _XI_SCALE = 0.2, 0.2
 _CONSERVATIVE = 1e-8
 # Smallest scale of a coordinate relative to the largest one, and part of the linear mode that the
 # observed point must have.
-_LEAST_SCALE, _LEAST_SEEN = 1e-3, 1e-9
+_LEAST_SCALE, _LEAST_SEEN = 1e-3, 1e-4
 # Part of the smallest amplitude below which the mode ends.
 _BELOW = 0.99
 _ENDS = ("largest amplitude", "smallest amplitude")
@@ -197,8 +197,8 @@ def nonlinear_mode(
     method : HarmonicBalance, optional
         Harmonics, samples; kinks need many samples.
     options : ContinuationOptions, optional
-        By default up to 2000 points, step 0.02, largest_step 0.06: relative changes of the
-        amplitude, of a fifth of the frequency and of a damping ratio of 0.1. Bounds are not used.
+        By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: changes
+        relative to amplitude, a fifth of the frequency, a damping ratio of 0.1. Without bounds.
 
     Raises
     ------
@@ -213,16 +213,25 @@ def nonlinear_mode(
     require_kind("nonlinear_mode", ContactSystem, system=system)
     require_kind("nonlinear_mode", (HarmonicBalance, type(None)), method=method)
     low, high = _amplitudes(bounds)
-    given = options_of(options or ContinuationOptions(points=_POINTS, step=_STEP,
-                                                      largest_step=_LARGEST), None)
+    # Of proportional coordinates each adds to the length of a step.
+    longer = max(1.0, np.sqrt(0.5 * system.basis.modes))
+    given = options_of(options or ContinuationOptions(
+        points=_POINTS, step=_STEP * longer, largest_step=_LARGEST * longer), None)
     start = linear_start(system, mode)
     row, observed = observed_row(start.field, observe)
     chosen = method or HarmonicBalance()
     problem, u, leaving = _leaving(start, row, observed, low, chosen)
-    branch = branches.follow(problem, u, leaving, chosen, replace(
-        given, bounds=(-np.inf, np.inf), locate=True,
-        stop_at=[*([given.stop_at] if isinstance(given.stop_at, str) else given.stop_at), *_ENDS],
-        events={**given.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)}))
+    stops = [given.stop_at] if isinstance(given.stop_at, str) else given.stop_at
+    ended = replace(
+        given, bounds=(-np.inf, np.inf), locate=True, stop_at=[*stops, *_ENDS],
+        events={**given.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)})
+    try:
+        branch = branches.follow(problem, u, leaving, chosen, ended)
+    except FecontactError as error:
+        raise AnalysisError(f"No nonlinear mode was followed from the linear one at "
+                            f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
+                            f"{low:g}; begin at a smaller one, where the motion is linear "
+                            f"({error})") from None
     return NonlinearMode(_ended(branch, observed, mode), mode, observed)
 
 
@@ -256,8 +265,9 @@ def _leaving(
     field, d, w = start.field, start.field.dimension, start.angular_frequency
     seen = complex(row @ start.shape)
     m = field.system().basis.modes
-    if abs(seen) <= _LEAST_SEEN * np.linalg.norm(np.abs(row[:m]) * np.abs(start.shape[:m])):
-        raise InputError(f"{observed} does not move in this mode; observe another displacement.")
+    if abs(seen) <= _LEAST_SEEN * np.linalg.norm(row[:m]) * np.linalg.norm(start.shape[:m]):
+        raise InputError(f"{observed} does not move in this mode, at {w / (2.0 * np.pi):.5g} Hz, "
+                         f"or hardly; observe another displacement.")
     # The observed displacement begins at its largest value.
     shape = start.shape * amplitude / seen
     sizes = np.abs(shape)
@@ -273,7 +283,7 @@ def _leaving(
     known = {entry.name: getattr(plain, entry.name) for entry in fields(plain)}
     problem = ModeProblem(**{
         **known, "reference": plain.coefficients(leaving).copy(), "limits": np.full(d, np.inf),
-        "row": row, "conservative": lossless})
+        "row": row, "conservative": lossless, "loose": start.loose, "home": start.state[:m]})
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
 
 

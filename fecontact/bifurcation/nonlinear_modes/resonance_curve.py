@@ -126,12 +126,13 @@ def resonance_curve(
     frequency : str
         Dotted name of the angular frequency of the excitation.
     observe : (point, component) or (d,) sequence
-        As for :func:`frequency_response`.
+        As for :func:`fecontact.bifurcation.frequency_response`.
     condition : 'amplitude' or 'phase'
         The peak of the observed amplitude, for smooth laws; or phase resonance of a contact system,
         where the force does no work in phase with the displacements: also with kinks.
     method, options
-        As for :func:`frequency_response`; by default up to 400 points, largest_step 0.05.
+        As for :func:`fecontact.bifurcation.frequency_response`; by default up to 400 points,
+        largest_step 0.05.
     start : float, optional
         Value of the parameter at which the curve starts, by default the lower bound.
 

@@ -277,9 +277,10 @@ def _from_motion(
         return shooting_branches.from_motion(
             field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
             method.solver, options, widths, direction, both)
-    problem, u = starts.corrected(*starts.from_samples(
-        field, given, free, motion.times, motion.states, motion.period, method.intervals,
-        method.degree, motion.periods, widths))
+    problem, u = starts.corrected_samples(
+        lambda intervals: starts.from_samples(
+            field, given, free, motion.times, motion.states, motion.period, intervals,
+            method.degree, motion.periods, widths), method.intervals)
     return _followed((problem, u, None), options, limits, direction=direction, both=both)
 
 

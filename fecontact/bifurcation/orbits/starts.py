@@ -3,7 +3,7 @@
 A start is a problem, its unknowns u and the direction in which the branch leaves.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +20,8 @@ from fecontact.core.types import Array, ArrayLike
 Start = tuple[CollocationProblem, Array, Array]
 
 _CORRECTIONS = 25
+# Times the intervals on which an orbit is found where the number asked for does not lead there.
+_FINER = (2, 4)
 # First amplitudes of orbits at a Hopf point, tried in this order. With a strongly curved friction
 # law only the smallest orbits have the shape of the eigenvector; where the parameter hardly changes
 # along the branch, only larger ones are distinct from the equilibrium.
@@ -174,6 +176,31 @@ def corrected(
         u = _newton(problem, u, tolerance)
         problem = replace(problem, reference=problem.nodes(u).copy(), age=0)
     return problem, u
+
+
+def corrected_samples(
+    sampled: Callable[[int], tuple[CollocationProblem, Array]], intervals: int
+) -> tuple[CollocationProblem, Array]:
+    """The orbit on so many intervals, near samples that ``sampled(intervals)`` puts on a mesh.
+
+    Where a coarse mesh does not lead from the samples to the orbit, a finer one does first.
+
+    Raises
+    ------
+    AnalysisError
+        As :func:`corrected`, if none does.
+    """
+    try:
+        return corrected(*sampled(intervals))
+    except AnalysisError:
+        for finer in _FINER:
+            try:
+                problem, u = corrected(*sampled(finer * intervals))
+                problem, u, _ = on_intervals((problem, u, np.zeros_like(u)), intervals)
+                return corrected(problem, u)
+            except AnalysisError:
+                continue
+        raise
 
 
 def _newton(problem: CollocationProblem, u: Array, tolerance: float) -> Array:

@@ -118,7 +118,7 @@ def draw_insets(
         letters.append((_letter(number), x, y))
         small = figure.add_subplot(grid[0, number])
         small.plot(inset.displacement / length, inset.velocity / speed, color=_INK, linewidth=1.0,
-                   linestyle="-" if inset.point.values["stable"] else DASHES)
+                   linestyle="-" if inset.point.values.get("stable", True) else DASHES)
         small.set_title(f"{letters[-1][0]}: {inset.title}", fontsize=9.0)
         small.tick_params(labelsize=7.5)
         small.set_xlabel(f"displacement [{length_name}]" if number == 0 else "", fontsize=8.0,

@@ -10,7 +10,7 @@ from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.units import quantity, suitable_unit
-from fecontact.output.plots.response import frequency_axis, level_texts
+from fecontact.output.plots.responses.response import frequency_axis, level_texts
 from fecontact.output.report.branch_report import COLUMNS, shown_of
 from fecontact.output.report.diagram_page import Diagram, point_texts, write_diagrams
 from fecontact.output.report.run_report import require_page

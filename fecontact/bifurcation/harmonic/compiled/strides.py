@@ -1,26 +1,24 @@
 """Plain steps of a branch of forced orbits, made by compiled code, with all that points store.
 
-What a call of :func:`~fecontact.bifurcation.harmonic.compiled_steps.steps` returns is looked at as
+What a call of :func:`~fecontact.bifurcation.harmonic.compiled.steps.steps` returns is looked at as
 a whole; it ends before the first step that needs more: a special point, a bound, a start met again.
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Stride
-from fecontact.bifurcation.harmonic import compiled_steps as kernels
 from fecontact.bifurcation.harmonic import estimates
+from fecontact.bifurcation.harmonic.compiled import arrays
+from fecontact.bifurcation.harmonic.compiled.steps import steps
 from fecontact.bifurcation.harmonic.series import differentiated
 from fecontact.bifurcation.harmonic.stability import along_orbits
 from fecontact.bifurcation.orbits.floquet import Floquet
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
-
-if TYPE_CHECKING:
-    from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 
 # Points in the first and in later calls, and numbers that a call may return.
 _FIRST, _LATER, _NUMBERS = 8, 64, 4_000_000
@@ -28,7 +26,7 @@ _FIRST, _LATER, _NUMBERS = 8, 64, 4_000_000
 
 @dataclass(eq=False)
 class Strides:
-    """Makes plain steps; it keeps from call to call how many to make.
+    """Makes plain steps of a :class:`fecontact.bifurcation.harmonic.problem.HarmonicProblem`.
 
     Attributes
     ----------
@@ -42,7 +40,7 @@ class Strides:
     count: int = _FIRST
 
     @classmethod
-    def of(cls, problem: "HarmonicProblem", options: ContinuationOptions) -> "Strides | None":
+    def of(cls, problem: Any, options: ContinuationOptions) -> "Strides | None":
         """None where the steps of this problem are not made by compiled code."""
         if (problem.compiled is None or options.events
                 or problem.stability not in (None, "transitions")):
@@ -50,14 +48,14 @@ class Strides:
         return cls(options)
 
     def stride(
-        self, problem: "HarmonicProblem", here: Solution, step: float, most: int, start: Solution
+        self, problem: Any, here: Solution, step: float, most: int, start: Solution
     ) -> Stride | None:
         """Plain steps from a solution; see :class:`Stride`. None where there are none."""
         e = problem.equations(float(here.u[-1]))
         if e is None:
             return None
         options = self.options
-        e.numbers[kernels.FIRST_BOUND :] = [
+        e.numbers[arrays.FIRST_BOUND :] = [
             *options.bounds, options.tolerance, options.largest_step, options.largest_turn,
             problem.rounding]
         if problem.limits is not None:
@@ -67,21 +65,21 @@ class Strides:
         n, m, N = len(here.u), problem.layout.displacements, problem.samples
         c = problem.layout.memory
         count = max(1, min(most, self.count, _NUMBERS // (N * (m + c) + 2 * n)))
-        out = kernels.Reached(
+        out = arrays.Reached(
             np.empty((count, n)), np.empty((count, n)), np.empty((count, N, c)),
             np.empty((count, N, m)), np.empty((count, m, 2 * m)), np.empty((count, m + 1)),
             np.array([step]))
         why = np.empty(1)
         bend = np.zeros(n) if problem.bend is None else problem.bend.copy()
         scales = np.append(problem.scales[:m], problem.scales[-1])
-        made = kernels.steps(here.u.copy(), here.tangent.copy(), bend, scales, e, out, why)
+        made = steps(here.u.copy(), here.tangent.copy(), bend, scales, e, out, why)
         if made == 0:
             return None
         return self._seen(problem, here, made, out, e, start)
 
     def _seen(
-        self, problem: "HarmonicProblem", here: Solution, made: int, out: kernels.Reached,
-        e: kernels.Equations, start: Solution,
+        self, problem: Any, here: Solution, made: int, out: arrays.Reached,
+        e: arrays.Equations, start: Solution,
     ) -> Stride | None:
         """The points that were reached before the first step at which something happens."""
         m = problem.layout.displacements
@@ -132,7 +130,7 @@ class Strides:
         return Stride(points, reached, replace(points[-1], tangent=tangent), previous, step)
 
     def _eventless(
-        self, problem: "HarmonicProblem", here: Solution, values: list[dict[str, Any]],
+        self, problem: Any, here: Solution, values: list[dict[str, Any]],
         tests: list[dict[str, float]], start: Solution, u: Array, weights: Array, lengths: Array,
     ) -> int:
         """Number of points before the first step at which something happens."""
@@ -162,7 +160,7 @@ class Strides:
 
 
     def _made_exact(
-        self, problem: "HarmonicProblem", u: Array, weights: Array, tangent: Array
+        self, problem: Any, u: Array, weights: Array, tangent: Array
     ) -> bool:
         """Replace a tangent by that of the equations at u itself; False if its slope changes sign.
 
@@ -182,7 +180,7 @@ class Strides:
 
 
 def _tests(
-    problem: "HarmonicProblem", floquet: Floquet | None, tangent: Array,
+    problem: Any, floquet: Floquet | None, tangent: Array,
     options: ContinuationOptions,
 ) -> dict[str, float]:
     if not options.locate:
@@ -193,7 +191,7 @@ def _tests(
     return {"fold": slope, **floquet.tests(slope / float(problem.scales[-1]))}
 
 
-def _weights(problem: "HarmonicProblem", scales: Array) -> Array:
+def _weights(problem: Any, scales: Array) -> Array:
     """Weights (K, n + 1) for scales (K, m + 1)."""
     over = np.full((2 * problem.harmonics + 1, 1), 0.5)
     over[0] = 1.0
@@ -202,7 +200,7 @@ def _weights(problem: "HarmonicProblem", scales: Array) -> Array:
 
 
 def _values(
-    problem: "HarmonicProblem", u: Array, out: kernels.Reached, made: int
+    problem: Any, u: Array, out: arrays.Reached, made: int
 ) -> list[dict[str, Any]]:
     """What is stored of each point but its stability."""
     m = problem.layout.displacements

@@ -1,16 +1,13 @@
 """Equations of harmonic balance of contact systems in compiled code."""
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
 from fecontact.bifurcation.fields.parametrised_system import AffineArrays
-from fecontact.bifurcation.harmonic import compiled_steps as kernels
-
-if TYPE_CHECKING:
-    from fecontact.bifurcation.harmonic.balance import Balance
+from fecontact.bifurcation.harmonic.compiled import arrays
 
 # Most unknowns for which compiled code without LAPACK is faster.
 _MOST_UNKNOWNS = 160
@@ -19,6 +16,8 @@ _MOST_UNKNOWNS = 160
 @dataclass(eq=False)
 class CompiledBalance:
     """What compiled code needs of a field over one parameter, kept for all problems along a branch.
+
+    Problems are those of :class:`fecontact.bifurcation.harmonic.balance.Balance`.
 
     Attributes
     ----------
@@ -31,10 +30,10 @@ class CompiledBalance:
 
     contact_field: ContactField
     affine: AffineArrays | None = None
-    known: dict[tuple[int, int, int], kernels.Equations] = field(default_factory=dict)
+    known: dict[tuple[int, int, int], arrays.Equations] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, problem: "Balance") -> "CompiledBalance | None":
+    def of(cls, problem: Any) -> "CompiledBalance | None":
         """None where the period is unknown, or changes with the parameter in an unknown way."""
         found = problem.field
         if (not isinstance(found, ContactField) or problem.autonomous
@@ -42,7 +41,7 @@ class CompiledBalance:
             return None
         return cls(found)
 
-    def equations(self, problem: "Balance", value: float) -> kernels.Equations | None:
+    def equations(self, problem: Any, value: float) -> arrays.Equations | None:
         """Equations about a value of the parameter; None where its arrays are not affine in it.
 
         There is one room for all equations of a size: what is found there has to be copied.
@@ -53,7 +52,7 @@ class CompiledBalance:
         if near is None or not near.low < value < near.high:
             values = problem.values.copy()
             values[problem.free] = value
-            near = self.affine = self.contact_field.affine(values, problem.free)
+            near = self.affine = affine_arrays(self.contact_field, values, problem.free)
             self.known.clear()
         if near is None:
             return None
@@ -66,18 +65,18 @@ class CompiledBalance:
         return found
 
     def _made(
-        self, problem: "Balance", near: AffineArrays, value: float
-    ) -> kernels.Equations:
+        self, problem: Any, near: AffineArrays, value: float
+    ) -> arrays.Equations:
         layout, series = problem.layout, problem.series
-        numbers = np.zeros(kernels.ROUNDING + 1)
+        numbers = np.zeros(arrays.ROUNDING + 1)
         if problem.turn is not None:
-            numbers[kernels.TURN] = problem.periods * problem.turn
+            numbers[arrays.TURN] = problem.periods * problem.turn
         else:
-            numbers[kernels.PERIOD] = problem.period(np.array([value]))
-        numbers[kernels.LOW], numbers[kernels.HIGH] = near.low, near.high
-        room = kernels.room_for(problem.harmonics, problem.samples, layout.displacements,
+            numbers[arrays.PERIOD] = problem.period(np.array([value]))
+        numbers[arrays.LOW], numbers[arrays.HIGH] = near.low, near.high
+        room = arrays.room_for(problem.harmonics, problem.samples, layout.displacements,
                                 layout.memory, layout.nodes)
-        return kernels.Equations(
+        return arrays.Equations(
             near.arrays, near.flat, near.base, near.slope, series.times, series.values,
             series.projection, series.cosines, series.sines, problem.kept.rows,
             problem.kept.offsets, np.full(layout.displacements, np.inf), numbers, layout.nodes,
