@@ -24,12 +24,15 @@ class CompiledBalance:
     contact_field : ContactField
     affine : AffineArrays or None
         Arrays of the system about the last value.
+    held : tuple, optional
+        Index of the parameter, period times it, and the values of the others, for which these are.
     known : dict
         Equations by harmonics, samples and periods.
     """
 
     contact_field: ContactField
     affine: AffineArrays | None = None
+    held: tuple[int, float | None, bytes] | None = None
     known: dict[tuple[int, int, int], arrays.Equations] = field(default_factory=dict)
 
     @classmethod
@@ -48,8 +51,11 @@ class CompiledBalance:
         """
         if not 0 < problem.size <= _MOST_UNKNOWNS:
             return None
-        near = self.affine
-        if near is None or not near.low < value < near.high:
+        near, others = self.affine, problem.values.copy()
+        others[problem.free] = 0.0
+        held = problem.free, problem.turn, others.tobytes()
+        if near is None or self.held != held or not near.low < value < near.high:
+            self.held = held
             values = problem.values.copy()
             values[problem.free] = value
             near = self.affine = affine_arrays(self.contact_field, values, problem.free)
