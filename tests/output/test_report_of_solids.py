@@ -240,7 +240,7 @@ def test_maps_of_heights_lie_below_the_bodies(browser, tmp_path):
         level = ground["level"] - 150.0 * ground["gap"]
         expected = level + 150.0 * study.ground.height_map.shape(
             *(places - travel).T)[..., 0]
-        found = opened.of_player(f"{places.tolist()}.map(p => player.height(...p))")
+        found = opened.of_player(f"{places.tolist()}.map(p => player.groundNow().height(...p))")
         assert found == pytest.approx(expected, abs=0.01 * 150.0 * np.ptp(heights))
         pictures = [opened.picture()]
         opened.scrub(0.8)

@@ -70,7 +70,7 @@ def write_branches(
         At least one.
     system : ContactSystem, optional
         What they are branches of; with it reports and movies can be made from the file alone, and
-        :func:`read_system` reads it.
+        :func:`fecontact.io.read_system` reads it.
     study : str, optional
         The study that described the system, as TOML text.
     root : str or Path, optional

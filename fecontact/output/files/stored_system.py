@@ -96,8 +96,8 @@ def read_system(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Co
     Parameters
     ----------
     path : str or Path
-        A file of :func:`write_branches` or :func:`write_response`, or of the commands ``branch``
-        and ``response``.
+        A file of :func:`fecontact.io.write_branches`, :func:`fecontact.io.write_response` or the
+        commands ``branch`` and ``response``.
     trust : bool or files
         Whether to execute code of laws that the file names, as for :func:`read_case`.
 

@@ -15,7 +15,7 @@ class Diagram extends Chart {
 
   // On a logarithmic axis 1, 2, 5 in each decade where there is room, else powers of ten.
   marks(low, high, most) {
-    if (!this.decades) return super.marks(low, high, most);
+    if (!this.decades) return ticks(low, high, most);
     const digits = high - low < most / 4 ? [1, 2, 5] : [1], found = [];
     for (let k = floor(low); k <= high; k++) {
       for (const digit of digits) {
@@ -23,7 +23,7 @@ class Diagram extends Chart {
         if (at >= low && at <= high) found.push([at, `${+(digit * 10 ** k).toPrecision(1)}`]);
       }
     }
-    return found.length > 1 ? found : super.marks(low, high, most).map(([at]) => [at, `${+(10 ** at).toPrecision(3)}`]);
+    return found.length > 1 ? found : ticks(low, high, most).map(([at]) => [at, `${+(10 ** at).toPrecision(3)}`]);
   }
 
   // The point that was picked in this diagram or in another one.
@@ -51,19 +51,19 @@ class Diagram extends Chart {
   draw() {
     super.draw();
     const c = this.context;
-    c.font = `600 12px ${css("--font")}`;
+    c.font = `600 12px ${css("font")}`;
     c.textAlign = "left";
     for (const { x, y, special } of this.lines) {
       for (const [at, letters] of special) {
         const [px, py] = [this.px(x[at]), this.py(y[at])];
         c.beginPath();
         c.arc(px, py, 4.5, 0, 7);
-        c.fillStyle = css("--panel");
-        c.strokeStyle = css("--ink");
+        c.fillStyle = css("panel");
+        c.strokeStyle = css("ink");
         c.lineWidth = 1.2;
         c.fill();
         c.stroke();
-        c.fillStyle = css("--ink");
+        c.fillStyle = css("ink");
         c.fillText(letters, px + 7, py - 9);
       }
     }
@@ -85,7 +85,7 @@ class Diagram extends Chart {
     const c = this.cursor, { chosen } = this;
     c.clearRect(0, 0, this.width, this.height);
     if (!chosen) return;
-    c.fillStyle = css("--accent");
+    c.fillStyle = css("accent");
     c.beginPath();
     c.arc(this.px(chosen.line.x[chosen.index]), this.py(chosen.line.y[chosen.index]), 5, 0, 7);
     c.fill();
@@ -116,7 +116,12 @@ async function build(host, data, told) {
     facts.replaceChildren(table([], [["branch", branch.name], ...data.columns.map((name, k) =>
       [name, branch.rows[place][k]]).filter(([, text]) => text)]));
     told.orbit = number;
-    if (orbits.scales) player.magnify(orbits.scales[number]);
+    if (orbits.scales) {
+      const scale = Math.log(orbits.scales[number]), slider = timing.more.querySelector("[aria-label=deformation]");
+      slider.max = max(slider.max, scale + 2.3);
+      slider.value = scale;
+      slider.oninput();
+    }
     for (const diagram of diagrams) diagram.mark(chosen);
     player?.draw();
     history.resize();

@@ -4,7 +4,7 @@ const { abs, floor, hypot, max, min, round } = Math;
 // Colours are those of the element that was built last, looked up once: a page that changes between
 // light and dark is built anew.
 let palette = {}, styled;
-const css = (name) => palette[name] ??= getComputedStyle(styled).getPropertyValue(name).trim();
+const css = (name) => palette[name] ??= getComputedStyle(styled).getPropertyValue("--" + name).trim();
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const clamp = (x, low, high) => min(max(x, low), high);
 
@@ -18,7 +18,7 @@ function el(name, props = {}, ...children) {
 
 // Colours of prints are too dark before a dark page.
 function themed(colour) {
-  if (!colour) return css("--ink");
+  if (!colour) return css("ink");
   if (!dark.matches) return colour;
   const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
   return `rgb(${parts.map((part) => round(part + 0.35 * (255 - part)))})`;
@@ -54,8 +54,8 @@ function layer(canvas, width, height) {
 
 // Letters of labels.
 function letters(c, textAlign) {
-  c.font = `11px ${css("--font")}`;
-  c.fillStyle = css("--soft");
+  c.font = `11px ${css("font")}`;
+  c.fillStyle = css("soft");
   c.textAlign = textAlign;
 }
 
@@ -119,9 +119,9 @@ class Chart {
     this.range = { x, y };
     c.clearRect(0, 0, this.width, this.height);
     letters(c, "right");
-    c.strokeStyle = css("--grid");
+    c.strokeStyle = css("grid");
     c.lineWidth = 1;
-    const xs = this.marks(...x, clamp((right - left) / 70, 2, 10)), ys = ticks(...y, this.height / 32);
+    const xs = (this.marks || ticks).call(this, ...x, clamp((right - left) / 70, 2, 10)), ys = ticks(...y, this.height / 32);
     c.beginPath();
     for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
     for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
@@ -142,8 +142,6 @@ class Chart {
     }
     c.restore();
   }
-
-  marks(low, high, most) { return ticks(low, high, most); }
 
   bottomLabels(c, xs) {
     const y = this.inner.bottom + 13, width = c.measureText(this.xLabel).width;
@@ -198,7 +196,7 @@ class Chart {
     const c = this.cursor, { index, axis } = this.clock, { top, bottom } = this.inner;
     c.clearRect(0, 0, this.width, this.height);
     if (this.overTime) {
-      c.fillStyle = css("--accent");
+      c.fillStyle = css("accent");
       c.fillRect(this.px(this.clock.time / this.clock.unit) - 0.5, top, 1, bottom - top);
     }
     for (const line of this.lines) {

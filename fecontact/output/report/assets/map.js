@@ -6,7 +6,7 @@ class ContactMap extends Chart {
       height: clamp(60 + 9 * face.abscissa.length, 90, 220), kind: "map" });
     Object.assign(this, { contact, face, shades, what: "state" });
     const pick = el("select", { ariaLabel: "quantity", onchange: () => { this.what = pick.value; this.draw(); } },
-      ...["state", "normal force", "tangential force"].map((name) => el("option", {}, name)));
+      ...options(["state", "normal force", "tangential force"]));
     this.node.firstChild.append(pick);
   }
 
@@ -49,7 +49,7 @@ class ContactMap extends Chart {
     }
     const small = el("canvas", { width: columns, height: n });
     small.getContext("2d").putImageData(image, 0, 0);
-    c.fillStyle = css("--open");
+    c.fillStyle = css("open");
     c.fillRect(left, top, columns, rows);
     c.imageSmoothingEnabled = false;
     c.drawImage(small, left, top, columns, rows);
@@ -87,7 +87,7 @@ class Footprint extends ContactMap {
     c.clearRect(0, 0, width, height);
     plan[0].forEach((x, k) => {
       const colour = this.painted(value(first + k, this.clock.index));
-      c.fillStyle = colour ? `rgb(${colour})` : css("--open");
+      c.fillStyle = colour ? `rgb(${colour})` : css("open");
       c.fillRect(width / 2 + size * (x - (left + right) / 2) - w / 2 + 0.5,
         (height - 20) / 2 - size * (plan[1][k] - (low + high) / 2) - h / 2 + 0.5, w - 1, h - 1);
     });

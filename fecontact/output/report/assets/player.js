@@ -333,7 +333,7 @@ class Player {
     gl.drawElements(gl.TRIANGLES, first, gl.UNSIGNED_INT, 0);
     gl.uniform4f(at.plain, 0, 0, 0, 0);
     gl.drawElements(gl.TRIANGLES, size - first, gl.UNSIGNED_INT, 4 * first);
-    gl.uniform4f(at.plain, ...css("--outline").split(",").map(Number), 1);
+    gl.uniform4f(at.plain, ...css("outline").split(",").map(Number), 1);
     gl.uniform1f(at.solid, 0);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.#edges.buffer);
     gl.drawElements(gl.LINES, this.#edges.size, gl.UNSIGNED_INT, 0);
@@ -345,54 +345,51 @@ class Player {
   }
 
   // Height of the ground and way that it has gone at the drawn instant.
-  #groundNow() {
+  groundNow() {
     const { ground } = this.data, { scale } = this.#drawn, [a, b] = ground.direction;
     const way = this.#now(ground.travel, []).map((one) => (ground.wavy ? 1 : scale) * one);
     const level = ground.level - scale * ground.gap, profile = ground.profile.values;
-    return { way, height: (x, y) => {
+    return { way, height: (x, y = 0) => {
       if (!ground.wavy) return level;
-      if (ground.heights) return level + scale * this.#mapped(x - way[0], y - way[1]);
-      const at = clamp(((this.d > 2 ? a * (x - way[0]) + b * (y - way[1]) : x - way[0]) - ground.first) / ground.spacing, 0, profile.length - 1);
+      x -= way[0];
+      y -= way[1] || 0;
+      if (ground.heights) return level + scale * this.#mapped(x, y);
+      const at = clamp((a * x + b * y - ground.first) / ground.spacing, 0, profile.length - 1);
       const k = min(floor(at), profile.length - 2);
       return level + scale * (profile[k] + (at - k) * (profile[k + 1] - profile[k]));
     } };
   }
 
-  // Drawn height of the ground at a place of the space that stands still.
-  height(x, y) {
-    return this.#groundNow().height(x, y);
-  }
-
   // Height of a map that repeats itself, between its four points around a place of its own frame.
-  #mapped(x, y) {
-    const { heights, origin, steps } = this.data.ground, { rows, columns, values } = heights;
-    const u = (x - origin[0]) / steps[0], v = (y - origin[1]) / steps[1], i = floor(u), j = floor(v);
-    const row = (k) => {
-      const at = (k % rows + rows) % rows * columns, one = (j % columns + columns) % columns;
-      return (1 - v + j) * values[at + one] + (v - j) * values[at + (one + 1) % columns];
-    };
-    return (1 - u + i) * row(i) + (u - i) * row(i + 1);
+  #mapped(...place) {
+    const { heights: { rows, columns, values }, origin, steps } = this.data.ground;
+    const [[i, k, u], [j, l, v]] = [rows, columns].map((n, way) => {
+      const at = (place[way] - origin[way]) / steps[way], first = floor(at), one = (first % n + n) % n;
+      return [one, (one + 1) % n, at - first];
+    });
+    const row = (one) => (1 - v) * values[one * columns + j] + v * values[one * columns + l];
+    return (1 - u) * row(i) + u * row(k);
   }
 
   #drawGround() {
     const c = this.#under, { box, ground } = this.data, [left, right] = box;
     c.clearRect(0, 0, this.#width, this.#height);
     if (!ground || this.mode >= 0) return;
-    const { way, height } = this.#groundNow(), [[first], [second]] = ticks(left, right, 12), spacing = second - first;
-    c.strokeStyle = css("--mark");
-    c.fillStyle = css("--ground");
+    const { way, height } = this.groundNow(), [[first], [second]] = ticks(left, right, 12), spacing = second - first;
+    c.strokeStyle = css("mark");
+    c.fillStyle = css("ground");
     c.lineWidth = 1;
     if (this.d === 3) return this.#drawPlane(c, height, way, spacing);
     const world = (px) => (px - 0.5 * this.#width) / this.size + this.#centre[0];
     c.beginPath();
     for (let px = 0; px <= this.#width; px += 2) c.lineTo(px, this.project(0, height(world(px)))[1]);
-    c.strokeStyle = css("--soft");
+    c.strokeStyle = css("soft");
     c.lineWidth = 1.5;
     c.stroke();
-    c.lineTo(this.#width, this.#height + 9);
-    c.lineTo(0, this.#height + 9);
+    c.lineTo(this.#width, 1e4);
+    c.lineTo(0, 1e4);
     c.fill();
-    c.strokeStyle = css("--mark");
+    c.strokeStyle = css("mark");
     c.beginPath();
     // Marks move with the ground.
     for (let k = Math.ceil((world(0) - way[0]) / spacing), x; (x = k * spacing + way[0]) < world(this.#width); k++) {
@@ -419,15 +416,14 @@ class Player {
     c.beginPath();
     // A net that moves and turns with the ground, around what of it lies below the middle.
     const turned = (x, y, sine, cosine = Math.cos(angle)) => [cosine * x - sine * y, sine * x + cosine * y];
-    const parts = this.data.ground.wavy ? 6 : 1;
     const sine = Math.sin(angle), x0 = cx + wayX, y0 = cy + wayY, reach = round(hypot(wide, deep) / 2 / spacing + 1) * spacing;
     const [x1, y1] = turned((left + right) / 2 - x0, (front + back) / 2 - y0, -sine).map((one) => round(one / spacing) * spacing);
     for (let x = x1 - reach; x < x1 + reach; x += spacing) {
       for (let y = y1 - reach; y < y1 + reach; y += spacing) {
-        // Along two sides of a mesh, over waves in several steps.
-        for (let k = -parts; k <= parts; k++) {
-          const [p, q] = turned(x + max(k, 0) * spacing / parts, y + max(-k, 0) * spacing / parts, sine);
-          c[k > -parts ? "lineTo" : "moveTo"](...at(x0 + p, y0 + q));
+        // Along two sides of a mesh, which waves bend.
+        for (let k = -6; k < 7; k++) {
+          const [p, q] = turned(x + max(k, 0) * spacing / 6, y + max(-k, 0) * spacing / 6, sine);
+          c[k > -6 ? "lineTo" : "moveTo"](...at(x0 + p, y0 + q));
         }
       }
     }
@@ -439,11 +435,11 @@ class Player {
     const c = this.#over, { contact, bodies } = this.data;
     c.clearRect(0, 0, this.#width, this.#height);
     if (contact && this.data.whole && this.mode < 0) this.#drawContact(c, contact);
-    c.font = `600 12px ${css("--font")}`;
+    c.font = `600 12px ${css("font")}`;
     c.textAlign = "center";
     c.lineWidth = 3;
-    c.strokeStyle = css("--panel");
-    c.fillStyle = css("--ink");
+    c.strokeStyle = css("panel");
+    c.fillStyle = css("ink");
     for (const { name, label } of bodies.parts) {
       const at = this.project(...this.places.subarray(3 * label, 3 * label + 3));
       c.strokeText(name, ...at);
@@ -473,7 +469,7 @@ class Player {
     const radius = clamp(0.3 * apart, 1.5, 3.6);
     for (const hidden of [true, false]) {
       c.globalAlpha = hidden ? 0.35 : 1;
-      c.strokeStyle = c.fillStyle = css("--accent");
+      c.strokeStyle = c.fillStyle = css("accent");
       c.lineWidth = size > 100 ? 1.1 : 1.6;
       const lines = new Path2D(), heads = new Path2D(), dots = contact.colours.map(() => new Path2D());
       for (let k = 0; k < size; k++) {
@@ -495,9 +491,9 @@ class Player {
       c.stroke(lines);
       c.fill(heads);
       c.lineWidth = 1;
-      c.strokeStyle = css("--ink");
+      c.strokeStyle = css("ink");
       dots.forEach((dot, k) => {
-        c.fillStyle = contact.colours[k] || css("--panel");
+        c.fillStyle = contact.colours[k] || css("panel");
         c.fill(dot);
         c.stroke(dot);
       });

@@ -44,10 +44,10 @@ class Cases extends Chart {
     const w = this.side(x, this.px, this.width), h = this.side(y, this.py, this.height);
     x.forEach((_, i) => {
       const px = this.px(x[i]), py = this.py(y[i]), missing = values[i] !== values[i];
-      c.fillStyle = missing ? css("--open") : `rgb(${shades[round(63 * (values[i] - low) / span)]})`;
+      c.fillStyle = missing ? css("open") : `rgb(${shades[round(63 * (values[i] - low) / span)]})`;
       c.fillRect(px - w / 2, py - h / 2, w + 0.5, h + 0.5);
       if (missing) {
-        c.fillStyle = css("--soft");
+        c.fillStyle = css("soft");
         c.textAlign = "center";
         c.fillText("×", px, py);
       }
@@ -78,7 +78,7 @@ class Cases extends Chart {
     const c = this.cursor;
     c.clearRect(0, 0, this.width, this.height);
     if (this.chosen === undefined) return;
-    c.strokeStyle = css("--accent");
+    c.strokeStyle = css("accent");
     c.lineWidth = 2.5;
     c.beginPath();
     c.arc(this.px(this.along.values[this.chosen]), this.py(this.up.values[this.chosen]), 8, 0, 7);

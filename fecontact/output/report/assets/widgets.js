@@ -127,10 +127,12 @@ function controls(data, clock, player, resize, lap = 12) {
   return timing;
 }
 
+const options = (names) => names.map((name) => el("option", {}, name));
+
 function addPlayer(data, player, more) {
   const factor = el("output"), { paints } = data.bodies, given = Math.log(data.scale);
   const colour = el("select", { ariaLabel: "colour", onchange() { player.paint = colour.value; player.draw(); } },
-    ...paints.map((name) => el("option", {}, name)));
+    ...options(paints));
   const magnify = slider("deformation", min(0, given), max(2.3, given + 2.3), given, () => {
     player.scale = Math.exp(magnify.value);
     player.swing = player.scale / data.scale;
@@ -138,20 +140,16 @@ function addPlayer(data, player, more) {
     player.draw();
   });
   magnify.oninput();
-  player.magnify = (scale) => {
-    magnify.max = max(magnify.max, Math.log(scale) + 2.3);
-    magnify.value = Math.log(scale);
-    magnify.oninput();
+  const ticked = (name, checked) => {
+    const box = el("input", { type: "checkbox", checked, onchange() { player[name] = box.checked; player.draw(); } });
+    return box;
   };
-  const arrows = el("input", { type: "checkbox", checked: true,
-    onchange() { player.arrows = arrows.checked; player.draw(); } });
   more.append(field("deformation", magnify), factor, field("colour", colour),
-    ...data.contact ? [field("forces", arrows)] : []);
+    ...data.contact ? [field("forces", ticked("arrows", true))] : []);
   if (player.d < 3) return;
   const view = el("select", { ariaLabel: "view", onchange() { player.look(view.value); player.draw(); } },
-    ...Object.keys(VIEWS).map((name) => el("option", {}, name)));
-  const through = el("input", { type: "checkbox", onchange() { player.through = through.checked; player.draw(); } });
-  more.append(field("view", view), field("see-through", through));
+    ...options(Object.keys(VIEWS)));
+  more.append(field("view", view), field("see-through", ticked("through")));
 }
 
 function cards(title, sections) {
