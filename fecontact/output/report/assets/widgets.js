@@ -107,7 +107,7 @@ function controls(data, clock, player, resize, lap = 12) {
   const closer = (textContent, factor, title) => el("button", { textContent, title,
     onclick() { clock.show(factor); resize(); clock.set(clock.time); } });
   timing.bar = el("div.controls", {}, play, scrub, now,
-    closer("+", 0.5, "shorter time"), closer("−", 2, "longer time"));
+    closer("+", 0.5, "zoom in"), closer("−", 2, "zoom out"));
   timing.more = el("div.controls", {}, field("speed", speeds), pace);
   if (player) addPlayer(data, player, timing.more);
   const frame = (at) => {
