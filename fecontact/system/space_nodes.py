@@ -101,32 +101,34 @@ def _space_node(motion, moved, laws, z, side, normal_parameters, friction_parame
 
     That is the :class:`~fecontact.system.nodes.NodeContact`, F, and derivatives (4, 6) of F, of the
     force against the first tangent, of the pressing force and of the force against the second
-    tangent.
+    tangent; these are left out where ``force`` has no room for them.
     """
     states = len(rates)
     second, told = 4 + states, 2 * (4 + states)
     contact = contact_in_space(motion, moved, laws, side, profile_parameters)
     F, F_u, F_v = normal_at(laws.normal)(contact.penetration, contact.rate,
                                                normal_parameters)
+    pressing, scale, scale_slope = abs(F), 1.0, 0.0
+    a, b = side[WAVES_X], side[WAVES_Y]
+    if laws.scale != 0 and side[ON_GROUND] != 0.0 and F != 0.0:
+        scale, scale_slope = scale_under(contact, a, b, laws.scale, scale_parameters)
+    planar_at(laws.planar)(laws.friction, contact.slip, contact.slip_across, scale * pressing,
+                                 z, friction_parameters, force[:told], rates)
+    for k in range(CONTACT_FIELDS):
+        force[told + k] = contact[k]
+    force[told + CONTACT_FIELDS] = F
     first = told + CONTACT_FIELDS + 1
+    if len(force) <= first:
+        return
     normal = force[first : first + 6]
     tangential, pressed = force[first + 6 : first + 12], force[first + 12 : first + 18]
     across = force[first + 18 : first + 24]
     _normal_part(contact, F_u, F_v, normal)
-    sign = 1.0 if F >= 0.0 else -1.0
-    pressing = abs(F)
+    sign = scale if F >= 0.0 else -scale
     for k in range(SPACE_COLUMNS):
         pressed[k] = sign * normal[k]
-    if laws.scale != 0 and side[ON_GROUND] != 0.0 and F != 0.0:
-        a, b = side[WAVES_X], side[WAVES_Y]
-        scale, slope = scale_under(contact, a, b, laws.scale, scale_parameters)
-        for k in range(SPACE_COLUMNS):
-            pressed[k] *= scale
-        pressed[0] += a * slope * pressing
-        pressed[4] += b * slope * pressing
-        pressing *= scale
-    planar_at(laws.planar)(laws.friction, contact.slip, contact.slip_across, pressing,
-                                 z, friction_parameters, force[:told], rates)
+    pressed[0] += a * scale_slope * pressing
+    pressed[4] += b * scale_slope * pressing
     for k in range(SPACE_COLUMNS):
         tangential[k] = force[2] * pressed[k]
         across[k] = force[second + 2] * pressed[k]
@@ -142,9 +144,6 @@ def _space_node(motion, moved, laws, z, side, normal_parameters, friction_parame
         tangential[4] += F * contact.twist
         across[0] += F * contact.twist
         across[4] += F * contact.curvature_across
-    for k in range(CONTACT_FIELDS):
-        force[told + k] = contact[k]
-    force[told + CONTACT_FIELDS] = F
 
 
 space_node = compile_law(_SPACE_NODE, "space_node(motion, moved, laws, z, side, ...)", _space_node)

@@ -11,7 +11,13 @@ from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks
-from fecontact.system.nodes import GROUND_MOTION, SYSTEM, TOLD, GroundMotion
+from fecontact.system.nodes import (
+    CONTACT_FIELDS,
+    GROUND_MOTION,
+    SYSTEM,
+    TOLD,
+    GroundMotion,
+)
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
@@ -201,9 +207,15 @@ ROOM = types.NamedTuple(
     Room)
 
 
-def gradients_for(nodes: int, states: int, dimension: int) -> motion.Gradients:
-    """Zeros for so many contact nodes with so many internal variables each."""
-    length, width = (2 * (4 + states) + TOLD, 4 + states) if dimension == 3 else (
+def gradients_for(
+    nodes: int, states: int, dimension: int, *, told: int = TOLD
+) -> motion.Gradients:
+    """Zeros for so many contact nodes with so many internal variables each.
+
+    ``told`` is the length of what is told of a node in space; without derivatives they are not
+    computed.
+    """
+    length, width = (2 * (4 + states) + told, 4 + states) if dimension == 3 else (
         3 + states, 3 + states)
     return motion.Gradients(np.zeros((nodes, 1 + dimension, 2 * dimension)),
                             np.zeros((nodes, length)), np.zeros((nodes, states, width)))
@@ -221,7 +233,8 @@ def room_for(modes: int, nodes: int, states: int, dimension: int) -> Room:
         np.zeros(modes), np.zeros(modes),
         np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)),
         stage_solver.reduced_for(modes, nodes, states, dimension),
-        gradients_for(nodes, states, dimension), gradients_for(nodes, states, dimension),
+        gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1),
+        gradients_for(nodes, states, dimension),
         np.zeros((3, columns)), np.zeros((3, size)),
         np.zeros((courses.DOUBT + 1, (2 * dimension - 1) * nodes)),
         np.zeros((3, courses.COEFFICIENTS)),
