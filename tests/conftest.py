@@ -42,7 +42,9 @@ LONG = {
     "test_two_bodies", "test_two_spheres", "test_pressed_sphere", "test_sliding_box",
     "test_report", "test_report_branches", "test_sweep_report",
     "test_solid_basis", "test_solid_assembly", "test_surface_patches", "test_solid_movie",
-    "test_solid_plots",
+    "test_solid_plots", "test_prestressed_solids", "test_load_history_space", "test_solid_eigen",
+    "test_set_valued_orbits", "test_homoclinic_curves", "test_branch_tree", "test_branch_ends",
+    "test_simulate", "test_set_valued_space",
 }
 
 
