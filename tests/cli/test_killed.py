@@ -24,7 +24,7 @@ from fecontact.io import read_table
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")]
 
-KILLS = 20
+KILLS = 12
 # Driven, so that it never comes to rest: most of the time goes into steps.
 LONG = TINY.replace("t_end = 5e-4, outputs = 11", "t_end = 0.6, outputs = 201").replace(
     "frames = 3", "frames = 0") + """
