@@ -26,7 +26,7 @@ test: $(READY) $(ALL) $(SYSTEM) ## run all tests but the slow ones
 	@$(BIN)/python -m pytest -q -n auto
 
 test-slow: $(READY) $(ALL) $(SYSTEM) ## run documents and examples, and what takes a minute or more
-	@$(BIN)/python -m pytest -q -n auto --dist loadgroup -m slow
+	@$(BIN)/python -m pytest -q -n auto -m slow
 
 check: $(READY) ## ruff and mypy
 	@$(BIN)/ruff check .
