@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, titled
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import observe
@@ -85,7 +85,7 @@ def follow_branches(
 
     result = Branches(contact_field=field, observe=(shown, wanted.component))
     grow(result, _first_tasks(field, wanted, initial), beyond, wanted.generations,
-         lambda title: _settings(wanted, title, progress), kept)
+         lambda title: titled(wanted.options(), title, progress), kept)
     return result
 
 
@@ -105,16 +105,6 @@ def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
             yield from (f"at {branch.parameter_name} = {point.parameter:.6g} {one}"
                         for one in found)
             return
-
-
-def _settings(
-    wanted: "BranchSettings", title: str, progress: Callable[[str, float], None] | None
-) -> ContinuationOptions:
-    options = wanted.options()
-    if progress is None:
-        return options
-    progress(title, 0.0)
-    return replace(options, progress=lambda points: progress(title, points / options.points))
 
 
 def _first_tasks(field: ContactField, wanted: "BranchSettings", initial: Any) -> Iterator[Task]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.analysis.histories import usual_component
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, titled
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.response import (
     FrequencyResponse,
@@ -90,7 +90,7 @@ def follow_responses(
         title = "Response" if wanted.level_name is None else f"{wanted.level_name} = {value:g}"
         known = _level_of(earlier, value)
         try:
-            options = _settings(wanted, title, progress)
+            options = titled(wanted.options(), title, progress)
             if known is not None and _goes_on(known, wanted):
                 found = _with_rest(system, known, observe, options)
             elif known is not None and known.branches[0].status is not BranchStatus.INTERRUPTED:
@@ -119,16 +119,6 @@ def follow_responses(
     if result.response is None and failed is not None:
         raise failed
     return result
-
-
-def _settings(
-    wanted: "ResponseSettings", title: str, progress: Callable[[str, float], None] | None
-) -> ContinuationOptions:
-    options = wanted.options()
-    if progress is None:
-        return options
-    progress(title, 0.0)
-    return replace(options, progress=lambda points: progress(title, points / options.points))
 
 
 def _level_of(earlier: FrequencyResponse | None, value: float) -> FrequencyResponse | None:

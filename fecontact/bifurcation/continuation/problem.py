@@ -272,6 +272,16 @@ def options_of(
     return chosen if bounds is None else replace(chosen, bounds=bounds)
 
 
+def titled(
+    options: ContinuationOptions, title: str, progress: Callable[[str, float], None] | None
+) -> ContinuationOptions:
+    """The options, with progress that is told the title and which part of the points there is."""
+    if progress is None:
+        return options
+    progress(title, 0.0)
+    return replace(options, progress=lambda points: progress(title, points / options.points))
+
+
 def sizes_of(given: ArrayLike | None, found: Array) -> tuple[Array, Array | None]:
     """Scales (d,) of the states, and their upper limits where they grow with the orbit."""
     if given is None:
