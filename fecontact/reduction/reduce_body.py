@@ -29,11 +29,8 @@ from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import modal_rotation
 from fecontact.reduction.solvers.solid_solver import Eigensolver
 from fecontact.reduction.static_modes.craig_bampton import craig_bampton
-from fecontact.reduction.static_modes.residual_vectors import (
-    Flexibility,
-    flexibility_of,
-    residual_modes,
-)
+from fecontact.reduction.static_modes.flexibility import Flexibility
+from fecontact.reduction.static_modes.residual_vectors import flexibility_of, residual_modes
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
 
@@ -125,14 +122,15 @@ def modal_basis(
     # At B, C and the contact nodes there are forces, but no moments.
     at_points = sp.csr_array(displacement_rows(restriction, d))
     further_rows = [_given_rows(body, given) for given in rows]
+    vibration = None if reduction == "craig-bampton" else free_modes(system, modes)
     flexibility = flexibility_of(system, sp.csr_array(
         sp.vstack([at_points, *further_rows]) @ body.expansion),
-        0.0 if reduction == "craig-bampton" else tolerance)
+        0.0 if vibration is None else tolerance, vibration)
     row = np.arange(len(flexibility.rows.indptr) - 1)
     is_point = row < at_points.shape[0]
     used = (row < d * (2 + len(face.tributary))) | ~is_point
-    w, free_shapes, vibration = _modes(system, flexibility.of_rows(used), modes, reduction,
-                                       tolerance, completing)
+    w, free_shapes, own = _modes(flexibility.of_rows(used), modes, reduction, tolerance,
+                                 completing)
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
@@ -163,7 +161,7 @@ def modal_basis(
             elements=elements,
             outline_nodes=None if d == 2 else _nodes_of_outline(body, face),
         ),
-        quality=_quality(body, system, flexibility.of_rows(is_point), w, free_shapes, vibration,
+        quality=_quality(body, system, flexibility.of_rows(is_point), w, free_shapes, own,
                          forces),
         groups=face.groups,
         thickness=body.thickness if d == 2 else None,
@@ -318,20 +316,19 @@ def _joints(
 
 
 def _modes(
-    system: FreeSystem, flexibility: Flexibility, count: int, reduction: Reduction,
-    tolerance: float, loads: Array,
+    flexibility: Flexibility, count: int, reduction: Reduction, tolerance: float, loads: Array,
 ) -> tuple[Array, Array, int]:
     """Frequencies, shapes and number of the eigenmodes among them."""
+    system, (w, shapes) = flexibility.system, flexibility.modes
     if reduction == "craig-bampton":
         w, shapes = craig_bampton(system, flexibility.rows, count, loads)
         return w, shapes, system.rigid.shape[1]
-    w, shapes = free_modes(system, count)
     if reduction == "vibration":
         return w, shapes, count
     if count < system.rigid.shape[1]:
         raise InputError(f"modes = {count} must be at least the number of rigid modes, "
                          f"{system.rigid.shape[1]}, for reduction = 'residual'.")
-    more, completing = residual_modes(flexibility, w, shapes, tolerance, loads)
+    more, completing = residual_modes(flexibility, tolerance, loads)
     return np.concatenate([w, more]), np.hstack([shapes, completing]), count
 
 

@@ -14,7 +14,7 @@ from fecontact.reduction import BasisReport, eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.solvers.factorisation import SymmetricFactors
 from fecontact.reduction.static_modes.craig_bampton import craig_bampton
-from fecontact.reduction.static_modes.residual_vectors import Flexibility
+from fecontact.reduction.static_modes.flexibility import Flexibility
 
 modal_basis = partial(fecontact.modal_basis, contact="bottom")
 

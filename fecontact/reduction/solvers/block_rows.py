@@ -140,7 +140,7 @@ def _in_parts(kernel: Any, rows: int, *arrays: Any) -> None:
 
 @dataclass(frozen=True, eq=False)
 class BlockRows:
-    """A square matrix by rows of 3 x 3 blocks (e, 3, 3), or of numbers (e,) for each component."""
+    """A matrix by rows of 3 x 3 blocks (e, 3, 3), or of numbers (e,) for each component."""
 
     indptr: Integers
     indices: Integers
@@ -149,13 +149,16 @@ class BlockRows:
     @classmethod
     def of(cls, matrix: Any, dtype: Any = np.float64) -> "BlockRows":
         """A scipy BSR array of 3 x 3 blocks, or a CSR array that acts on each component."""
-        return cls(matrix.indptr, matrix.indices, np.ascontiguousarray(matrix.data, dtype=dtype))
+        return cls(matrix.indptr.astype(np.int32, copy=False),
+                   matrix.indices.astype(np.int32, copy=False),
+                   np.ascontiguousarray(matrix.data, dtype=dtype))
 
     def product(self, x: Any) -> Any:
         """A x (N, 3, k) of vectors of the matrix's precision."""
-        y = np.empty_like(x)
+        rows = len(self.indptr) - 1
+        y = np.empty((rows, *x.shape[1:]), dtype=x.dtype)
         kernels = _products if self.blocks.ndim == 3 else _scalar_products
-        _in_parts(kernels[self.blocks.dtype], len(self.indptr) - 1, self.indptr, self.indices,
+        _in_parts(kernels[self.blocks.dtype], rows, self.indptr, self.indices,
                   self.blocks, x, y)
         return y
 

@@ -120,6 +120,11 @@ def multigrid(fine: Any, coarse: Any, interpolation: Any, rigid: Array) -> Multi
     return Multigrid(levels + further, last)
 
 
+def with_finest(cycle: Multigrid, matrix: Any, interpolation: Any) -> Multigrid:
+    """The same for another finest matrix of 3 x 3 blocks, interpolated (n, m) from the next one."""
+    return Multigrid([_nodal_level(matrix, interpolation), *cycle.levels[1:]], cycle.coarsest)
+
+
 def _nodal_level(matrix: Any, interpolation: Any) -> Level:
     """The level of nodes with three displacements each, and nodal interpolation to it."""
     rows = BlockRows.of(matrix, np.float32)
@@ -139,11 +144,11 @@ def _nodal_level(matrix: Any, interpolation: Any) -> Level:
                            x.reshape(shape)).reshape(x.shape)
 
     return Level(product, precondition, smooth,
-                 _largest(product, precondition, matrix.shape[0]), _ByNodes(P), _ByNodes(R))
+                 _largest(product, precondition, matrix.shape[0]), ByNodes(P), ByNodes(R))
 
 
 @dataclass(frozen=True, eq=False)
-class _ByNodes:
+class ByNodes:
     """A matrix between nodes (N, n) that acts on each of the three components."""
 
     matrix: Any

@@ -78,6 +78,8 @@ class SolidSolver:
         One for degrees of freedom that are not fixed, zero for the others.
     gauge : (3 N, 6) array
         Forces K z that mass-normalised rigid motions z seem to need.
+    shift : float
+        The part of M.
     """
 
     stiffness: BlockRows
@@ -85,6 +87,7 @@ class SolidSolver:
     mesh_cycle: Multigrid
     moving: Array
     gauge: Array
+    shift: float
 
     @classmethod
     def of(cls, body: ElasticBody, rigid: int) -> "SolidSolver":
@@ -97,17 +100,18 @@ class SolidSolver:
         # A part of the mass makes K positive definite, too small to matter beside elastic modes.
         waves = body.elasticity[2] / body.material.density * (np.pi / body.mesh.extent) ** 2
         shift = 0.02 * waves if rigid else 0.0
-        moving = _moving(body)
-        held = _held(K, moving)
+        moving = moving_components(body)
+        held = held_matrix(K, moving)
         coarse = replace(body, degree=1) if body.degree == 2 else body
-        coarse_matrix = _shifted(_held(coarse.stiffness_blocks, _moving(coarse)),
-                                 coarse.component_mass, shift)
+        coarse_moving = moving_components(coarse)
+        coarse_matrix = shifted(held_matrix(coarse.stiffness_blocks, coarse_moving),
+                                coarse.component_mass, shift)
         scaled = (coarse.nodes - coarse.nodes.mean(axis=0)) / body.mesh.extent
-        coarse_motions = rigid_motions(scaled, np.zeros(3)) * _moving(coarse).reshape(-1, 1)
-        cycle = multigrid(_shifted(held, M, shift), coarse_matrix,
-                          _interpolation(body) if body.degree == 2 else None, coarse_motions)
+        coarse_motions = rigid_motions(scaled, np.zeros(3)) * coarse_moving.reshape(-1, 1)
+        cycle = multigrid(shifted(held, M, shift), coarse_matrix,
+                          interpolation(body) if body.degree == 2 else None, coarse_motions)
         return cls(BlockRows.of(held), BlockRows.of(M), cycle, moving[:, :, None],
-                   gauge * moving.reshape(-1, 1))
+                   gauge * moving.reshape(-1, 1), shift)
 
     def modes(self, count: int, rigid: Array) -> Found:
         """The lowest elastic modes; ``rigid`` (3 N, r) are the rigid ones."""
@@ -116,8 +120,9 @@ class SolidSolver:
         width = min(width, int(self.moving.sum()) - rigid.shape[1])
         start = np.random.default_rng(0).standard_normal((3 * len(self.moving), width))
         noise = np.einsum("ij,ij->j", self.gauge, self._cycle(self.gauge))
-        return lowest_modes(self._stiffness, self._mass, self._cycle,
-                            self._cycle(self._mass(start)), count, rigid, _MODES, np.abs(noise))
+        return lowest_modes(
+            self.stiffness_product, self.mass_product, self._cycle,
+            self._cycle(self.mass_product(start)), count, rigid, _MODES, np.abs(noise))
 
     def deflections(
         self, forces: Array, tolerance: float, most: int = 100
@@ -146,7 +151,7 @@ class SolidSolver:
         reached = energy <= 0.0
         before = np.zeros(forces.shape[1])
         for _ in range(most):
-            pushed = self._stiffness(direction)
+            pushed = self.stiffness_product(direction)
             curvature = np.einsum("ij,ij->j", direction, pushed)
             step = np.where(reached, 0.0, energy / np.where(curvature > 0.0, curvature, 1.0))
             step_on(step, direction, pushed, x, residual)
@@ -169,10 +174,12 @@ class SolidSolver:
             energy = following
         return x, bool(reached.all())
 
-    def _stiffness(self, x: Array) -> Array:
+    def stiffness_product(self, x: Array) -> Array:
+        """K x of displacements (3 N, k) that vanish where they are fixed."""
         return self._by_nodes(self.stiffness.product, x)
 
-    def _mass(self, x: Array) -> Array:
+    def mass_product(self, x: Array) -> Array:
+        """M x, zero where displacements are fixed."""
         return self._held(self._by_nodes(self.component_mass.product, x))
 
     def _cycle(self, x: Array) -> Array:
@@ -192,7 +199,8 @@ class SolidSolver:
                           ).reshape(x.shape)
 
 
-def _moving(body: ElasticBody) -> Array:
+def moving_components(body: ElasticBody) -> Array:
+    """One for each displacement (N, 3) that is not fixed, else zero."""
     moving = np.ones(3 * len(body.nodes))
     moving[body.fixed_dofs] = 0.0
     return moving.reshape(-1, 3)
@@ -202,7 +210,7 @@ def _rows(matrix: Any) -> Integers:
     return np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
 
 
-def _held(matrix: Any, moving: Array) -> Any:
+def held_matrix(matrix: Any, moving: Array) -> Any:
     """A matrix of blocks with nothing but its diagonal in the rows and columns of fixed dofs."""
     import scipy.sparse as sp
 
@@ -217,7 +225,7 @@ def _held(matrix: Any, moving: Array) -> Any:
     return sp.bsr_array((blocks, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _shifted(matrix: Any, component_mass: Any, shift: float) -> Any:
+def shifted(matrix: Any, component_mass: Any, shift: float) -> Any:
     """K + shift M, which have the same pattern."""
     import scipy.sparse as sp
 
@@ -229,7 +237,7 @@ def _shifted(matrix: Any, component_mass: Any, shift: float) -> Any:
     return sp.bsr_array((blocks, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _interpolation(body: ElasticBody) -> Any:
+def interpolation(body: ElasticBody) -> Any:
     """Nodal displacements of quadratic elements from those of linear ones, sparse (N, n)."""
     import scipy.sparse as sp
 

@@ -14,11 +14,8 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem
-from fecontact.reduction.static_modes.residual_vectors import (
-    Flexibility,
-    diagonalised,
-    flexibility_of,
-)
+from fecontact.reduction.static_modes.flexibility import Flexibility
+from fecontact.reduction.static_modes.residual_vectors import diagonalised, flexibility_of
 
 
 def craig_bampton(

@@ -1,0 +1,107 @@
+"""Residual vectors of many rows of large solids, among few displacements, to their tolerance."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from solid_blocks import block_mesh
+
+import fecontact.reduction.static_modes.iterated_flexibility as iterated
+import fecontact.reduction.static_modes.residual_vectors as residual_vectors
+from fecontact import ElasticBody, Material, modal_basis
+from fecontact.fem.contact_face import contact_nodes
+from fecontact.reduction.eigenmodes import FreeSystem, free_modes
+from fecontact.reduction.reduce_body import displacement_rows
+from fecontact.reduction.solvers.near_solver import NearSolver
+from fecontact.reduction.static_modes.flexibility import Flexibility
+from fecontact.reduction.static_modes.iterated_flexibility import Answers, TrialSpace
+
+STEEL = Material(2.1e11, 0.3, 7850.0)
+
+
+def column(fixed=None, hexahedra=False, cells=9):
+    """Loaded at its lower end."""
+    mesh = block_mesh((4, 4, cells), (0.8, 0.8, 0.2 * cells), tetrahedra=not hexahedra)
+    return ElasticBody(mesh, STEEL, fixed=fixed or {})
+
+
+def loaded_rows(body, nodes=9):
+    rows = displacement_rows(contact_nodes(body, "contact", nodes).matrix, 3)
+    return sp.csr_array(rows @ body.expansion)
+
+
+def residual_compliance(body, rows, modes):
+    whole = Flexibility(FreeSystem.of(body, "direct"), rows).compliance
+    w, shapes = modes
+    at_rows = np.asarray(rows @ shapes[:, w > 0.0]) / w[w > 0.0]
+    return whole - at_rows @ at_rows.T
+
+
+@pytest.mark.parametrize(("fixed", "hexahedra"), [
+    ({}, False), ({"top": "xyz"}, False), ({"left": "x"}, False), ({}, True)])
+def test_what_linear_elements_lack_is_estimated(fixed, hexahedra):
+    """They lack something, less with each layer, and no more than the estimate, mostly less."""
+    body = column(fixed, hexahedra)
+    system, rows = FreeSystem.of(body, "iterative"), loaded_rows(body)
+    modes = free_modes(FreeSystem.of(body, "direct"), 12)
+    exact = np.diag(residual_compliance(body, rows, modes))
+    nodes = np.unique((rows @ body.expansion.T).tocsr().indices // 3)
+    before = np.inf
+    for layers in (1, 2, 3):
+        near = NearSolver.of(body, system.iterative, nodes, layers)
+        assert len(near.followers) > 0
+        answers = Answers.of(TrialSpace(system, near.solver, near), rows, modes, 1e-6)
+        lacking = exact - np.diag(answers.compliance)
+        assert (lacking > 0.0).all()
+        assert ((answers.missing > 0.95 * lacking) & (answers.missing < 2.4 * lacking)).all()
+        assert lacking.max() < 0.6 * before
+        before = lacking.max()
+    everywhere = NearSolver.of(body, system.iterative, nodes, 40)
+    assert len(everywhere.followers) == 0
+    answers = Answers.of(TrialSpace(system, everywhere.solver, everywhere), rows, modes, 1e-6)
+    assert answers.compliance == pytest.approx(residual_compliance(body, rows, modes),
+                                               abs=1e-6 * exact.max())
+
+
+@pytest.mark.parametrize(("room", "layers"), [(3e9, (2, 4, 6)), (0.0, (2, 4, 6)), (3e9, ())])
+@pytest.mark.parametrize("fixed", [{}, {"top": "xyz"}])
+def test_no_row_lacks_more_than_the_tolerance(room, layers, fixed, monkeypatch):
+    """By the compliance by factors, with few vectors more; among few displacements or all."""
+    monkeypatch.setattr(residual_vectors, "_LARGE", 0)
+    monkeypatch.setattr(iterated, "_ROOM", room)
+    monkeypatch.setattr(iterated, "_LAYERS", layers)
+    monkeypatch.setattr(iterated, "_WORTH", 0.9)
+    body = column(fixed, cells=14)
+    used = []
+    suited = TrialSpace.suited
+    monkeypatch.setattr(TrialSpace, "suited", lambda *given: used.append(suited(*given))
+                        or used[-1])
+    options = {"contact": "contact", "contact_nodes": 25, "points": {"side": (0.8, 0.4, 0.9)},
+               "loads": ["gravity", "left"], "reduction": "residual"}
+    if not fixed:
+        options["B"] = (0.8, 0.8, 2.8)
+    for tolerance in (0.3, 0.1):
+        one, other = (modal_basis(body, 10, tolerance=tolerance, eigensolver=way, **options)
+                      for way in ("direct", "iterative"))
+        assert (used[-1].near is not None) == bool(layers)
+        # Without C, and perhaps B.
+        there = np.arange(len(one.T)) >= 2
+        there[0] = not fixed
+        found, exact = (basis.quality.compliance[there].ravel() for basis in (other, one))
+        # The iterations approach the whole from below.
+        assert (found < exact * (1.0 + 1e-9)).all()
+        assert found == pytest.approx(exact, rel=0.15 * tolerance)
+        assert 1.0 <= other.modes / one.modes < 1.1
+        elastic = other.angular_frequencies > 0.0
+        w = other.angular_frequencies[elastic]
+        rows = other.T[there, :3].reshape(len(exact), -1)[:, elastic] / w
+        missing = 1.0 - (rows**2).sum(axis=1)[:-3] / exact[:-3]
+        assert 0.5 * tolerance < missing.max() <= tolerance
+        assert missing.min() > -1e-9
+        # The same loads are answered, and added shapes are shapes of the body.
+        assert other.quality.orthogonality < 1e-9
+        shapes = other.mode_shapes.shapes.reshape(-1, other.modes)[:, elastic]
+        stiffness = shapes.T @ (body.stiffness @ shapes) / np.outer(w, w)
+        assert np.abs(stiffness - np.eye(len(w))).max() < 1e-7
+        answered = (other.inertia_rows[:, elastic] / w**2) @ other.inertia_rows[:, elastic].T
+        assert np.diag(answered) == pytest.approx(
+            other.quality.load_compliance[0], rel=tolerance, abs=1e-20)
