@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, Prob
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
+from fecontact.bifurcation.harmonic.compiled.balance import MOST_UNKNOWNS
 from fecontact.bifurcation.harmonic.compiled.evaluation import evaluate
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
@@ -72,7 +73,8 @@ class CompiledLinearisation(HarmonicLinearisation):
                         mean):
             raise AnalysisError(UNREPEATED)
         found = room.residual.copy(), room.z.copy(), forces
-        return (*found, room.condensed.copy(), mean) if derivatives else found
+        n = len(room.residual)
+        return (*found, room.condensed.reshape(n, n + 1).copy(), mean) if derivatives else found
 
     @cached_property
     def _values(self) -> tuple[Array, ...]:
@@ -130,7 +132,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """Residual and linearisation at u, each computed on demand."""
         if self.autonomous and not u[-2] > 0.0:
             raise AnalysisError("The period became negative.")
-        e = self.equations(float(u[-1]))
+        e = self.equations(float(u[-1])) if self.size <= MOST_UNKNOWNS else None
         return (HarmonicLinearisation(self, u) if e is None
                 else CompiledLinearisation(self, u, e))
 

@@ -13,8 +13,9 @@ from fecontact.bifurcation.harmonic.layout import around
 from fecontact.bifurcation.harmonic.memory import LEAK
 from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.linalg.motion_transitions import integrals, motion_transitions
 from fecontact.bifurcation.linalg.transition_matrices import transitions
-from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
+from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of, floquet_of_product
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
 
@@ -101,6 +102,10 @@ def _floquet(problem: Balance, T: float, f: Array, J: Array) -> Floquet:
     layout = problem.layout
     N, radau = _intervals(problem)
     points, basis, slopes = _collocation(radau)
+    if layout.displacements and not layout.memory:
+        M = np.empty((N, layout.states, layout.states))
+        motion_transitions(J, T / N, points, *integrals(tuple(points.tolist())), M)
+        return _of_transitions(problem, T, M, J)
     for k in range(layout.states - layout.memory, layout.states):
         J[:, k, k] -= LEAK / T
     factors, nothing, widths = _room(N, len(points), layout.states)
@@ -109,17 +114,25 @@ def _floquet(problem: Balance, T: float, f: Array, J: Array) -> Floquet:
         return floquet_of(factors, problem.autonomous)
     M = np.empty((N, layout.states, layout.states))
     transitions(factors, M)
+    return _of_transitions(problem, T, M, J)
+
+
+def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
+    """Multipliers from the transition matrices M (N, d, d) of motions."""
+    layout = problem.layout
+    if problem.autonomous or layout.states < _MANY:
+        return floquet_of_product(M, problem.autonomous)
     # Velocities in the scale of displacements, by the stiffness of each coordinate.
     m, scale = layout.displacements, np.ones(layout.states)
     stiffness = -J[:, m : 2 * m, :m].mean(axis=0).diagonal()
     scale[m : 2 * m] = np.sqrt(np.maximum(stiffness, (2.0 * np.pi / T) ** 2))
-    M *= scale / scale[:, None]
-    product, largest = M[0], 0.0
-    for step in M[1:]:
+    scaled = M * (scale / scale[:, None])
+    product, largest = scaled[0], 0.0
+    for step in scaled[1:]:
         product = step @ product
         largest = max(largest, float(np.abs(product).max()))
     if not largest < _LARGEST:
-        return floquet_of(factors, False)
+        return floquet_of_product(M, False)
     found = np.asarray(eigvals(product), dtype=np.complex128)
     return Floquet(found[np.argsort(-np.abs(found))], None)
 
