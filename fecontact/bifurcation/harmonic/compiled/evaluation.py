@@ -375,33 +375,42 @@ def _take_coefficients(u, T, X):
             X[0, j, k], X[1, j, k] = u[k * m + j], speed_coefficient(u, k, j, m, T)
 
 
-@kernel(types.void(matrix, block, vector, matrix, EQUATIONS, block, types.Array(f8, 4, "C")))
-def derivatives_along(us, zs, tau, values, e, f, J):
-    """Fill f (K, P, d) and J (K, P, d, d) at times tau (P,) of K orbits; values (P, 2 H + 1) there.
+@kernel(types.void(matrix, block, vector, matrix, EQUATIONS, types.Array(f8, 4, "C")))
+def derivatives_along(us, zs, tau, series, e, J):
+    """Fill J (K, P, d, d) with the derivatives of the rates at times tau (P,) of K orbits.
 
-    Internal variables zs (K, N, c) are linear between the samples.
+    ``series`` (2 H + 1, P) holds the functions of the series there. Internal variables zs
+    (K, N, c) are linear between the samples.
     """
-    us, zs, e, f, J = borrowed(us), borrowed(zs), borrowed(e), borrowed(f), borrowed(J)
+    us, zs, series, e, J = borrowed(us), borrowed(zs), borrowed(series), borrowed(e), borrowed(J)
     m, N, c = e.springs.shape[1], zs.shape[1], zs.shape[2]
-    X = e.room.coefficients
+    X, linear = e.room.coefficients, e.room.linear
     L = X.shape[2]
     P = len(tau)
-    t, x = np.empty(P), np.empty((P, 2 * m + c))
+    t, x, f, row = np.empty(P), np.empty((P, 2 * m + c)), np.empty((P, 2 * m + c)), np.empty(P)
     for k in range(len(us)):
         T = take_parameter(us[k, us.shape[1] - 1], e)
         _take_coefficients(us[k], T, X)
+        for part in range(2):
+            for j in range(m):
+                for p in range(P):
+                    row[p] = 0.0
+                for i in range(L):
+                    for p in range(P):
+                        row[p] += X[part, j, i] * series[i, p]
+                for p in range(P):
+                    x[p, part * m + j] = row[p]
         for p in range(P):
             t[p] = tau[p] * T
-            for part in range(2):
-                for j in range(m):
-                    total = 0.0
-                    for i in range(L):
-                        total += values[p, i] * X[part, j, i]
-                    x[p, part * m + j] = total
             place = tau[p] * N
             first = int(place)
             part_of = place - first
             for i in range(c):
                 x[p, 2 * m + i] = ((1.0 - part_of) * zs[k, first % N, i]
                                    + part_of * zs[k, (first + 1) % N, i])
-        batch_derivatives(t, x, e.system, e.system, 0.0, f[k], J[k], np.empty((0, 0)))
+        batch_derivatives(t, x, e.contact, e.contact, 0.0, f, J[k], np.empty((0, 0)))
+        for p in range(P):
+            for i in range(m):
+                for j in range(m):
+                    J[k, p, m + i, j] -= linear[0, i, j]
+                    J[k, p, m + i, m + j] -= linear[1, i, j]

@@ -22,6 +22,8 @@ from fecontact.core.types import Array
 
 # Points in the first and in later calls, and numbers that a call may return.
 _FIRST, _LATER, _NUMBERS = 8, 64, 4_000_000
+# Without stability folds alone end a call, and compiled code sees these itself.
+_WITHOUT_STABILITY = 256
 # Steps that are made one by one where modes cannot be separated, before compiled code is tried.
 _APART = 10
 
@@ -109,7 +111,8 @@ class Strides:
         lengths = (weights * directions * (u - before)).sum(axis=1) / np.sqrt(
             (weights * directions**2).sum(axis=1))
         whole = self._eventless(problem, here, values, tests, start, u, weights, lengths)
-        self.count = _LATER if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
+        later = _LATER if problem.stability is not None else _WITHOUT_STABILITY
+        self.count = later if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
         # The last tangent is made exact: what lies behind it relies on its signs.
         while whole > 0 and not self._made_exact(problem, u[whole - 1], weights[whole - 1],
                                                  tangents[whole - 1]):
