@@ -131,8 +131,9 @@ class NodeLaw:
 
     def table(self, share: Array) -> Array:
         """Parameters (n, k) of n nodes; ``share`` (n,) is each node's fraction of the face."""
-        columns = []
-        for entry in fields(self):
+        entries = fields(self)
+        table = np.empty((len(share), len(entries)))
+        for column, entry in enumerate(entries):
             given = getattr(self, entry.name)
             if entry.name in self.choices:
                 given = self.choices[entry.name].index(given)
@@ -142,8 +143,8 @@ class NodeLaw:
                                  f"{share.size} contact nodes; give one number or one per node.")
             if not value.ndim and entry.name in self.extensive:
                 value = value * share
-            columns.append(np.broadcast_to(value, share.shape))
-        return np.array(columns).T.reshape(len(share), -1).copy()
+            table[:, column] = value
+        return table
 
     def require(self, allowed: str, test: Callable[[Array], Any],
                 *names: str) -> None:

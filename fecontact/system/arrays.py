@@ -143,11 +143,15 @@ def _bristles(friction_groups: list[LawGroup], n: int, components: int) -> Array
 def _law_table(law_groups: Iterable[LawGroup]) -> tuple[Integers, Array]:
     """Addresses (n,) and parameters (n, k) of the laws of all nodes."""
     groups = [(law, law.table(share)) for _, share, law in law_groups]
-    width = max(table.shape[1] for _, table in groups)
-    return (np.concatenate([np.full(len(table), law.kernel.address, dtype=np.int64)
-                            for law, table in groups]),
-            np.vstack([np.pad(table, ((0, 0), (0, width - table.shape[1])))
-                       for _, table in groups]))
+    nodes = sum(len(table) for _, table in groups)
+    addresses = np.empty(nodes, dtype=np.int64)
+    tables = np.zeros((nodes, max(table.shape[1] for _, table in groups)))
+    first = 0
+    for law, table in groups:
+        last = first + len(table)
+        addresses[first:last], tables[first:last, : table.shape[1]] = law.kernel.address, table
+        first = last
+    return addresses, tables
 
 
 def _rows(parameters: list[Array]) -> Array:

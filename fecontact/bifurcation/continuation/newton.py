@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -141,9 +141,11 @@ def _iterated(
 
 def finished(
     problem: Problem, u: Array, linearisation: Linearisation, iterations: int, row: Array,
-    options: ContinuationOptions,
+    options: ContinuationOptions, *, stored: bool = True,
 ) -> Solution:
     """Tangent, stored values and test functions at a converged u.
+
+    Without ``stored`` values only where events need them; see :func:`with_values`.
 
     Raises
     ------
@@ -158,9 +160,15 @@ def finished(
         raise AnalysisError("The branch has no direction there: its equations grow beyond all "
                             "numbers.")
     tangent = tangent / size
-    values = problem.point(u, linearisation, tangent)
+    values = (problem.point(u, linearisation, tangent) if stored or options.events else {})
     return Solution(u, linearisation, tangent, iterations, values,
                     _tests(problem, u, linearisation, tangent, values, options))
+
+
+def with_values(problem: Problem, at: Solution) -> Solution:
+    """The solution with what is stored of it."""
+    return at if at.values else replace(
+        at, values=problem.point(at.u, at.linearisation, at.tangent))
 
 
 def _tests(

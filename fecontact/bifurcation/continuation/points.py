@@ -406,7 +406,13 @@ def special_point(
 
 def on_branch(point: BranchPoint, header: BranchHeader) -> BranchPoint:
     """The point as one of a branch, of the class of its kind."""
-    require_kind("A branch", BranchPoint, point=point)
+    if not isinstance(point, BranchPoint):
+        require_kind("A branch", BranchPoint, point=point)
+    known = point.header
+    if (known is not None and known.attributes is header.attributes
+            and known.parameter_name == header.parameter_name
+            and type(point) is _KINDS.get(point.kind, BranchPoint)):
+        return point
     return special_point(point.u, point.tangent, point.values, point.kind, point._details, header)
 
 

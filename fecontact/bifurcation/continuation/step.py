@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.newton import (
     finished,
     weighted_norm,
     weighted_product,
+    with_values,
 )
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.core.errors import FecontactError
@@ -134,16 +135,24 @@ class Step:
             return None
         first = min(known, key=lambda each: each[0])
         if remeshed and first[1] * after > 0.0 and first[0] <= 3.0 * precision * length:
-            return first[2], first[0]
+            return self._completed(first[2], first[0])
         along, size, at = min(known, key=lambda each: abs(each[1]))
         # At a zero the values become small, as far as the precision allows; not so at a pole or a
         # jump.
         if abs(size) > max(1e-3, 50.0 * precision) * max(abs(before), abs(after)):
             return None
         if converged or size == 0.0:
-            return at, 0.0
+            return self._completed(at, 0.0)
         ends = [(0.0, before, self.here), (length, after, self.there), *known]
-        return at, min(abs(place - along) for place, other, _ in ends if other * size < 0.0)
+        return self._completed(at, min(
+            abs(place - along) for place, other, _ in ends if other * size < 0.0))
+
+    def _completed(self, at: Solution, bracket: float) -> tuple[Solution, float] | None:
+        """A zero with what is stored of it; None where that cannot be found."""
+        try:
+            return with_values(self.problem, at), bracket
+        except FecontactError:
+            return None
 
 
 class _LostError(Exception):
@@ -179,7 +188,7 @@ class _Search:
                 found = corrected(step.problem, guess, step.row, exact, 2 * options.iterations,
                                   exact=True, known=beside.linearisation)
                 if found is not None:
-                    return finished(step.problem, *found, step.row, options)
+                    return finished(step.problem, *found, step.row, options, stored=False)
             except FecontactError:
                 continue
         raise _LostError

@@ -138,6 +138,11 @@ def affine_arrays(field: ContactField, values: Array, index: int) -> AffineArray
     return field._family.affine(values, index)
 
 
+def made_values(field: ContactField, values: Array, index: int) -> list[float]:
+    """Further values of one parameter for which a field has systems already."""
+    return [value for value in field._family.made_for(values, index) if value != values[index]]
+
+
 def contact_field(
     system: ContactSystem, parameters: Mapping[str, Any] | Iterable[str]
 ) -> ContactField:

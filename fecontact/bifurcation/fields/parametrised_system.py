@@ -138,6 +138,13 @@ class ParametrisedSystem:
             self._made.popitem(last=False)
         return made
 
+    def made_for(self, values: Array, index: int) -> list[float]:
+        """Values of one parameter, the others as given, for which there are systems already."""
+        known = [np.frombuffer(key) for key in self._made]
+        others = np.delete(values, index).tolist()
+        return [float(each[index]) for each in known
+                if np.delete(each, index).tolist() == others]
+
     def arrays(self, values: Array) -> SystemArrays:
         """Arrays of the system for the kernels."""
         if self._fixed is not None:

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.fields.contact_field import ContactField, made_values
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
@@ -18,6 +18,8 @@ from fecontact.core.types import Array
 
 # Relative step of differences in a parameter that changes the period.
 _DIFFERENCE = 1e-5
+# Further values of a parameter, as factors, at which the period of the forcing is compared.
+_BESIDE = (0.97, 1.01, 1.043)
 UNREPEATED = ("The internal variables of friction do not come to repeat; take more samples a "
               "period.")
 _NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0))

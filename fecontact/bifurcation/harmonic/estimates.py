@@ -3,7 +3,7 @@
 import numpy as np
 
 from fecontact.bifurcation.harmonic.series import basis_at, uniform_basis
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 
 # Points per harmonic, and at least, among which extremes are looked for.
 _FINE, _LEAST_FINE = 12, 96
@@ -71,33 +71,31 @@ def extremes(whole: Array, z: Array) -> tuple[Array, Array]:
 
     ``whole`` (K, 2 H + 1, d - c) are coefficients, z (K, N, c) the states behind at the samples.
     """
-    H = whole.shape[1] // 2
+    count, L, b = whole.shape
+    H = L // 2
     fine = max(_LEAST_FINE, _FINE * H)
-    x = uniform_basis(fine, H) @ whole
+    series = np.ascontiguousarray(np.moveaxis(whole, 1, 2)).reshape(-1, L)
+    x = series @ uniform_basis(fine, H).T
     found = []
     for sign in (-1.0, 1.0):
-        best, place = _peaks(np.moveaxis(sign * x, 1, 0))
+        best, place = _peaks(sign * x)
         # The series where the parabola has its peak: exact but for the square of its error.
-        there = (basis_at(place.reshape(-1) / fine, H).reshape(*place.shape, -1)
-                 * np.moveaxis(whole, 1, 2)).sum(axis=-1)
-        best = np.maximum(best, sign * there)
+        there = (basis_at(place / fine, H) * series).sum(axis=1)
+        best = np.maximum(best, sign * there).reshape(count, b)
         found.append(sign * np.concatenate([best, (sign * z).max(axis=1)], axis=1))
     return found[0], found[1]
 
 
 def peaks(x: Array) -> tuple[Array, Array]:
-    """Extremes (d,) of samples (N, d) around a period, on parabolas through three of them."""
+    """Extremes (d,) of samples (d, N) around a period, on parabolas through three of them."""
     return -_peaks(-x)[0], _peaks(x)[0]
 
 
 def _peaks(x: Array) -> tuple[Array, Array]:
-    """Largest values (...) of samples (N, ...), and their places counted in samples."""
-    place = x.argmax(axis=0)
-
-    def at(index: Integers) -> Array:
-        return np.take_along_axis(x, index[None], axis=0)[0]
-
-    here, left, right = at(place), at(place - 1), at((place + 1) % len(x))
+    """Largest values (d,) of samples (d, N), and their places counted in samples."""
+    N = x.shape[1]
+    rows, place = np.arange(len(x)), x.argmax(axis=1)
+    here, left, right = x[rows, place], x[rows, place - 1], x[rows, (place + 1) % N]
     bend = left - 2.0 * here + right
     curved = bend < 0.0
     safe = np.where(curved, bend, -1.0)

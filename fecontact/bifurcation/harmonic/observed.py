@@ -64,7 +64,7 @@ def observed_of_orbits(
     observes = moved[..., :m] @ row[:m] + moved[..., m:] @ row[2 * m : m + layout.harmonic]
     if m and row[m : 2 * m].any():
         observes = observes + differentiated(moved[..., :m]) @ row[m : 2 * m] / periods
-    low, high = peaks(uniform_basis(_SAMPLES, H) @ observes)
+    low, high = peaks(observes.T @ uniform_basis(_SAMPLES, H).T)
     harmonics = np.zeros((K, max(H, _HARMONICS) + 1), dtype=complex)
     harmonics[:, 0] = observes[0]
     harmonics[:, 1 : H + 1] = (observes[1::2] - 1j * observes[2::2]).T

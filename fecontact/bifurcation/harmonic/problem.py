@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, Prob
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
+from fecontact.bifurcation.harmonic.compiled.balance import MOST_UNKNOWNS
 from fecontact.bifurcation.harmonic.compiled.evaluation import evaluate
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
@@ -59,9 +60,11 @@ class HarmonicLinearisation(Linearised):
 class CompiledLinearisation(HarmonicLinearisation):
     """The same of forced contact systems, by compiled code."""
 
-    def __init__(self, problem: "HarmonicProblem", u: Array, e: Equations) -> None:
+    def __init__(
+        self, problem: "HarmonicProblem", u: Array, e: Equations, derivatives: bool
+    ) -> None:
         super().__init__(problem, u)
-        self._equations = e
+        self._equations, self._derivatives = e, derivatives
 
     def _evaluated(self, derivatives: bool) -> tuple[Array, ...]:
         """Residual, z and forces at the samples; and derivatives, condensed and in the mean."""
@@ -72,11 +75,14 @@ class CompiledLinearisation(HarmonicLinearisation):
                         mean):
             raise AnalysisError(UNREPEATED)
         found = room.residual.copy(), room.z.copy(), forces
-        return (*found, room.condensed.copy(), mean) if derivatives else found
+        n = len(room.residual)
+        return (*found, room.condensed.reshape(n, n + 1).copy(), mean) if derivatives else found
 
     @cached_property
     def _values(self) -> tuple[Array, ...]:
-        return self._whole if "_whole" in self.__dict__ else self._evaluated(False)
+        if self._derivatives or "_whole" in self.__dict__:
+            return self._whole
+        return self._evaluated(False)
 
     @cached_property
     def _whole(self) -> tuple[Array, ...]:
@@ -128,11 +134,18 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def linearise(self, u: Array) -> HarmonicLinearisation:
         """Residual and linearisation at u, each computed on demand."""
+        return self._about(u, True)
+
+    def evaluate(self, u: Array) -> HarmonicLinearisation:
+        """The same where the residual alone is sure to be asked for."""
+        return self._about(u, False)
+
+    def _about(self, u: Array, derivatives: bool) -> HarmonicLinearisation:
         if self.autonomous and not u[-2] > 0.0:
             raise AnalysisError("The period became negative.")
-        e = self.equations(float(u[-1]))
+        e = self.equations(float(u[-1])) if self.size <= MOST_UNKNOWNS else None
         return (HarmonicLinearisation(self, u) if e is None
-                else CompiledLinearisation(self, u, e))
+                else CompiledLinearisation(self, u, e, derivatives))
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Predictor along the tangent, with the curvature of the last step."""
@@ -205,6 +218,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """
         if kind == "branch point" and self._halves_meet(u, tangent):
             return {"kind": HALVING}
+        if kind == "fold":
+            return {}
         found: dict[str, Any] | None = linearisation.floquet.confirmed(kind)
         return found
 

@@ -7,7 +7,12 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.points import (
+    BranchHeader,
+    BranchPoint,
+    details_of,
+    special_point,
+)
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -355,10 +360,12 @@ def with_observed(
     b = layout.harmonic
     X = np.array([point.u[: (2 * H + 1) * b] for point in branch.points]).reshape(-1, 2 * H + 1, b)
     seen = observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
-    points = [replace(point, values={**point.values, **each})
-              for point, each in zip(branch.points, seen, strict=True)]
     attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
                                   "level_name": level_name or ""}
+    header = BranchHeader(branch.parameter_name, attributes)
+    points = [special_point(point.u, point.tangent, {**point.values, **each}, point.kind,
+                            details_of(point), header)
+              for point, each in zip(branch.points, seen, strict=True)]
     return replace(branch, points=tuple(points), attributes=attributes)
 
 

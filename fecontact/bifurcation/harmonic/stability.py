@@ -1,6 +1,7 @@
 """Floquet multipliers of orbits by harmonic balance."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,9 @@ from fecontact.bifurcation.harmonic.layout import around
 from fecontact.bifurcation.harmonic.memory import LEAK
 from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.linalg.motion_transitions import integrals, motion_transitions
 from fecontact.bifurcation.linalg.transition_matrices import transitions
-from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
+from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of, floquet_of_product
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
 
@@ -26,7 +28,7 @@ _DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE = 4, 3, 20, 4
 # it are then rounding.
 _MANY, _LARGEST = 16, 1e4
 # Largest size of the derivatives of several orbits that are made at once.
-_NUMBERS = 1_000_000
+_NUMBERS = 200_000
 
 
 @cache
@@ -67,8 +69,7 @@ def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
     tau, series = _grid(N, radau, problem.harmonics)
     x = np.concatenate([series @ problem.whole(u, T), around(z, tau)], axis=1)
     t = np.zeros(len(tau)) if problem.autonomous else tau * T
-    f, J, _ = problem.field.derivatives(t, x, problem.parameters(u))
-    return _floquet(problem, T, f, J)
+    return _floquet(problem, T, problem.field.derivatives(t, x, problem.parameters(u))[1])
 
 
 def along_orbits(
@@ -77,15 +78,15 @@ def along_orbits(
     """As :func:`by_transitions` for K forced orbits us (K, n + 1) with zs (K, N, c)."""
     intervals, radau = _intervals(problem)
     tau, series = _grid(intervals, radau, problem.harmonics)
-    d, found = problem.layout.states, []
-    most = max(1, _NUMBERS // (len(tau) * d * d))
+    d = problem.layout.states
+    found: list[Floquet] = []
+    most = min(len(us), max(1, _NUMBERS // (len(tau) * d * d)))
+    J, functions = np.empty((most, len(tau), d, d)), np.ascontiguousarray(series.T)
     for first in range(0, len(us), most):
-        part = slice(first, min(first + most, len(us)))
-        f = np.empty((part.stop - first, len(tau), d))
-        J = np.empty((*f.shape, d))
-        derivatives_along(us[part], zs[part], tau, series, e, f, J)
-        found += [_floquet(problem, problem.period(u), *each)
-                  for u, *each in zip(us[part], f, J, strict=True)]
+        some = us[first : first + most]
+        derivatives_along(some, zs[first : first + most], tau, functions, e, J[: len(some)])
+        found += [_floquet(problem, problem.period(u), each)
+                  for u, each in zip(some, J[: len(some)], strict=True)]
     return found
 
 
@@ -96,41 +97,52 @@ def _intervals(problem: Balance) -> tuple[int, bool]:
     return max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE), False
 
 
-def _floquet(problem: Balance, T: float, f: Array, J: Array) -> Floquet:
-    """Multipliers from rates (P, d) and derivatives (P, d, d) at the collocation points."""
+def _floquet(problem: Balance, T: float, J: Array) -> Floquet:
+    """Multipliers from derivatives (P, d, d) at the collocation points."""
     layout = problem.layout
     N, radau = _intervals(problem)
     points, basis, slopes = _collocation(radau)
+    if layout.displacements and not layout.memory:
+        M = np.empty((N, layout.states, layout.states))
+        motion_transitions(J, T / N, points, *integrals(tuple(points.tolist())), M)
+        return _of_transitions(problem, T, M, J)
     for k in range(layout.states - layout.memory, layout.states):
         J[:, k, k] -= LEAK / T
-    factors, nothing, widths = _room(N, len(points), layout.states)
-    condensation.condense(J, f, nothing, widths, T, basis, slopes, 0, factors)
+    factors, rates, nothing, widths = _room(N, len(points), layout.states)
+    condensation.condense(J, rates, nothing, widths, T, basis, slopes, 0, factors)
     if problem.autonomous or not layout.displacements or layout.states < _MANY:
         return floquet_of(factors, problem.autonomous)
     M = np.empty((N, layout.states, layout.states))
     transitions(factors, M)
+    return _of_transitions(problem, T, M, J)
+
+
+def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
+    """Multipliers from the transition matrices M (N, d, d) of motions."""
+    layout = problem.layout
+    if problem.autonomous or layout.states < _MANY:
+        return floquet_of_product(M, problem.autonomous)
     # Velocities in the scale of displacements, by the stiffness of each coordinate.
     m, scale = layout.displacements, np.ones(layout.states)
     stiffness = -J[:, m : 2 * m, :m].mean(axis=0).diagonal()
     scale[m : 2 * m] = np.sqrt(np.maximum(stiffness, (2.0 * np.pi / T) ** 2))
-    M *= scale / scale[:, None]
-    product, largest = M[0], 0.0
-    for step in M[1:]:
-        product = step @ product
-        largest = max(largest, float(np.abs(product).max()))
-    if not largest < _LARGEST:
-        return floquet_of(factors, False)
-    found = np.asarray(eigvals(product), dtype=np.complex128)
+    products = M * (scale / scale[:, None])
+    for before, step in pairwise(products):
+        step[:] = step @ before
+    if not np.abs(products[1:]).max(initial=0.0) < _LARGEST:
+        return floquet_of_product(M, False)
+    found = np.asarray(eigvals(products[-1]), dtype=np.complex128)
     return Floquet(found[np.argsort(-np.abs(found))], None)
 
 
 @cache
 def _room(
     intervals: int, points: int, states: int
-) -> tuple[condensation.CondensedFactors, Array, Array]:
-    """Room for factors, and what they are made with: no parameters, and widths."""
+) -> tuple[condensation.CondensedFactors, Array, Array, Array]:
+    """Room for factors, and what they are made with: no rates, no parameters, and widths."""
     return (condensation.factors_for(intervals, points, states, 1),
-            np.zeros((intervals * points, states, 1)), np.full(intervals, 1.0 / intervals))
+            np.zeros((intervals * points, states)), np.zeros((intervals * points, states, 1)),
+            np.full(intervals, 1.0 / intervals))
 
 
 def hill_matrix(J: Array, period: float, order: int) -> NDArray[np.complex128]:

@@ -131,6 +131,17 @@ def floquet_of(factors: CondensedFactors, autonomous: bool) -> Floquet:
     d = factors.end.shape[0]
     M = np.empty((len(factors.local), d, d))
     transitions(factors, M)
+    return floquet_of_product(M, autonomous)
+
+
+def floquet_of_product(M: Array, autonomous: bool) -> Floquet:
+    """Floquet multipliers from transition matrices M (N, d, d), which may be overwritten.
+
+    Raises
+    ------
+    AnalysisError
+        As :func:`floquet_of`.
+    """
     try:
         multipliers = eigenvalues_of_product(M)
     except ArithmeticError as error:

@@ -58,7 +58,7 @@ def amplitudes(branch: Branch, row: ArrayLike) -> Array:
 
 def _peaks(moved: Array) -> tuple[float, float]:
     """Extremes of samples over a period, the last of which is the first again."""
-    low, high = peaks(moved[:-1, None])
+    low, high = peaks(moved[None, :-1])
     return float(low[0]), float(high[0])
 
 

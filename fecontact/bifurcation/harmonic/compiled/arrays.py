@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, f8, i8, matrix, vector
+from fecontact.core.compiled import block, f8, i8, integers, matrix, vector
 from fecontact.core.types import Array, Integers
 from fecontact.system.nodes import SYSTEM, SystemArrays
 
@@ -13,8 +13,13 @@ from fecontact.system.nodes import SYSTEM, SystemArrays
 class Room(NamedTuple):
     """Room for the work at one orbit; n unknown coefficients of m modes, N samples, d states.
 
-    ``a`` (n + 1, n + 1) holds the factors, ``along`` (n + 1,) the solution of the equations without
-    right side that has one in the last row.
+    Modes in ``order`` (m,), of which the first ``coupled`` (1,) are solved for together, k
+    coefficients, the others each for itself with the mean stiffness and damping ``alone`` (2, m);
+    ``extent`` (3, m, 2 m) is least, largest and mean derivative of the contact forces.
+    ``square`` and ``condensed`` hold (k, k) and (k, k + 1) derivatives, ``a`` factors of (k + 1,
+    k + 1); ``column`` (n,) is the derivative to the parameter, ``linear`` (2, m, m) are stiffness
+    and damping. ``along`` (n + 1,) is the solution of the equations without right side that has one
+    in the last row.
     """
 
     t: Array
@@ -35,6 +40,12 @@ class Room(NamedTuple):
     condensed: Array
     a: Array
     pivots: Integers
+    order: Integers
+    coupled: Integers
+    alone: Array
+    extent: Array
+    linear: Array
+    column: Array
     residual: Array
     beside: Array
     along: Array
@@ -44,14 +55,19 @@ class Room(NamedTuple):
 class Equations(NamedTuple):
     """Equations of orbits over one parameter p, and how a branch is followed.
 
-    Arrays of ``system`` that depend on p lie in ``flat`` = ``base`` + p ``slope``. ``springs``
-    (c, m) and ``offsets`` (c,) give the deflections to which internal variables return. Numbers are
-    the period times p or 0, the period, least and largest p for which this holds, bounds of the
-    branch, tolerance, largest step, largest turn, Newton's rounding. ``limits`` (m,) bound the
-    scales of the displacements; ``nodes`` have internal variables.
+    Arrays of ``system`` that depend on p lie in ``flat`` = ``base`` + p ``slope``. Where the loads
+    are affine in p at the samples, ``contact`` is the system of the contact forces alone; stiffness
+    and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N, m)
+    at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the whole
+    system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to which
+    internal variables return. Numbers are the period times p or 0, the period, least and largest p
+    for which this holds, whether contact forces do not depend on p and t, bounds of the branch,
+    tolerance, largest step, largest turn, Newton's rounding. ``limits`` (m,) bound the scales of the
+    displacements; ``nodes`` have internal variables.
     """
 
     system: SystemArrays
+    contact: SystemArrays
     flat: Array
     base: Array
     slope: Array
@@ -60,6 +76,9 @@ class Equations(NamedTuple):
     projection: Array
     cosines: Array
     sines: Array
+    body: Array
+    given: Array
+    pulls: Array
     springs: Array
     offsets: Array
     limits: Array
@@ -68,16 +87,17 @@ class Equations(NamedTuple):
     room: Room
 
 
-(TURN, PERIOD, LOW, HIGH, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP, LARGEST_TURN,
- ROUNDING) = range(10)
+(TURN, PERIOD, LOW, HIGH, STEADY, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP, LARGEST_TURN,
+ ROUNDING) = range(11)
 
 _blocks = types.Array(f8, 4, "C")
-_pivots = types.Array(i8, 1, "C")
 ROOM = types.NamedTuple(
-    [vector, matrix, matrix, matrix, matrix, matrix, block, block, block, matrix, block, _blocks,
-     block, block, _blocks, matrix, matrix, _pivots, vector, vector, vector, matrix], Room)
+    [vector, matrix, matrix, matrix, matrix, matrix, block, block, block, matrix, vector, vector,
+     block, block, _blocks, vector, vector, integers, integers, integers, matrix, block,
+     block, *[vector] * 4, matrix], Room)
 EQUATIONS = types.NamedTuple(
-    [SYSTEM, *[vector] * 4, *[matrix] * 5, *[vector] * 3, i8, ROOM], Equations)
+    [SYSTEM, SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, *[vector] * 3, i8, ROOM],
+    Equations)
 
 
 class Reached(NamedTuple):
@@ -99,16 +119,22 @@ class Reached(NamedTuple):
 REACHED = types.NamedTuple([matrix, matrix, block, block, block, matrix, vector], Reached)
 
 
-def room_for(harmonics: int, samples: int, modes: int, memory: int, nodes: int) -> Room:
-    """Room for a system of so many modes and internal variables, on so many nodes."""
+def room_for(
+    harmonics: int, samples: int, modes: int, memory: int, nodes: int, coupled: int
+) -> Room:
+    """Room for a system of so many modes and internal variables, on so many nodes.
+
+    At most ``coupled`` modes are solved for together.
+    """
     L, N, m, c = 2 * harmonics + 1, samples, modes, memory
-    n, d = L * m, 2 * m + c
+    n, d, k = L * m, 2 * m + c, L * coupled
     s = c // nodes if nodes else 0
     return Room(
         np.empty(N), np.empty((N, d)), np.empty((N, d)), np.empty((N, c)), np.empty((N, c)),
         np.empty((N, d)), np.empty((N, d, d)), np.empty((N if c else 0, d, d)),
-        np.empty((2, m, L)), np.empty((2 * m * m, N)), np.empty((4, L, m * m)),
-        np.empty((L, m, L, m)), np.empty((N if c else 0, c, n + 1)),
-        np.empty((N if c else 0, m, n + 1)), np.empty((N, nodes, s, s)), np.empty((n, n + 1)),
-        np.empty((n + 1, n + 1)), np.empty(n + 1, dtype=np.int64), np.empty(n),
-        np.empty(n), np.empty(n + 1), np.empty((6, n + 1)))
+        np.empty((2, m, L)), np.empty((max(m, 2 * coupled**2), N)), np.empty(4 * L * coupled**2),
+        np.empty(k * k), np.empty((N if c else 0, c, n + 1)),
+        np.empty((N if c else 0, m, n + 1)), np.empty((N, nodes, s, s)), np.empty(k * (k + 1)),
+        np.empty((k + 1) ** 2), np.empty(k + 1, dtype=np.int64), np.arange(m),
+        np.array([coupled]), np.empty((2, m)), np.empty((3, m, 2 * m)), np.empty((2, m, m)), np.empty(n), np.empty(n),
+        np.empty(n), np.empty(n + 1), np.empty((10, n + 1)))

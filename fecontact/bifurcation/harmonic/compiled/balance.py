@@ -8,9 +8,18 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
 from fecontact.bifurcation.fields.parametrised_system import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
+from fecontact.core.types import Array
+from fecontact.system.jacobian import batch_rates
+from fecontact.system.nodes import SystemArrays
 
-# Most unknowns for which compiled code without LAPACK is faster.
-_MOST_UNKNOWNS = 160
+# Most unknowns that compiled code without LAPACK solves for together.
+MOST_UNKNOWNS = 160
+# Relative error of loads that are affine in the parameter.
+_AFFINE = 1e-13
+# Arrays of a system that do not act on contact forces.
+_OF_BODY = frozenset({"stiffness", "damping", "modal_damping", "constant_load", "drive_shapes",
+                      "drive_stiffness", "drive_damping", "drive_parameters", "load_shapes",
+                      "load_parameters"})
 
 
 @dataclass(eq=False)
@@ -47,9 +56,11 @@ class CompiledBalance:
     def equations(self, problem: Any, value: float) -> arrays.Equations | None:
         """Equations about a value of the parameter; None where its arrays are not affine in it.
 
-        There is one room for all equations of a size: what is found there has to be copied.
+        There is one room for all equations of a size: what is found there has to be copied. None
+        also for more unknowns with internal variables, or with loads that are not affine.
         """
-        if not 0 < problem.size <= _MOST_UNKNOWNS:
+        small = problem.size <= MOST_UNKNOWNS
+        if not problem.size or not (small or not problem.layout.memory):
             return None
         near, others = self.affine, problem.values.copy()
         others[problem.free] = 0.0
@@ -66,6 +77,8 @@ class CompiledBalance:
         if key not in self.known:
             self.known[key] = self._made(problem, near, value)
         found = self.known[key]
+        if not small and found.contact is found.system:
+            return None
         if found.offsets is not problem.kept.offsets:
             found = self.known[key] = found._replace(offsets=problem.kept.offsets)
         return found
@@ -74,16 +87,71 @@ class CompiledBalance:
         self, problem: Any, near: AffineArrays, value: float
     ) -> arrays.Equations:
         layout, series = problem.layout, problem.series
+        m, L = layout.displacements, 2 * problem.harmonics + 1
         numbers = np.zeros(arrays.ROUNDING + 1)
         if problem.turn is not None:
             numbers[arrays.TURN] = problem.periods * problem.turn
         else:
             numbers[arrays.PERIOD] = problem.period(np.array([value]))
         numbers[arrays.LOW], numbers[arrays.HIGH] = near.low, near.high
-        room = arrays.room_for(problem.harmonics, problem.samples, layout.displacements,
-                                layout.memory, layout.nodes)
+        most = m if problem.size <= MOST_UNKNOWNS else max(1, MOST_UNKNOWNS // L)
+        room = arrays.room_for(problem.harmonics, problem.samples, m, layout.memory, layout.nodes,
+                               most)
+        system, contact = near.arrays, near.arrays
+        body, given = np.zeros((4, m, m)), np.zeros((2, problem.samples, m))
+        found = self._without_contact(problem, near)
+        if found is not None:
+            contact = _contact_alone(system)
+            body, given = found
+            numbers[arrays.STEADY] = self._steady(near)
         return arrays.Equations(
-            near.arrays, near.flat, near.base, near.slope, series.times, series.values,
-            series.projection, series.cosines, series.sines, problem.kept.rows,
-            problem.kept.offsets, np.full(layout.displacements, np.inf), numbers, layout.nodes,
-            room)
+            system, contact, near.flat, near.base, near.slope, series.times, series.values,
+            series.projection, series.cosines, series.sines, body, given,
+            series.projection @ given, problem.kept.rows, problem.kept.offsets, np.full(m, np.inf),
+            numbers, layout.nodes, room)
+
+    def _without_contact(self, problem: Any, near: AffineArrays) -> tuple[Array, Array] | None:
+        """``body`` and ``given`` of the equations; None where loads are not affine."""
+        system, m = near.arrays, problem.layout.displacements
+        bare = system._replace(Tx=np.zeros_like(system.Tx), Ty=np.zeros_like(system.Ty),
+                               T2=np.zeros_like(system.T2))
+        places = near.low + (near.high - near.low) * np.array([0.02, 0.98, 0.31, 0.73])
+        loads, matrices = [], []
+        x = np.zeros((problem.samples, problem.layout.states))
+        for value in places:
+            near.flat[:] = near.base + value * near.slope
+            f = np.empty_like(x)
+            batch_rates(problem.series.times * problem.period(np.array([value])), x, bare, f)
+            loads.append(f[:, m : 2 * m].copy())
+            matrices.append(np.stack([system.stiffness, system.damping]))
+        given = np.stack(_affine(places, loads))
+        if any(np.abs(given[0] + value * given[1] - load).max()
+               > _AFFINE * np.abs(given).max() * max(1.0, abs(value))
+               for value, load in zip(places, loads, strict=True)):
+            return None
+        return np.concatenate(_affine(places, matrices)), given
+
+    def _steady(self, near: AffineArrays) -> bool:
+        """Whether contact forces depend neither on the parameter nor on time."""
+        ground = self.contact_field.system().ground
+        return not ground.wavy and ground.friction_variation is None and not any(
+            np.shares_memory(array, near.flat)
+            for name, array in near.arrays._asdict().items()
+            if isinstance(array, np.ndarray) and name not in _OF_BODY)
+
+
+def _affine(places: Array, found: list[Array]) -> tuple[Array, Array]:
+    """Value at zero and slope from the first two of arrays at places."""
+    slope = (found[1] - found[0]) / (places[1] - places[0])
+    return found[0] - places[0] * slope, slope
+
+
+def _contact_alone(system: SystemArrays) -> SystemArrays:
+    """Arrays of a system without all that acts on its body beside contact."""
+    return system._replace(
+        stiffness=np.zeros_like(system.stiffness), damping=np.zeros_like(system.damping),
+        constant_load=np.zeros_like(system.constant_load),
+        drive_shapes=system.drive_shapes[:0], drive_stiffness=system.drive_stiffness[:0],
+        drive_damping=system.drive_damping[:0], drive_parameters=system.drive_parameters[:0],
+        drive=system.drive[:0], load_shapes=system.load_shapes[:0],
+        load_parameters=system.load_parameters[:0], load=system.load[:0])

@@ -1,6 +1,7 @@
 """Residual of harmonic balance of a contact system and its derivatives, in compiled code.
 
-The equations are those of :class:`fecontact.bifurcation.harmonic.balance.Balance`.
+The equations are those of :class:`fecontact.bifurcation.harmonic.balance.Balance`. What is linear
+is taken harmonic by harmonic, contact forces at the samples.
 """
 
 import math
@@ -8,7 +9,7 @@ import math
 import numpy as np
 from numba import types
 
-from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, PERIOD, TURN
+from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, PERIOD, STEADY, TURN
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
 from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, routine, vector
@@ -27,28 +28,40 @@ def take_parameter(p, e):
     T = e.numbers[TURN] / p if e.numbers[TURN] != 0.0 else e.numbers[PERIOD]
     for k in range(len(e.tau)):
         e.room.t[k] = e.tau[k] * T
+    linear = e.room.linear
+    for part in range(2):
+        for i in range(linear.shape[1]):
+            for j in range(linear.shape[1]):
+                linear[part, i, j] = e.body[part, i, j] + p * e.body[2 + part, i, j]
     return T
+
+
+@helper
+def speed_coefficient(u, k, j, m, T):
+    """Coefficient k of velocity j from the coefficients u of the displacements."""
+    turn = 2.0 * math.pi * ((k + 1) // 2) / T
+    if k == 0:
+        return 0.0
+    return turn * u[(k + 1) * m + j] if k % 2 == 1 else -turn * u[(k - 1) * m + j]
 
 
 @helper
 def take_states(u, T, e, x):
     """Fill displacements and velocities of the states (N, d) at the samples."""
-    X = e.room.coefficients
-    m, L = X.shape[1], X.shape[2]
-    for j in range(m):
-        X[0, j, 0], X[1, j, 0] = u[j], 0.0
-        for k in range(1, L // 2 + 1):
-            turn = 2.0 * math.pi * k / T
-            c, s = u[(2 * k - 1) * m + j], u[2 * k * m + j]
-            X[0, j, 2 * k - 1], X[0, j, 2 * k] = c, s
-            X[1, j, 2 * k - 1], X[1, j, 2 * k] = turn * s, -turn * c
-    for n in range(len(x)):
-        for part in range(2):
-            for j in range(m):
-                total = 0.0
-                for k in range(L):
-                    total += e.values[n, k] * X[part, j, k]
-                x[n, part * m + j] = total
+    X, row = e.room.coefficients, e.room.rows[0]
+    m, L, N = X.shape[1], X.shape[2], len(x)
+    for part in range(2):
+        for j in range(m):
+            for n in range(N):
+                row[n] = 0.0
+            for k in range(L):
+                X[part, j, k] = u[k * m + j] if part == 0 else speed_coefficient(u, k, j, m, T)
+                # The rows of the projection are those of the series, but for their size.
+                size = X[part, j, k] * (N if k == 0 else 0.5 * N)
+                for n in range(N):
+                    row[n] += size * e.projection[k, n]
+            for n in range(N):
+                x[n, part * m + j] = row[n]
 
 
 @helper
@@ -69,20 +82,27 @@ def _take_differences(T, e):
 
 
 @helper
-def _balance(u, T, f, e, out):
-    """Fill out (n,) with the harmonics of q'' - f."""
+def balance(u, T, f, loads, e, out):
+    """Fill out (n,) with the harmonics of q'' - f; f at the samples without what is linear.
+
+    ``loads`` is the factor of the loads.
+    """
     m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
-    rows = e.room.rows
+    rows, linear, p = e.room.rows, e.room.linear, u[len(u) - 1]
     for j in range(m):
         for n in range(N):
             rows[j, n] = f[n, m + j]
     for k in range(L):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
-            total = 0.0
+            total = loads * (e.pulls[0, k, j] + p * e.pulls[1, k, j])
             for n in range(N):
                 total += e.projection[k, n] * rows[j, n]
             out[k * m + j] = -turn * turn * u[k * m + j] - total
+        for i in range(m):
+            place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
+            for j in range(m):
+                out[k * m + j] += linear[0, i, j] * place + linear[1, i, j] * speed
 
 
 @routine
@@ -100,47 +120,100 @@ def evaluate_at(u, derivatives, e):
         for n in range(len(room.t)):
             for i in range(c):
                 room.y[n, 2 * m + i] = 0.0
-        if march(room.t, room.y, e.system, T, room.target, room.z) == 0:
+        if march(room.t, room.y, e.contact, T, room.target, room.z) == 0:
             return 0.0
         for n in range(len(room.t)):
             for i in range(c):
                 room.x[n, 2 * m + i] = room.z[n, i]
                 room.y[n, 2 * m + i] = room.z[n, i]
     if derivatives:
-        batch_derivatives(room.t, room.x, e.system, e.system, 0.0, room.f, room.J,
+        batch_derivatives(room.t, room.x, e.contact, e.contact, 0.0, room.f, room.J,
                           np.empty((0, 0)))
     else:
-        batch_rates(room.t, room.x, e.system, room.f)
-    _balance(u, T, room.f, e, room.residual)
+        batch_rates(room.t, room.x, e.contact, room.f)
+    balance(u, T, room.f, 1.0, e, room.residual)
     return T
 
 
 @helper
-def _harmonics_of_derivatives(T, e):
-    """Fill the derivatives of the balance to the coefficients, z held."""
+def _harmonics_of_derivatives(T, s, e):
+    """Fill the derivatives of the balance of s coupled modes to their coefficients, z held."""
     room = e.room
     m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
+    spectra = room.spectra[: 4 * L * s * s].reshape((4, L, s * s))
+    square = room.square[: L * s * L * s].reshape((L, s, L, s))
     for part in range(2):
+        for i in range(s):
+            for j in range(s):
+                row = room.rows[(part * s + i) * s + j]
+                least, most = np.inf, -np.inf
+                for n in range(N):
+                    value = room.J[n, m + room.order[i], part * m + room.order[j]]
+                    row[n] = value
+                    least, most = min(least, value), max(most, value)
+                p = i * s + j
+                spectra[2 * part, 0, p], spectra[2 * part + 1, 0, p] = 2.0 * most, 0.0
+                for k in range(L):
+                    c, w = 0.0, 0.0
+                    if least != most:
+                        for n in range(N):
+                            c += e.cosines[k, n] * row[n]
+                            w += e.sines[k, n] * row[n]
+                    if k > 0 or least != most:
+                        spectra[2 * part, k, p], spectra[2 * part + 1, k, p] = c, w
+    fill_blocks(spectra[0], spectra[1], spectra[2], spectra[3], T, s, s, square)
+    for k in range(L):
+        turn = 2.0 * math.pi * ((k + 1) // 2) / T
+        for i in range(s):
+            for j in range(s):
+                a, b = room.order[i], room.order[j]
+                square[k, i, k, j] += room.linear[0, a, b]
+                if k % 2 == 1:
+                    square[k, i, k + 1, j] += turn * room.linear[1, a, b]
+                    square[k + 1, i, k, j] -= turn * room.linear[1, a, b]
+
+
+@helper
+def _by_parameter(u, T, e):
+    """As :func:`_beside` where contact forces depend on the parameter through speeds alone."""
+    room = e.room
+    p, m, L = u[len(u) - 1], e.springs.shape[1], e.values.shape[1]
+    N, c = len(e.tau), len(e.offsets)
+    # Relative change of the period; that of speeds is the opposite.
+    rise = -1.0 / p if e.numbers[TURN] != 0.0 else 0.0
+    for j in range(m):
+        row = room.rows[j]
+        for n in range(N):
+            total = 0.0
+            for i in range(m):
+                total -= room.J[n, m + j, m + i] * room.x[n, m + i]
+            row[n] = rise * total
+    for k in range(L):
+        turn = 2.0 * math.pi * ((k + 1) // 2) / T
+        for j in range(m):
+            total = e.pulls[1, k, j]
+            for n in range(N):
+                total += e.projection[k, n] * room.rows[j, n]
+            room.column[k * m + j] = 2.0 * rise * turn * turn * u[k * m + j] - total
         for i in range(m):
+            place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
             for j in range(m):
-                row = room.rows[(part * m + i) * m + j]
-                for n in range(N):
-                    row[n] = room.J[n, m + i, part * m + j]
-        for k in range(L):
-            for p in range(m * m):
-                row = room.rows[part * m * m + p]
-                c, s = 0.0, 0.0
-                for n in range(N):
-                    c += e.cosines[k, n] * row[n]
-                    s += e.sines[k, n] * row[n]
-                room.spectra[2 * part, k, p], room.spectra[2 * part + 1, k, p] = c, s
-    fill_blocks(room.spectra[0], room.spectra[1], room.spectra[2], room.spectra[3], T, m, m,
-                room.square)
+                room.column[k * m + j] += (e.body[2, i, j] * place + e.body[3, i, j] * speed
+                                           - rise * room.linear[1, i, j] * speed)
+    rate = N / T
+    for k in range(N):
+        for i in range(c):
+            total = (LEAK / T * (room.z[k, i] - room.target[k, i])
+                     + rate * (1.5 * room.z[k, i] - 2.0 * room.z[k - 1, i]
+                               + 0.5 * room.z[k - 2, i]))
+            for j in range(m):
+                total -= room.J_marched[k, 2 * m + i, m + j] * room.y[k, m + j]
+            room.followed[k, i, len(u) - 1] = rise * total
 
 
 @helper
 def _beside(u, central, e, followed):
-    """Fill the last columns of ``condensed``, and of ``followed``, by differences; z held."""
+    """Fill ``column``, and the last columns of ``followed``, by differences; z held."""
     room = e.room
     n, p = len(room.residual), u[len(u) - 1]
     m, c, N = e.springs.shape[1], len(e.offsets), len(e.tau)
@@ -148,18 +221,22 @@ def _beside(u, central, e, followed):
     # Without a second side what is marched meets its equations.
     width = 2.0 * h if central else h
     for k in range(n):
-        room.condensed[k, n] = 0.0 if central else -room.residual[k] / h
+        room.column[k] = 0.0 if central else -room.residual[k] / h
+    there = room.vectors[7]
+    for k in range(n):
+        there[k] = u[k]
     for side in range(2 if central else 1):
         sign = 1.0 if side == 0 else -1.0
-        T = take_parameter(p + sign * h, e)
-        take_states(u, T, e, room.x)
-        batch_rates(room.t, room.x, e.system, room.f)
-        _balance(u, T, room.f, e, room.beside)
+        there[n] = p + sign * h
+        T = take_parameter(there[n], e)
+        take_states(there, T, e, room.x)
+        batch_rates(room.t, room.x, e.contact, room.f)
+        balance(there, T, room.f, 1.0, e, room.beside)
         for k in range(n):
-            room.condensed[k, n] += sign * room.beside[k] / width
+            room.column[k] += sign * room.beside[k] / width
         if c > 0:
             _take_differences(T, e)
-            batch_rates(room.t, room.y, e.system, room.f)
+            batch_rates(room.t, room.y, e.contact, room.f)
             rate = N / T
             for k in range(N):
                 for i in range(c):
@@ -168,19 +245,21 @@ def _beside(u, central, e, followed):
                                      + 0.5 * room.z[k - 2, i]))
                     followed[k, i, n] = (sign * off / width
                                          + (followed[k, i, n] if side > 0 else 0.0))
+    take_parameter(p, e)
 
 
 @helper
 def _add_memory(T, e):
-    """Add what internal variables contribute to ``condensed``; ``followed`` holds its last column.
+    """Add what internal variables contribute to ``condensed`` (n, n + 1) and ``column``.
 
-    ``J_marched`` holds the derivatives at the states in which they were marched.
+    ``followed`` holds its last column, ``J_marched`` holds the derivatives at the states in which they were marched.
     """
     room = e.room
     m, L, N, c = e.springs.shape[1], e.values.shape[1], len(e.tau), len(e.offsets)
     n, rate = L * m, N / T
     s = c // e.nodes
     followed, J = room.followed, room.J_marched
+    square = room.square.reshape((n, n))
     for k in range(N):
         for i in range(c):
             node = i // s
@@ -207,27 +286,66 @@ def _add_memory(T, e):
         for k in range(N):
             part = e.projection[q, k]
             for j in range(m):
-                for column in range(n + 1):
-                    room.condensed[q * m + j, column] -= part * room.forces[k, j, column]
+                for column in range(n):
+                    square[q * m + j, column] -= part * room.forces[k, j, column]
+                room.column[q * m + j] -= part * room.forces[k, j, n]
 
 
 @routine
 def condense(u, T, central, e):
-    """Fill ``condensed``, the derivatives of the residual that was evaluated at u."""
+    """Fill ``condensed`` and ``column``, the derivatives of the residual evaluated at u."""
     room = e.room
-    n, c = len(room.residual), len(e.offsets)
-    _harmonics_of_derivatives(T, e)
-    square = room.square.reshape((n, n))
-    for i in range(n):
-        for j in range(n):
-            room.condensed[i, j] = square[i, j]
+    c, s = len(e.offsets), room.coupled[0]
+    m, L = e.springs.shape[1], e.values.shape[1]
+    k = L * s
+    _harmonics_of_derivatives(T, s, e)
     if c > 0:
-        batch_derivatives(room.t, room.y, e.system, e.system, 0.0, room.f, room.J_marched,
+        batch_derivatives(room.t, room.y, e.contact, e.contact, 0.0, room.f, room.J_marched,
                           np.empty((0, 0)))
-    _beside(u, central, e, room.followed)
-    take_parameter(u[n], e)
+    if e.numbers[STEADY] != 0.0:
+        _by_parameter(u, T, e)
+    else:
+        _beside(u, central, e, room.followed)
     if c > 0:
         _add_memory(T, e)
+    condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
+    square = room.square[: k * k].reshape((k, k))
+    for i in range(k):
+        for j in range(k):
+            condensed[i, j] = square[i, j]
+        condensed[i, k] = room.column[(i // s) * m + room.order[i % s]]
+
+
+@helper
+def take_forces(p, e, forces):
+    """Fill forces (N, m) with the accelerations at the samples that were evaluated last."""
+    room = e.room
+    m, N = e.springs.shape[1], len(e.tau)
+    for n in range(N):
+        for j in range(m):
+            forces[n, j] = room.f[n, m + j] + e.given[0, n, j] + p * e.given[1, n, j]
+        for i in range(m):
+            place, speed = room.x[n, i], room.x[n, m + i]
+            for j in range(m):
+                forces[n, j] -= room.linear[0, i, j] * place + room.linear[1, i, j] * speed
+
+
+@helper
+def take_mean(e, mean):
+    """Fill the mean derivatives (m, 2 m) of the accelerations to q and q'."""
+    room = e.room
+    m, N = e.springs.shape[1], len(e.tau)
+    for i in range(m):
+        for j in range(2 * m):
+            mean[i, j] = 0.0
+    for n in range(N):
+        for i in range(m):
+            for j in range(2 * m):
+                mean[i, j] += room.J[n, m + i, j] / N
+    for i in range(m):
+        for j in range(m):
+            mean[i, j] -= room.linear[0, i, j]
+            mean[i, m + j] -= room.linear[1, i, j]
 
 
 @kernel(i8(vector, i8, EQUATIONS, matrix, matrix))
@@ -238,52 +356,61 @@ def evaluate(u, derivatives, e, forces, mean):
     q'. Returns 0 where internal variables do not come to repeat, else 1.
     """
     u, e, forces, mean = borrowed(u), borrowed(e), borrowed(forces), borrowed(mean)
-    room = e.room
-    m, N = e.springs.shape[1], len(e.tau)
     T = evaluate_at(u, derivatives != 0, e)
     if not T > 0.0:
         return 0
-    for n in range(N):
-        for j in range(m):
-            forces[n, j] = room.f[n, m + j]
+    take_forces(u[len(u) - 1], e, forces)
     if derivatives != 0:
-        for i in range(m):
-            for j in range(2 * m):
-                total = 0.0
-                for n in range(N):
-                    total += room.J[n, m + i, j]
-                mean[i, j] = total / N
+        take_mean(e, mean)
         condense(u, T, True, e)
     return 1
 
 
-@kernel(types.void(matrix, block, vector, matrix, EQUATIONS, block, types.Array(f8, 4, "C")))
-def derivatives_along(us, zs, tau, values, e, f, J):
-    """Fill f (K, P, d) and J (K, P, d, d) at times tau (P,) of K orbits; values (P, 2 H + 1) there.
+@helper
+def _take_coefficients(u, T, X):
+    """Fill X (2, m, 2 H + 1) with the coefficients of displacements and velocities."""
+    m = X.shape[1]
+    for j in range(m):
+        for k in range(X.shape[2]):
+            X[0, j, k], X[1, j, k] = u[k * m + j], speed_coefficient(u, k, j, m, T)
 
-    Internal variables zs (K, N, c) are linear between the samples.
+
+@kernel(types.void(matrix, block, vector, matrix, EQUATIONS, types.Array(f8, 4, "C")))
+def derivatives_along(us, zs, tau, series, e, J):
+    """Fill J (K, P, d, d) with the derivatives of the rates at times tau (P,) of K orbits.
+
+    ``series`` (2 H + 1, P) holds the functions of the series there. Internal variables zs
+    (K, N, c) are linear between the samples.
     """
-    us, zs, e, f, J = borrowed(us), borrowed(zs), borrowed(e), borrowed(f), borrowed(J)
+    us, zs, series, e, J = borrowed(us), borrowed(zs), borrowed(series), borrowed(e), borrowed(J)
     m, N, c = e.springs.shape[1], zs.shape[1], zs.shape[2]
-    X = e.room.coefficients
+    X, linear = e.room.coefficients, e.room.linear
     L = X.shape[2]
     P = len(tau)
-    t, x = np.empty(P), np.empty((P, 2 * m + c))
+    t, x, f, row = np.empty(P), np.empty((P, 2 * m + c)), np.empty((P, 2 * m + c)), np.empty(P)
     for k in range(len(us)):
         T = take_parameter(us[k, us.shape[1] - 1], e)
-        take_states(us[k], T, e, e.room.x)
+        _take_coefficients(us[k], T, X)
+        for part in range(2):
+            for j in range(m):
+                for p in range(P):
+                    row[p] = 0.0
+                for i in range(L):
+                    for p in range(P):
+                        row[p] += X[part, j, i] * series[i, p]
+                for p in range(P):
+                    x[p, part * m + j] = row[p]
         for p in range(P):
             t[p] = tau[p] * T
-            for part in range(2):
-                for j in range(m):
-                    total = 0.0
-                    for i in range(L):
-                        total += values[p, i] * X[part, j, i]
-                    x[p, part * m + j] = total
             place = tau[p] * N
             first = int(place)
             part_of = place - first
             for i in range(c):
                 x[p, 2 * m + i] = ((1.0 - part_of) * zs[k, first % N, i]
                                    + part_of * zs[k, (first + 1) % N, i])
-        batch_derivatives(t, x, e.system, e.system, 0.0, f[k], J[k], np.empty((0, 0)))
+        batch_derivatives(t, x, e.contact, e.contact, 0.0, f, J[k], np.empty((0, 0)))
+        for p in range(P):
+            for i in range(m):
+                for j in range(m):
+                    J[k, p, m + i, j] -= linear[0, i, j]
+                    J[k, p, m + i, m + j] -= linear[1, i, j]

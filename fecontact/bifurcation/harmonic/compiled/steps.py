@@ -23,9 +23,20 @@ from fecontact.bifurcation.harmonic.compiled.arrays import (
     ROUNDING,
     TOLERANCE,
 )
-from fecontact.bifurcation.harmonic.compiled.evaluation import condense, evaluate_at
+from fecontact.bifurcation.harmonic.compiled.evaluation import (
+    condense,
+    evaluate_at,
+    take_forces,
+    take_mean,
+)
+from fecontact.bifurcation.harmonic.compiled.linear_systems import (
+    choose_coupled,
+    factorise_with,
+    inner,
+    length,
+    solve_with,
+)
 from fecontact.core.compiled import helper, i8, kernel, routine, vector
-from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.references import borrowed
 
 # Newton steps before a step fails, and largest factor by which a step with kept factors may leave
@@ -40,55 +51,26 @@ _OVERSHOOT = 1.2
 # Growth of an orbit from which its scales follow.
 _GROWN = 1.5
 
+# Relative errors of tangents and of Newton steps where they are found by iteration.
+_TANGENT, _INEXACT = 1e-9, 1e-4
+
 # Why a call ended: as many points as were asked for, something to look at in the next step, a step
-# that fails.
-FULL, EVENT, FAILED = range(3)
-
-
-@helper
-def _factorise(row, e):
-    """Factorise ``condensed`` with a further row (n + 1,)."""
-    room = e.room
-    n = len(room.residual)
-    for i in range(n):
-        for j in range(n + 1):
-            room.a[i, j] = room.condensed[i, j]
-    for j in range(n + 1):
-        room.a[n, j] = row[j]
-        room.along[j] = 0.0
-    room.along[n] = 1.0
-    factorise(room.a, n + 1, room.pivots)
-    solve(room.a, room.pivots, room.along)
-
-
-@helper
-def _inner(a, b):
-    total = 0.0
-    for k in range(len(a)):
-        total += a[k] * b[k]
-    return total
-
-
-@helper
-def _length(weights, a):
-    total = 0.0
-    for k in range(len(a)):
-        total += weights[k] * a[k] * a[k]
-    return math.sqrt(total)
+# that fails, modes that cannot be separated.
+FULL, EVENT, FAILED, COUPLED = range(4)
 
 
 @routine
 def _corrected(u, guess, row, weights, e):
     """Newton's method from u = guess at right angles to a row.
 
-    Returns how often factors were made; zero where it fails.
+    Returns how often factors were made; zero where it fails, -1 where the modes cannot be separated.
     """
     room = e.room
     n = len(room.residual)
     tolerance = e.numbers[TOLERANCE]
     change = room.vectors[0]
-    scale = 1.0 + _length(weights, guess)
-    before, made, fresh = np.inf, 0, True
+    scale = 1.0 + length(weights, guess)
+    before, made, fresh, made_at = np.inf, 0, True, 0.0
     for count in range(1, _STEPS + 1):
         T = evaluate_at(u, fresh, e)
         if not T > 0.0:
@@ -100,11 +82,19 @@ def _corrected(u, guess, row, weights, e):
             off += row[k] * (u[k] - guess[k])
         change[n] = -off
         if fresh:
+            if len(room.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
+                return -1
             condense(u, T, False, e)
-            _factorise(row, e)
-            made += 1
-        solve(room.a, room.pivots, change)
-        size = _length(weights, change)
+            factorise_with(row, T, e)
+            made, made_at = made + 1, T
+            for k in range(n):
+                room.along[k] = 0.0
+            room.along[n] = 1.0
+            if solve_with(row, weights, T, _TANGENT, e, room.along) == 0:
+                return -1
+        if solve_with(row, weights, made_at, _INEXACT, e, change) == 0:
+            return -1
+        size = length(weights, change)
         if count > 1 and size > before and before <= e.numbers[ROUNDING] * scale:
             return made
         if not size < np.inf or (count > 1 and size > before):
@@ -154,21 +144,13 @@ def _grow(u, scales, e):
 @helper
 def _keep(count, u, tangent, e, out):
     """Store a point with what its values are made from."""
-    room = e.room
-    m, N, c = e.springs.shape[1], len(e.tau), len(e.offsets)
     out.u[count, :] = u
     out.tangent[count, :] = tangent
-    for n in range(N):
-        for i in range(c):
-            out.z[count, n, i] = room.z[n, i]
-        for j in range(m):
-            out.forces[count, n, j] = room.f[n, m + j]
-    for i in range(m):
-        for j in range(2 * m):
-            total = 0.0
-            for n in range(N):
-                total += room.J[n, m + i, j]
-            out.mean[count, i, j] = total / N
+    for n in range(len(e.tau)):
+        for i in range(len(e.offsets)):
+            out.z[count, n, i] = e.room.z[n, i]
+    take_forces(u[len(u) - 1], e, out.forces[count])
+    take_mean(e, out.mean[count])
 
 
 @kernel(i8(vector, vector, vector, vector, EQUATIONS, REACHED, vector))
@@ -196,7 +178,7 @@ def steps(u, tangent, bend, scales, e, out, why):
         if slope != 0.0:
             step = min(step, _OVERSHOOT * (bound - u[n]) / slope)
         aside = 0.5 * step * step
-        if aside * _length(weights, bend) > _MOST_BENT * step:
+        if aside * length(weights, bend) > _MOST_BENT * step:
             aside = 0.0
         for k in range(n + 1):
             guess[k] = u[k] + step * tangent[k] + aside * bend[k]
@@ -205,14 +187,17 @@ def steps(u, tangent, bend, scales, e, out, why):
             why[0] = EVENT
             break
         made = _corrected(there, guess, row, weights, e)
-        size = _length(weights, room.along)
+        if made < 0:
+            why[0] = COUPLED
+            break
+        size = length(weights, room.along)
         failed = made == 0 or not 0.0 < size < np.inf
         turned = False
         if not failed:
             for k in range(n + 1):
                 chord[k] = there[k] - u[k]
-            aligned = _inner(row, room.along) / size
-            ahead = _inner(row, chord) / _length(weights, chord)
+            aligned = inner(row, room.along) / size
+            ahead = inner(row, chord) / length(weights, chord)
             cosine = math.cos(e.numbers[LARGEST_TURN])
             if min(aligned, ahead) < cosine:
                 # At a corner the turn stays the same over shorter steps.
@@ -231,10 +216,10 @@ def steps(u, tangent, bend, scales, e, out, why):
             or there[n] >= e.numbers[LAST_BOUND]):
             why[0] = EVENT
             break
-        length = _inner(row, chord)
+        way = inner(row, chord)
         for k in range(n + 1):
             new = room.along[k] / size
-            bend[k] = (new - tangent[k]) / length if last_turn == 0.0 else 0.0
+            bend[k] = (new - tangent[k]) / way if last_turn == 0.0 else 0.0
             tangent[k], u[k] = new, there[k]
         _keep(count, u, tangent, e, out)
         factor = 2.0 if made == 1 else (1.5 if made == 2 else 0.7)
@@ -245,7 +230,7 @@ def steps(u, tangent, bend, scales, e, out, why):
         halvings, last_turn, alike = 0, 0.0, 0
         if _grow(u, scales, e):
             _set_weights(scales, H, weights)
-            size = _length(weights, tangent)
+            size = length(weights, tangent)
             for k in range(n + 1):
                 tangent[k] /= size
                 bend[k] = 0.0

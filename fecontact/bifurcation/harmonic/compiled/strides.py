@@ -13,7 +13,7 @@ from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Stride
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.compiled import arrays
-from fecontact.bifurcation.harmonic.compiled.steps import steps
+from fecontact.bifurcation.harmonic.compiled.steps import COUPLED, steps
 from fecontact.bifurcation.harmonic.series import differentiated
 from fecontact.bifurcation.harmonic.stability import along_orbits
 from fecontact.bifurcation.orbits.floquet import Floquet
@@ -22,6 +22,10 @@ from fecontact.core.types import Array
 
 # Points in the first and in later calls, and numbers that a call may return.
 _FIRST, _LATER, _NUMBERS = 8, 64, 4_000_000
+# Without stability folds alone end a call, and compiled code sees these itself.
+_WITHOUT_STABILITY = 256
+# Steps that are made one by one where modes cannot be separated, before compiled code is tried.
+_APART = 10
 
 
 @dataclass(eq=False)
@@ -34,10 +38,13 @@ class Strides:
         Of the branch.
     count : int
         Points in the next call.
+    waits : int
+        Calls from now on that make no steps.
     """
 
     options: ContinuationOptions
     count: int = _FIRST
+    waits: int = 0
 
     @classmethod
     def of(cls, problem: Any, options: ContinuationOptions) -> "Strides | None":
@@ -51,6 +58,9 @@ class Strides:
         self, problem: Any, here: Solution, step: float, most: int, start: Solution
     ) -> Stride | None:
         """Plain steps from a solution; see :class:`Stride`. None where there are none."""
+        if self.waits > 0:
+            self.waits -= 1
+            return None
         e = problem.equations(float(here.u[-1]))
         if e is None:
             return None
@@ -73,6 +83,7 @@ class Strides:
         bend = np.zeros(n) if problem.bend is None else problem.bend.copy()
         scales = np.append(problem.scales[:m], problem.scales[-1])
         made = steps(here.u.copy(), here.tangent.copy(), bend, scales, e, out, why)
+        self.waits = _APART if why[0] == COUPLED else 0
         if made == 0:
             return None
         return self._seen(problem, here, made, out, e, start)
@@ -100,7 +111,8 @@ class Strides:
         lengths = (weights * directions * (u - before)).sum(axis=1) / np.sqrt(
             (weights * directions**2).sum(axis=1))
         whole = self._eventless(problem, here, values, tests, start, u, weights, lengths)
-        self.count = _LATER if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
+        later = _LATER if problem.stability is not None else _WITHOUT_STABILITY
+        self.count = later if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
         # The last tangent is made exact: what lies behind it relies on its signs.
         while whole > 0 and not self._made_exact(problem, u[whole - 1], weights[whole - 1],
                                                  tangents[whole - 1]):

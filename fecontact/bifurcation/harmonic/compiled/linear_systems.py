@@ -1,0 +1,212 @@
+"""Linear systems of compiled steps, with the modes that contact couples over the harmonics.
+
+Modes far above the harmonics follow their loads almost statically, and contact is soft beside their
+stiffness: their coefficients are solved for each by itself, with the mean derivatives, the others
+together. What that neglects is made good by iteration with all derivatives at the samples.
+"""
+
+import math
+
+from fecontact.bifurcation.harmonic.compiled.evaluation import balance, take_states
+from fecontact.core.compiled import helper, routine
+from fecontact.core.dense_lu import factorise, solve
+
+# Coupling of a mode, relative to its own stiffness, from which it is solved for with the others,
+# and the one up to which it may be left.
+_COUPLED, _LEFT = 0.01, 0.2
+# Iterations of a solution.
+_ROUNDS = 40
+
+
+@helper
+def inner(a, b):
+    """Sum a b."""
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total
+
+
+@helper
+def length(weights, a):
+    """Square root of sum w a a."""
+    total = 0.0
+    for k in range(len(a)):
+        total += weights[k] * a[k] * a[k]
+    return math.sqrt(total)
+
+
+@routine
+def choose_coupled(T, e):
+    """Order the modes by how much they are coupled, and fill what is left ``alone``.
+
+    Derivatives at the samples are those evaluated last. As many modes are coupled as there is room
+    for; returns 0 if that leaves more than it may, else 1.
+    """
+    room = e.room
+    most = int(math.sqrt(float(len(room.a)))) // e.values.shape[1]
+    m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
+    linear, coupling, extent = room.linear, room.beside, room.extent
+    fastest = 2.0 * math.pi * (L // 2) / T
+    for i in range(m):
+        for j in range(2 * m):
+            extent[0, i, j], extent[1, i, j], extent[2, i, j] = math.inf, -math.inf, 0.0
+    for n in range(N):
+        for i in range(m):
+            for j in range(2 * m):
+                value = room.J[n, m + i, j]
+                extent[0, i, j] = min(extent[0, i, j], value)
+                extent[1, i, j] = max(extent[1, i, j], value)
+                extent[2, i, j] += value / N
+    for i in range(m):
+        total = 0.0
+        for part in range(2):
+            for j in range(m):
+                k = part * m + j
+                spread = extent[1, i, k] - extent[0, i, k]
+                fixed = linear[part, i, j] - extent[2, i, k]
+                if j == i:
+                    room.alone[part, i] = fixed
+                else:
+                    spread += abs(fixed)
+                total += fastest * spread if part == 1 else spread
+        own = math.inf
+        for k in range(L // 2 + 1):
+            turn = 2.0 * math.pi * k / T
+            a, b = room.alone[0, i] - turn * turn, turn * room.alone[1, i]
+            own = min(own, math.sqrt(a * a + b * b))
+        coupling[i] = total / own if own > 0.0 else math.inf
+        room.order[i] = i
+    for i in range(m):
+        for j in range(i, 0, -1):
+            if coupling[room.order[j]] > coupling[room.order[j - 1]]:
+                room.order[j], room.order[j - 1] = room.order[j - 1], room.order[j]
+    count = 0
+    while count < m and not coupling[room.order[count]] <= _COUPLED:
+        count += 1
+    room.coupled[0] = max(1, min(count, most))
+    left = room.coupled[0]
+    return 1 if left == m or coupling[room.order[left]] <= _LEFT else 0
+
+
+@helper
+def _alone(j, k, T, e, a, b):
+    """Coefficients of the cosine and sine k > 0 of mode j for right sides a, b."""
+    turn = 2.0 * math.pi * k / T
+    own, loss = e.room.alone[0, j] - turn * turn, turn * e.room.alone[1, j]
+    size = own * own + loss * loss
+    return (own * a - loss * b) / size, (loss * a + own * b) / size
+
+
+@helper
+def _each_alone(T, e, x):
+    """Solve in x (n,) for the modes that are left alone."""
+    m, H = e.springs.shape[1], e.values.shape[1] // 2
+    for place in range(e.room.coupled[0], m):
+        j = e.room.order[place]
+        x[j] /= e.room.alone[0, j]
+        for k in range(1, H + 1):
+            c, s = (2 * k - 1) * m + j, 2 * k * m + j
+            x[c], x[s] = _alone(j, k, T, e, x[c], x[s])
+
+
+@helper
+def factorise_with(row, T, e):
+    """Factorise ``condensed`` with a further row (n + 1,)."""
+    room = e.room
+    m, L, count, n = e.springs.shape[1], e.values.shape[1], room.coupled[0], len(room.residual)
+    k = L * count
+    condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
+    a = room.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
+    for i in range(k):
+        for j in range(k + 1):
+            a[i, j] = condensed[i, j]
+        a[k, i] = row[(i // count) * m + room.order[i % count]]
+    a[k, k] = row[n]
+    if count < m:
+        for i in range(n):
+            room.beside[i] = room.column[i]
+        _each_alone(T, e, room.beside)
+        for place in range(count, m):
+            for q in range(L):
+                i = q * m + room.order[place]
+                a[k, k] -= row[i] * room.beside[i]
+    factorise(a, k + 1, room.pivots[: k + 1])
+
+
+@helper
+def _once(row, T, e, x):
+    """Replace x (n + 1,) by the solution, modes that are left alone being so."""
+    room, parts = e.room, e.room.vectors[7]
+    m, L, count, n = e.springs.shape[1], e.values.shape[1], room.coupled[0], len(room.residual)
+    k = L * count
+    a = room.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
+    if count < m:
+        _each_alone(T, e, x)
+        for place in range(count, m):
+            for q in range(L):
+                i = q * m + room.order[place]
+                x[n] -= row[i] * x[i]
+    known = parts[: k + 1]
+    for i in range(k):
+        known[i] = x[(i // count) * m + room.order[i % count]]
+    known[k] = x[n]
+    solve(a, room.pivots[: k + 1], known)
+    for i in range(k):
+        x[(i // count) * m + room.order[i % count]] = known[i]
+    x[n] = known[k]
+    for place in range(count, m):
+        for q in range(L):
+            i = q * m + room.order[place]
+            x[i] -= room.beside[i] * x[n]
+
+
+@helper
+def _applied(row, x, T, e, out):
+    """Fill out (n + 1,) with the derivatives at the samples, and the row, times x (n + 1,)."""
+    room, forces = e.room, e.room.vectors[7]
+    m, N, n = e.springs.shape[1], len(e.tau), len(room.residual)
+    take_states(x, T, e, room.y)
+    for k in range(N):
+        for i in range(m):
+            total = 0.0
+            for j in range(2 * m):
+                total += room.J[k, m + i, j] * room.y[k, j]
+            forces[i] = total
+        for i in range(m):
+            room.y[k, m + i] = forces[i]
+    balance(x, T, room.y, 0.0, e, out)
+    for i in range(n):
+        out[i] += room.column[i] * x[n]
+    out[n] = inner(row, x)
+
+
+@routine
+def solve_with(row, weights, T, tolerance, e, x):
+    """Replace the right side x (n + 1,) by the solution, to a relative tolerance.
+
+    Returns 0 if the iteration does not converge, else 1.
+    """
+    room = e.room
+    if room.coupled[0] == e.springs.shape[1]:
+        _once(row, T, e, x)
+        return 1
+    wanted, change, seen = room.vectors[6], room.vectors[8], room.vectors[9]
+    n = len(room.residual)
+    for i in range(n + 1):
+        wanted[i] = x[i]
+    _once(row, T, e, x)
+    for _ in range(_ROUNDS):
+        _applied(row, x, T, e, seen)
+        for i in range(n + 1):
+            change[i] = wanted[i] - seen[i]
+        _once(row, T, e, change)
+        for i in range(n + 1):
+            x[i] += change[i]
+        size = length(weights, x)
+        off = length(weights, change)
+        if not off < math.inf:
+            return 0
+        if off <= tolerance * size:
+            return 1
+    return 0
