@@ -21,6 +21,8 @@ _AHEAD = (1.0, 2.0)
 # Largest distance between both tangents, and from the last point to where they meet, relative to
 # the way from point to point and to the step.
 _APART, _FAR = 0.05, 1.5
+# Cosine of tangents that are those of the same piece of the branch, there and back.
+_BACK = -0.999
 
 
 def round_corner(
@@ -71,6 +73,8 @@ def round_corner(
             if there is None or not _meet(problem, here, there, step):
                 continue
             # Where the branch came from, the orientation is that of the way back.
+            if float(weights * here.tangent @ there.tangent) < _BACK:
+                continue
             if side * problem.orientation(there.linearisation, there.tangent) <= 0.0:
                 continue
             row = weights * (here.tangent + there.tangent)

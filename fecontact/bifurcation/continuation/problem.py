@@ -146,7 +146,7 @@ class Problem(Protocol):
         return {}
 
     def orientation(self, linearisation: Any, tangent: Array) -> float:
-        """Sign of det [[dG/du], [w tangent]], constant along a branch, at corners too; 0 unknown."""
+        """Sign of det [[dG/du], [w tangent]], constant along a branch; 0 if unknown."""
         return 0.0
 
     @property

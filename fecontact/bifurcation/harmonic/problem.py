@@ -143,8 +143,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         return guess if weighted_norm(self.weights(), aside) > _MOST_BENT * step else guess + aside
 
     def orientation(self, linearisation: Any, tangent: Array) -> float:
-        """Sign of the determinant of the equations with the tangent as last row, in their scales.
-        """
+        """Sign of the determinant of the equations, in their scales, with the tangent below."""
         weights = self.weights()
         square = np.vstack([linearisation.condensed, weights * tangent]) * weights**-0.5
         return float(np.linalg.slogdet(square / np.abs(square).max(axis=1)[:, None])[0])
