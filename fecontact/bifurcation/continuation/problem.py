@@ -145,6 +145,10 @@ class Problem(Protocol):
         """
         return {}
 
+    def orientation(self, linearisation: Any, tangent: Array) -> float:
+        """Sign of det [[dG/du], [w tangent]], constant along a branch; 0 if unknown."""
+        return 0.0
+
     @property
     def rounding(self) -> float:
         """Relative size of Newton steps below which growing steps are rounding."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.corner import round_corner
 from fecontact.bifurcation.continuation.hairpin import round_hairpin
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
 from fecontact.bifurcation.continuation.points import UNRESOLVED, BranchPoint
@@ -27,8 +28,10 @@ from fecontact.core.types import Array
 # Steps shorter than this part of the first one may turn by any angle: contact laws with kinks give
 # branches with corners.
 _CORNER_STEP = 1e-3
-# Try a hairpin after every second halving of a step.
+# Try a hairpin and a corner after every second halving of a step.
 _HALVINGS = 2
+# Factor between lengths tried beyond close corners.
+_FARTHER = 8.0
 # Overshoot of a bound by at most this factor: beyond it the motion may not exist.
 _OVERSHOOT = 1.2
 # Relative distance from a bound at which a start lies on it.
@@ -101,6 +104,7 @@ def continuation(
                 step = stride.step
                 continue
         step = min(step, _OVERSHOOT * _room(here, options))
+        rounded = False
         try:
             reached = _step(problem, here, step, options)
         except FecontactError as error:
@@ -108,8 +112,12 @@ def continuation(
         if reached is None:
             whole = step if halved == 0 else whole
             step, halved = 0.5 * step, halved + 1
-            if before is not None and halved % _HALVINGS == 0:
+            last_try = step < options.smallest_step
+            if before is not None and (halved % _HALVINGS == 0 or last_try):
                 reached = round_hairpin(problem, before, here, step, options)
+            if reached is None and (halved % _HALVINGS == 0 or last_try):
+                reached = _round_corner(problem, here, 2.0 * step, last_try, options)
+                rounded = reached is not None
         if reached is None:
             if step < options.smallest_step:
                 return End(BranchStatus.STALLED, message)
@@ -138,7 +146,8 @@ def continuation(
         before = last
         # An unresolved change of stability has halved the step; restore its length behind it.
         unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
-        step = whole if unresolved else _next_step(problem, last, here, step, options)
+        step = (whole if unresolved else min(whole, 4.0 * step) if rounded
+                else _next_step(problem, last, here, step, options))
         halved = 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
@@ -203,12 +212,31 @@ def _step(
                       options.tolerance, options.iterations, known=here.linearisation)
     if found is None:
         return None
+    # What rounding takes for a solution may lie where the step began.
+    if float(row @ (found[0] - here.u)) <= 0.5 * step:
+        return None
     there = finished(problem, *found, row, options)
     short = step < _CORNER_STEP * options.step
-    if not (short or _believable(problem, here, there, options)):
-        return None
+    if not _believable(problem, here, there, options):
+        # A corner; past one that is sharper than a right angle the tangent would lead back.
+        sides = ([problem.orientation(at.linearisation, at.tangent) for at in (here, there)]
+                 if short else [-1.0, 1.0])
+        if sides[0] * sides[1] < 0.0:
+            return None
     reached = located_on(Step(problem, here, there, options, row), strict=not short)
     return None if reached is None else [reached]
+
+
+def _round_corner(
+    problem: Problem, here: Solution, step: float, farther: bool, options: ContinuationOptions
+) -> list[tuple[Solution, list[BranchPoint]]] | None:
+    """The point behind a corner at most a step ahead or, past several close ones, ``farther``."""
+    while True:
+        reached = round_corner(problem, here, step, options,
+                               strict=step >= _CORNER_STEP * options.step)
+        if reached is not None or not farther or step >= options.step:
+            return reached
+        step *= _FARTHER
 
 
 def _room(here: Solution, options: ContinuationOptions) -> float:

@@ -41,8 +41,11 @@ def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPo
     Returns
     -------
     (Solution, list of BranchPoint) or None
-        None where the step is refused, or a bound is passed that no solution on the step meets.
+        None where the step is refused or leads nowhere, or a bound is passed that no solution on
+        the step meets.
     """
+    if not step.length > 0.0:
+        return None
     ended = next((name for name in step.problem.ends if step.here.tests.get(name, -1.0) > 0.0
                   >= step.there.tests.get(name, 1.0)), None)
     if ended is not None:

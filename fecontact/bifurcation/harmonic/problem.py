@@ -155,6 +155,12 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         aside = 0.5 * step * step * self.bend
         return guess if weighted_norm(self.weights(), aside) > _MOST_BENT * step else guess + aside
 
+    def orientation(self, linearisation: Any, tangent: Array) -> float:
+        """Sign of the determinant of the equations, in their scales, with the tangent below."""
+        weights = self.weights()
+        square = np.vstack([linearisation.condensed, weights * tangent]) * weights**-0.5
+        return float(np.linalg.slogdet(square / np.abs(square).max(axis=1)[:, None])[0])
+
     def adapted(self, u: Array, tangent: Array) -> "tuple[HarmonicProblem, Array, Array]":
         """The problem for the next step, with the phase condition at u."""
         bend = None

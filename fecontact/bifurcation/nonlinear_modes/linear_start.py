@@ -24,6 +24,8 @@ _ZERO = 1e-7
 # Part of the largest stiffness that is rounding.
 _LOOSE = 1e-14
 _ITERATIONS = 60
+# Part by which deflections of a preload are lowered, so that elements at their limits stick.
+_BELOW_LIMIT = 1e-6
 # Relative change of xi at which the search for the undamped motion ends.
 _SETTLED = 1e-13
 
@@ -95,11 +97,14 @@ def with_mass_damping(system: ContactSystem, xi: float) -> ContactSystem:
     return system.with_(basis=replace(basis, damping=basis.damping - xi * np.eye(basis.modes)))
 
 
-def linear_start(system: ContactSystem, number: int) -> LinearStart:
+def linear_start(
+    system: ContactSystem, number: int, preloaded: Array | None = None
+) -> LinearStart:
     """The linear mode ``number``, from 1, of the system at rest under its constant loads.
 
-    Friction with memory sticks in it. Modes are counted by their damped frequencies at xi = 0; xi
-    is then the negative damping under which the mode neither grows nor decays.
+    Friction with memory sticks in it, with the deflections of the state ``preloaded`` (d,) or none.
+    Modes are counted by their damped frequencies at xi = 0; xi is then the negative damping under
+    which the mode neither grows nor decays.
 
     Raises
     ------
@@ -112,7 +117,8 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
         raise InputError("Waves of the moving ground excite the system; nonlinear modes need flat "
                          "ground, or ground at rest.")
     moves = free.prescribed_motion.largest_speed(0.0, 1.0) > 0.0
-    state = (steady_sliding if moves else rest_state)(field, field.values)
+    state = ((steady_sliding if moves else rest_state)(field, field.values) if preloaded is None
+             else _stuck(preloaded, free.basis.modes))
     state = _sliding_where_open(free, state)
     A = field.derivatives(np.zeros(1), state[None], field.values)[1][0]
     modes = ComplexModes.of(A, zero=_ZERO)
@@ -129,6 +135,13 @@ def linear_start(system: ContactSystem, number: int) -> LinearStart:
     # The parameter's own scale is that of the mode.
     field = contact_field(free, {XI: (xi, with_mass_damping)})
     return LinearStart(field, state, shape, value, xi, loose)
+
+
+def _stuck(state: Array, modes: int) -> Array:
+    """The state with elements that are at their limits just below them: they stick."""
+    found = np.array(state, dtype=float)
+    found[2 * modes :] *= 1.0 - _BELOW_LIMIT
+    return found
 
 
 def _sliding_where_open(system: ContactSystem, state: Array) -> Array:

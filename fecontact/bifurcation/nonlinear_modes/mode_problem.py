@@ -17,6 +17,10 @@ from fecontact.core.types import Array, ComplexArray
 _ROUNDING_OF_MEANS = 1e-5
 # Distance of a multiplier from the unit circle beyond which a perturbation grows.
 _GROWS = 1e-6
+# Relative size of sines up to which a motion is the same backwards in time.
+_REVERSIBLE = 1e-6
+# Scale of the period, relative to it, and ratio of the two from which it is renewed.
+PERIOD_SCALE, _FOLLOWED = 0.2, 1.3
 
 
 class ModeLinearisation(HarmonicLinearisation):
@@ -84,6 +88,25 @@ class ModeProblem(HarmonicProblem):
     def rounding(self) -> float:
         """Relative size of Newton steps below which growing steps are rounding."""
         return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
+
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """The predictor; that of a motion x(-t) = x(t) without losses is one too.
+
+        Newton's method keeps to such motions then, past points where few samples in short contacts
+        let others branch off.
+        """
+        guess = super().predicted(u, tangent, step)
+        X = self.coefficients(guess)
+        if self.conservative and np.abs(X[2::2]).max() <= _REVERSIBLE * np.abs(X[1::2]).max():
+            X[2::2] = 0.0
+        return guess
+
+    def _grown(self, u: Array) -> Array:
+        """Scales enlarged with the motion; those of period and xi follow the frequency."""
+        found, ratio = super()._grown(u), PERIOD_SCALE * self.period(u) / self.scales[-2]
+        if 1.0 / _FOLLOWED < ratio < _FOLLOWED:
+            return found
+        return np.append(found[:-2], [found[-2] * ratio, found[-1] / ratio])
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, velocities, truncation errors, and what is observed."""

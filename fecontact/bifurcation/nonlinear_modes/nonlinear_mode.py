@@ -14,23 +14,34 @@ from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     options_of,
 )
+from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_row
-from fecontact.bifurcation.nonlinear_modes.linear_start import LinearStart, linear_start
-from fecontact.bifurcation.nonlinear_modes.mode_problem import ModeProblem
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.nonlinear_modes.linear_start import (
+    XI,
+    LinearStart,
+    linear_start,
+    unforced,
+    with_mass_damping,
+)
+from fecontact.bifurcation.nonlinear_modes.mode_problem import PERIOD_SCALE, ModeProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ComplexArray
 from fecontact.core.units import Summarised, listed, span
+from fecontact.integrate.initial_state import initial_state
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import RestState
 
 # Points at most and steps, unless options say so: a step of one is the amplitude itself, and the
 # parts of frequency and damping below.
 _POINTS, _STEP, _LARGEST = 2000, 0.02, 0.06
-_PERIOD_SCALE, _XI_SCALE = 0.2, 0.2
+_XI_SCALE = 0.2
 # Largest |xi| of a conservative system, relative to the frequency.
 _CONSERVATIVE = 1e-8
 # Smallest scale of a coordinate relative to the largest one, and part of the linear mode that the
@@ -173,6 +184,7 @@ def nonlinear_mode(
     system: ContactSystem, bounds: tuple[float, float], mode: int = 1, *,
     observe: tuple[str | int, str] = ("B", "x"), method: HarmonicBalance | None = None,
     options: ContinuationOptions | None = None,
+    preload: LoadHistory | RestState | Array | None = None,
 ) -> NonlinearMode:
     r"""A nonlinear mode by harmonic balance: frequency, damping and shape over the amplitude.
 
@@ -181,8 +193,9 @@ def nonlinear_mode(
     .. math:: M x'' + C x' + K x + f(x, x') - \xi M x' = f_{static},
 
     with :math:`\Omega` and :math:`\xi` unknown; :math:`\xi / (2 \Omega)` is the damping ratio.
-    Without losses xi is zero. The branch starts with the linear mode at rest, friction with memory
-    sticking, and follows internal resonances. Drives and loads in time are left out.
+    Without losses xi is zero. The branch starts with the linear mode about the static deflection,
+    friction with memory sticking, and follows internal resonances. The mean is an unknown too.
+    Drives and loads in time are left out.
 
     Parameters
     ----------
@@ -199,6 +212,8 @@ def nonlinear_mode(
     options : ContinuationOptions, optional
         By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: changes
         relative to amplitude, a fifth of the frequency, a damping ratio of 0.1. Without bounds.
+    preload : LoadHistory, RestState or (d,) array, optional
+        As for :func:`fecontact.bifurcation.frequency_response`.
 
     Raises
     ------
@@ -217,22 +232,46 @@ def nonlinear_mode(
     longer = max(1.0, np.sqrt(0.5 * system.basis.modes))
     given = options_of(options or ContinuationOptions(
         points=_POINTS, step=_STEP * longer, largest_step=_LARGEST * longer), None)
-    start = linear_start(system, mode)
+    start = linear_start(system, mode,
+                         None if preload is None else initial_state(system, preload, 0.0))
     row, observed = observed_row(start.field, observe)
     chosen = method or HarmonicBalance()
     problem, u, leaving = _leaving(start, row, observed, low, chosen)
-    stops = [given.stop_at] if isinstance(given.stop_at, str) else given.stop_at
-    ended = replace(
-        given, bounds=(-np.inf, np.inf), locate=True, stop_at=[*stops, *_ENDS],
-        events={**given.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)})
     try:
-        branch = branches.follow(problem, u, leaving, chosen, ended)
+        branch = branches.follow(problem, u, leaving, chosen, _between(given, low, high))
     except FecontactError as error:
         raise AnalysisError(f"No nonlinear mode was followed from the linear one at "
                             f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
                             f"{low:g}; begin at a smaller one, where the motion is linear "
                             f"({error})") from None
-    return NonlinearMode(_ended(branch, observed, mode), mode, observed)
+    return NonlinearMode(_ended(branch, {
+        "observed": observed, "mode_number": int(mode), "conservative": problem.conservative,
+        "rigid_motions": problem.loose, "rest": problem.home}), mode, observed)
+
+
+def continued_mode(
+    system: ContactSystem, mode: NonlinearMode, bounds: tuple[float, float],
+    observe: tuple[str | int, str], options: ContinuationOptions,
+) -> NonlinearMode:
+    """A mode that was interrupted, followed on from its last regular point."""
+    low, high = _amplitudes(bounds)
+    known, points = mode.branch.attributes, list(mode.branch.points)
+    while points[-1].kind is not None and len(points) > 1:
+        points.pop()
+    last = points[-1]
+    field = contact_field(unforced(system), {XI: (last.parameter, with_mass_damping)})
+    plain, u, tangent = starts.restored(field, last)
+    problem = _mode_problem(
+        plain, row=observed_row(field, observe)[0], conservative=bool(known["conservative"]),
+        loose=np.asarray(known["rigid_motions"]).reshape(-1, plain.layout.displacements),
+        home=np.asarray(known["rest"]))
+    left = max(2, options.points - len(points) + 1)
+    rest = branches.follow(problem, u, tangent, starts.method_of(known),
+                           _between(replace(options, points=left), low, high))
+    ended = _ended(rest, {})
+    return replace(mode, branch=replace(
+        mode.branch, points=(*points[:-1], *ended.points), status=ended.status,
+        message=ended.message))
 
 
 def mode_of(branch: Branch) -> NonlinearMode:
@@ -273,18 +312,32 @@ def _leaving(
     sizes = np.abs(shape)
     sizes = np.maximum(sizes, _LEAST_SCALE * sizes[:m].max())
     T = 2.0 * np.pi / w
-    scales = np.concatenate([sizes, [_PERIOD_SCALE * T, _XI_SCALE * w]])
+    scales = np.concatenate([sizes, [PERIOD_SCALE * T, _XI_SCALE * w]])
     plain = starts.problem_for(field, field.values, 0, method, scales)
     waves = np.exp(2.0j * np.pi * plain.series.times)[:, None]
     leaving = starts.unknowns(plain, (waves * shape).real, 0.0)
     leaving[-2:] = 0.0
     u = starts.unknowns(plain, np.tile(start.state, (plain.samples, 1)), T) + leaving
     lossless = abs(start.xi) <= _CONSERVATIVE * w and not plain.layout.memory
-    known = {entry.name: getattr(plain, entry.name) for entry in fields(plain)}
-    problem = ModeProblem(**{
-        **known, "reference": plain.coefficients(leaving).copy(), "limits": np.full(d, np.inf),
-        "row": row, "conservative": lossless, "loose": start.loose, "home": start.state[:m]})
+    problem = _mode_problem(
+        plain, reference=plain.coefficients(leaving).copy(), limits=np.full(d, np.inf), row=row,
+        conservative=lossless, loose=start.loose, home=start.state[:m],
+        kept=plain.kept.left_by(start.state[None]) if plain.layout.memory else plain.kept)
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
+
+
+def _mode_problem(plain: HarmonicProblem, **changes: Any) -> ModeProblem:
+    """The problem of a mode that has what that of an orbit has, with changes."""
+    known = {entry.name: getattr(plain, entry.name) for entry in fields(plain)}
+    return ModeProblem(**{**known, **changes})
+
+
+def _between(options: ContinuationOptions, low: float, high: float) -> ContinuationOptions:
+    """The options with ends at two amplitudes."""
+    stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
+    return replace(
+        options, bounds=(-np.inf, np.inf), locate=True, stop_at=[*stops, *_ENDS],
+        events={**options.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)})
 
 
 def _beyond(amplitude: float) -> Any:
@@ -294,15 +347,15 @@ def _beyond(amplitude: float) -> Any:
     return off
 
 
-def _ended(branch: Branch, observed: str, mode: int) -> Branch:
-    """The branch with its last point a regular one, where it ends at an amplitude."""
+def _ended(branch: Branch, attributes: dict[str, Any]) -> Branch:
+    """The branch with attributes; its last point is regular where it ends at an amplitude."""
     last = branch.points[-1]
     points, status = branch.points, branch.status
     if last.kind in _ENDS:
         points = (*points[:-1], BranchPoint(last.u, last.tangent, last.values))
         status = BranchStatus.BOUND
-    return replace(branch, points=points, status=status, attributes={
-        **branch.attributes, "observed": observed, "mode_number": int(mode)})
+    return replace(branch, points=points, status=status,
+                   attributes={**branch.attributes, **attributes})
 
 
 def _integral(rate: Array, over: Array) -> Array:

@@ -26,6 +26,8 @@ _FIRST, _LATER, _NUMBERS = 8, 64, 4_000_000
 _WITHOUT_STABILITY = 256
 # Steps that are made one by one where modes cannot be separated, before compiled code is tried.
 _APART = 10
+# Steps shorter than this part of the first one are made one by one: they may lead to a corner.
+_SHORTEST = 1e-2
 
 
 @dataclass(eq=False)
@@ -84,9 +86,21 @@ class Strides:
         scales = np.append(problem.scales[:m], problem.scales[-1])
         made = steps(here.u.copy(), here.tangent.copy(), bend, scales, e, out, why)
         self.waits = _APART if why[0] == COUPLED else 0
+        made = self._before_corner(problem, here, made, out)
         if made == 0:
             return None
         return self._seen(problem, here, made, out, e, start)
+
+    def _before_corner(self, problem: Any, here: Solution, made: int, out: arrays.Reached) -> int:
+        """Number of points before steps that shorten towards a corner without end."""
+        weights, shortest = problem.weights(), _SHORTEST * self.options.step
+        way = np.diff(np.vstack([here.u, out.u[:made]]), axis=0)
+        lengths = np.sqrt((weights * way**2).sum(axis=1))
+        if out.step[0] >= shortest or (lengths >= shortest).all():
+            return made
+        made = int(np.argmax(lengths < shortest))
+        out.step[0] = lengths[made - 1] if made else shortest
+        return made
 
     def _seen(
         self, problem: Any, here: Solution, made: int, out: arrays.Reached,
