@@ -205,16 +205,12 @@ class Expansion:
         shaped = nodes[: len(self._x) * D].reshape(-1, D)
         return at_points(self._problem, shaped, shaped[0])
 
-    def _jacobian(self, shift: Array) -> Array:
-        x = np.ascontiguousarray(self._x + shift)
-        _, J, _ = self._problem.field.derivatives(self._times, x, self._values, ())
-        return self._T * J
-
     def _jacobians(self, a: Array, h: float) -> list[Array]:
         """Jacobians at h, -h, 2 h and -2 h along a, shared by second and third derivatives."""
         if self._last is None or self._last[1] != h or self._last[0] is not a:
-            self._last = a, h, [self._jacobian(part * h * a)
-                                for part in (1.0, -1.0, 2.0, -2.0)]
+            x = np.concatenate([self._x + part * h * a for part in (1.0, -1.0, 2.0, -2.0)])
+            _, J, _ = self._problem.field.derivatives(np.tile(self._times, 4), x, self._values, ())
+            self._last = a, h, [*(self._T * J).reshape(4, *self._J.shape)]
         return self._last[2]
 
     def _scaled(self, direction: Array, step: float) -> float:
