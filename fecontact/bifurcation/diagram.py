@@ -146,4 +146,4 @@ def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
 
     if wanted.method == "shooting":
         return Shooting(segments=wanted.segments)
-    return Collocation(intervals=wanted.intervals)
+    return Collocation(intervals=wanted.intervals, tolerance=wanted.tolerance)

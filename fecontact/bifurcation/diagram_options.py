@@ -47,6 +47,9 @@ class BranchSettings:
         friction, impacts and many modes.
     intervals : int
         For collocation: mesh intervals of an orbit.
+    tolerance : float
+        For collocation: largest error of the parameter of special points, in parts of the bounds;
+        they get more intervals until it is met.
     segments : int
         For shooting: pieces of an orbit that are run for themselves; more for unstable orbits.
     transient : float, optional
@@ -80,6 +83,7 @@ class BranchSettings:
     points: int = 200
     method: Literal["collocation", "shooting"] = "collocation"
     intervals: int = 50
+    tolerance: float = 1e-7
     segments: int = 4
     transient: Annotated[float | None, Unit("s")] = None
     longest_period: Annotated[float | None, Unit("s")] = None
@@ -90,7 +94,8 @@ class BranchSettings:
 
     def __post_init__(self) -> None:
         require_positive("BranchSettings", step=self.step, largest_step=self.largest_step,
-                         points=self.points, intervals=self.intervals, segments=self.segments)
+                         points=self.points, intervals=self.intervals, tolerance=self.tolerance,
+                         segments=self.segments)
         for name in ("transient", "longest_period"):
             if getattr(self, name) is not None:
                 require_positive("BranchSettings", **{name: getattr(self, name)})

@@ -97,7 +97,7 @@ def special_table(branch: Branch) -> Any:
         if point.kind is None and 0 < index < len(branch) - 1:
             continue
         period = _period(point)
-        rows.append((point.kind or ("start" if index == 0 else "end"), f"{point.parameter:.7g}",
+        rows.append((point.kind or ("start" if index == 0 else "end"), point.parameter_text(),
                      "" if period is None else f"{1.0 / period:.5g}", _remark(point)))
     return table("point", branch.parameter_name, "frequency [Hz]", "", rows=rows)
 

@@ -64,6 +64,17 @@ def forward(a, count, pivots, r):
 
 
 @helper
+def forward_transposed(a, count, pivots, r):
+    """The transpose of :func:`forward`."""
+    for i in range(len(r) - 1, 0, -1):
+        for k in range(min(i, count)):
+            r[k] -= a[i, k] * r[i]
+    for k in range(count - 1, -1, -1):
+        row = pivots[k]
+        r[k], r[row] = r[row], r[k]
+
+
+@helper
 def backward(a, count, r, x):
     """Fill x[:count], the other unknowns given, from the reduced right side r; x may be r."""
     for k in range(count - 1, -1, -1):

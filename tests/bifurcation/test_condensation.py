@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from fecontact.bifurcation.linalg.bordered import Border, Bordered
+from fecontact.bifurcation.linalg.bordered import (
+    Border,
+    Bordered,
+    expand_open,
+    original_rows,
+)
 from fecontact.bifurcation.linalg.condensation import condense, factors_for
 from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.bifurcation.orbits.mesh import rule
@@ -59,6 +64,55 @@ def test_bordered_solutions(intervals, degree, states, with_period, parameters):
         if np.linalg.cond(whole) < 1e8:
             wanted = np.linalg.solve(whole, rhs)
             assert np.abs(found - wanted).max() < 1e-7 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("intervals", [1, 2, 5, 8, 9, 23, 57])
+@pytest.mark.parametrize(("degree", "states", "parameters"), [(4, 4, 2), (3, 1, 1), (2, 3, 0)])
+def test_equations_of_the_ends(intervals, degree, states, parameters):
+    """They are sums of the collocation rows, and hold between the ends of an open solution."""
+    J, f, P, widths = random_system(intervals, degree, states, parameters)
+    factors = factors_for(intervals, degree, states, parameters)
+    basis, nodal, d = rule(degree), f.size, states
+    condense(0.05 * J, f, P, widths, 1.0, basis.values, basis.slopes, 0, factors)
+    whole = dense(0.05 * J, f, P, widths, 1.0, degree, 0)
+    size = np.abs(whole).max()
+    for row in range(d):
+        rows = original_rows(factors, np.eye(d)[row])
+        ends = rows @ whole
+        assert ends[:d] == pytest.approx(factors.end[row, :d], abs=1e-12 * size)
+        assert ends[nodal:] == pytest.approx(factors.end[row, d:], abs=1e-12 * size)
+        assert np.abs(ends[d:nodal]).max(initial=0.0) < 1e-12 * size
+    start = np.arange(1.0, d + 1.0)
+    end = np.linalg.solve(factors.end[:, d : 2 * d], -factors.end[:, :d] @ start)
+    found = np.concatenate([expand_open(factors, start, end), end])
+    assert np.abs(whole[:, : nodal + d] @ found).max() < 1e-11 * size * np.abs(found).max()
+
+
+@pytest.mark.parametrize("intervals", [3, 20])
+@pytest.mark.parametrize("closing", [1.0, -1.0])
+def test_singular_vectors(intervals, closing):
+    """Two border rows that depend on the others make a system singular."""
+    degree, d, parameters = 3, 4, 2
+    J, f, P, widths = random_system(intervals, degree, d, parameters)
+    factors = factors_for(intervals, degree, d, parameters)
+    basis, nodal = rule(degree), f.size
+    condense(0.05 * J, f, P, widths, 1.0, basis.values, basis.slopes, 0, factors)
+    whole = dense(0.05 * J, f, P, widths, 1.0, degree, 0)
+    whole[:, :d] += closing * whole[:, nodal : nodal + d]
+    whole = np.delete(whole, np.s_[nodal : nodal + d], axis=1)
+    rng = np.random.default_rng(2)
+    free = rng.standard_normal(whole.shape[1])
+    mixed = rng.standard_normal(nodal) @ whole
+    rows = [free, mixed + 2.0 * free]
+    value, left, right = Bordered(factors, [Border(factors, row) for row in rows],
+                                  closing).weakest()
+    size = np.abs(whole).max()
+    assert value < 1e-12
+    assert np.abs(np.vstack([whole, *rows]) @ right).max() < 1e-11 * size * np.abs(right).max()
+    rest = left @ whole
+    part = np.linalg.lstsq(np.array(rows).T, rest)[0]
+    assert rest == pytest.approx(part @ np.array(rows), abs=1e-11 * np.abs(left).max() * size)
+    assert np.abs(left).max() > 0.0
 
 
 @pytest.mark.parametrize("intervals", [3, 20])

@@ -69,7 +69,7 @@ class Branch(Summarised):
 
     def summary(self) -> list[tuple[str, str]]:
         """Parameter and its range, special points, stability, and how the branch ended."""
-        special = [f"{point.kind} at {point.parameter:.5g}" for point in self.special]
+        special = [f"{point.kind} at {point.parameter_text(5)}" for point in self.special]
         known = [bool(point.values["stable"]) for point in self.points
                  if point.kind is None and "stable" in point.values]
         return [
@@ -117,12 +117,17 @@ class Branch(Summarised):
         Raises
         ------
         InputError
-            If no such value is stored; it lists those that are.
+            If no such value is stored; it lists those that are. Or its length differs from point
+            to point, as that of the mesh of special points may.
         """
         known = self.points[0].values if self.points else {}
         if name not in known:
             raise InputError(f"The branch stores no value {name!r}; it has: {choices(known)}.")
-        return np.array([point.values[name] for point in self.points])
+        found = [point.values[name] for point in self.points]
+        if len({np.shape(value) for value in found}) > 1:
+            raise InputError(f"{name!r} differs in length from point to point; take it from each: "
+                             f"point.values[{name!r}].")
+        return np.array(found)
 
     @overload
     def at(self, field: VectorField, value: float, which: int = 0) -> BranchPoint: ...

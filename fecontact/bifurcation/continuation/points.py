@@ -222,9 +222,15 @@ class BranchPoint:
     def parameter_error(self) -> float:
         """Error of a special point's parameter; NaN where it is not estimated.
 
-        On branches of orbits by collocation it is the change of the parameter on finer meshes.
+        On branches of orbits by collocation it is the change of the parameter on a finer mesh.
         """
         return float(self._details.get("parameter_error", np.nan))
+
+    def parameter_text(self, digits: int = 7) -> str:
+        """The parameter with its error, where that is estimated: '8.092192 +- 3e-09'."""
+        error = self.parameter_error
+        known = "" if np.isnan(error) else f" +- {error:.1g}"
+        return f"{self.parameter:.{digits}g}{known}"
 
     @property
     def criticality(self) -> str | None:

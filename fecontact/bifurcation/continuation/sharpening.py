@@ -1,16 +1,18 @@
 """Refinement of special points of orbits: each on a mesh of its own, confirmed on finer ones.
 
 A branch locates its special points coarsely, on the mesh of a neighbour. Each is then located on
-the mesh equidistributed for its own orbit. The coefficient of a normal form contains third
-derivatives along the orbit and may need a far finer mesh than the orbit: the intervals are doubled
-until it converges.
+the mesh equidistributed for its own orbit, and on twice the intervals: the change of its parameter
+is its error on the former. The intervals are doubled until it is below the tolerance. The
+coefficient of a normal form contains third derivatives along the orbit and may need a far finer
+mesh than the orbit: for it the intervals are doubled until it converges.
 
 On too coarse a mesh the discretisation error alone makes the parameter turn, or a test function
 change sign. A special point must therefore exist on a finer mesh too, and the test functions of
 folds and branch points must agree on both sides of it; otherwise it becomes 'unresolved'.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -47,6 +49,10 @@ _MOST_POINTS = 30
 _FINEST_MESH = 16
 # Relative change between two meshes at which a coefficient counts as converged.
 _CONVERGED = 1e-3
+# Smallest factor by which the error of a parameter is taken to fall from one mesh to the next.
+_LEAST_FALL = 1e-3
+# Smallest error of a parameter, in widths of the diagram.
+_ROUNDING = 1e-13
 # Largest number of mesh doublings to confirm a fold or a branch point, and largest relative
 # difference of its test function on two meshes that agree.
 _DOUBLINGS, _AGREEMENT = 2, 0.5
@@ -55,7 +61,19 @@ _DOUBLINGS, _AGREEMENT = 2, 0.5
 _SHORTER_DISTANCES = np.array([1.0, 1e-1, 1e-2, 1e-3, 1e-4])
 
 
-def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
+@dataclass(frozen=True)
+class Accuracy:
+    """Error of the parameter up to which intervals are doubled, in widths of the diagram, and the
+    largest number of intervals.
+    """
+
+    tolerance: float
+    most_intervals: int
+
+
+def sharpened(
+    point: BranchPoint, own: Place, neighbour: Place, accuracy: Accuracy
+) -> BranchPoint:
     """Refine a special point and, where it has a normal form, determine its criticality.
 
     Parameters
@@ -65,14 +83,17 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     own, neighbour : (CollocationProblem, array, array)
         Problem, unknowns and tangent of the point and of a regular one before it. At branch points
         the tangent is not defined; that of the neighbour serves for all kinds.
+    accuracy : Accuracy
+        How well the parameter is to be known.
 
     Returns
     -------
     BranchPoint
-        With ``parameter_error``, the change of the parameter on finer meshes. A point that is not
-        found again stays where it was, not ``located``; its ``parameter_error`` is then the change
-        of the parameter over the stretch that was searched, if nothing better is known. A point
-        that finer meshes do not have becomes 'unresolved', ``instead_of`` its kind.
+        On the first mesh on which its ``parameter_error``, the change of the parameter on the next
+        finer one, is below the tolerance. A point that is not found again stays where it was, not
+        ``located``; its ``parameter_error`` is then the change of the parameter over the stretch
+        that was searched, if nothing better is known. A point that finer meshes do not have becomes
+        'unresolved', ``instead_of`` its kind.
     """
     kind = str(point.kind)
     problem, u, _ = own
@@ -82,16 +103,80 @@ def sharpened(point: BranchPoint, own: Place, neighbour: Place) -> BranchPoint:
     _, start, _ = problem.on_mesh(mesh, start, tangent)
     place = _unit(*problem.on_mesh(mesh, u, tangent))
     found = _found(place, kind) or _found_from(place, start, kind)
-    result = found or with_details(point, located=False)
+    here = place if found is None else (place[0], found.u, place[2])
+    located = _Located(kind, [found or with_details(point, located=False)], here,
+                       float(problem.scales[-1]), accuracy)
     if kind in _WITH_NORMAL_FORM:
-        judged = _on_finer_meshes(point, found, place)
+        judged = _judged(located, found)
     else:
         away = abs(float(problem.weights() * place[2] @ (u - start)))
-        judged = _change_on_finer_meshes(point, found, place, max(away, _DISTANCES[0]))
-    result = unresolved(result) if judged is None else with_details(result, **judged)
+        judged = _confirmed(located, found, max(away, _DISTANCES[0]))
+    if judged is not None:
+        located.refine()
+    best, error = located.best()
+    result = unresolved(best) if judged is None else with_details(best, **judged)
+    if not np.isnan(error):
+        return with_details(result, parameter_error=error)
     if np.isnan(result.parameter_error) and not result.located:
-        result = with_details(result, parameter_error=_reach(place))
+        return with_details(result, parameter_error=_reach(place))
     return result
+
+
+class _Located:
+    """A special point on meshes each of twice the intervals of the one before.
+
+    The first of the points is that on the branch's own number of intervals, or as the branch has it
+    where it is not found there. ``place`` is the finest mesh so far.
+    """
+
+    def __init__(
+        self, kind: str, points: list[BranchPoint], place: Place, width: float,
+        accuracy: Accuracy,
+    ) -> None:
+        self.kind, self.points, self.place = kind, points, place
+        self._tolerance, self._most = accuracy.tolerance * width, accuracy.most_intervals
+        self._rounding = _ROUNDING * width
+        # Whether the last mesh has the point.
+        self.found = True
+
+    @property
+    def intervals(self) -> int:
+        """Number of intervals of the finest mesh."""
+        return self.place[0].intervals
+
+    def next(self) -> BranchPoint | None:
+        """The point on twice the intervals; None if it is not found there."""
+        problem, u, tangent = self.place
+        self.place = _with_twice_the_intervals(problem, u, tangent)
+        finer = _found(self.place, self.kind)
+        self.found = finer is not None
+        if finer is not None:
+            self.points.append(finer)
+            self.place = self.place[0], finer.u, self.place[2]
+        return finer
+
+    def refine(self) -> None:
+        """Twice the intervals as often as the error is too large."""
+        while (self.found and not self.best()[1] <= self._tolerance
+               and 2 * self.intervals <= self._most):
+            self.next()
+
+    def best(self) -> tuple[BranchPoint, float]:
+        """The point on the first mesh that is fine enough, and the error of its parameter.
+
+        A change much smaller than the one before is an accident: an error falls by 256 from mesh to
+        mesh of degree four where the motion is smooth.
+        """
+        places = [point.parameter for point in self.points]
+        changes = [abs(after - before) for before, after in pairwise(places)]
+        if not self.points[0].located and len(self.points) > 1:
+            changes[0] = max(changes[0], self._tolerance * (1.0 + _LEAST_FALL))
+        if not changes:
+            return self.points[0], float("nan")
+        errors = [max(change, _LEAST_FALL * before, self._rounding)
+                  for change, before in zip(changes, [0.0, *changes], strict=False)]
+        fine = [k for k, error in enumerate(errors) if error <= self._tolerance]
+        return self.points[fine[0] if fine else -2], errors[fine[0] if fine else -1]
 
 
 def _unit(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
@@ -140,29 +225,22 @@ def _reach(place: Place) -> float:
     return max(_DISTANCES) * abs(float(place[2][-1]))
 
 
-def _on_finer_meshes(
-    rough: BranchPoint, found: BranchPoint | None, place: Place
-) -> dict[str, Any] | None:
-    """Coefficient, criticality and parameter error of a special point, from finer meshes.
+def _judged(located: _Located, found: BranchPoint | None) -> dict[str, Any] | None:
+    """Coefficient and criticality of a special point, from finer meshes; None if none has it.
 
-    None if no finer mesh has the point. The error of the coefficient is its last change from mesh
-    to mesh, and at least half the change before: two meshes may agree by accident.
+    The error of the coefficient is its last change from mesh to mesh, and at least half the change
+    before: two meshes may agree by accident.
     """
-    problem, u, tangent = place
-    kind, parameter = str(rough.kind), (found or rough).parameter
-    most = _FINEST_MESH * problem.intervals
+    most = _FINEST_MESH * located.intervals
     coefficients = [] if found is None else [_normal_form(found)[0]]
-    u, error, before = u if found is None else found.u, float("nan"), float("inf")
-    confirmed = False
-    while 2 * problem.intervals <= most:
-        place = _with_twice_the_intervals(problem, u, tangent)
-        problem, u, tangent = place
-        finer = _found(place, kind)
+    error, before, confirmed = float("nan"), float("inf"), False
+    while 2 * located.intervals <= most:
+        finer = located.next()
         if finer is None:
             error = float("nan")
             continue
-        found, u, confirmed = finer, finer.u, True
-        coefficient, own_error = _normal_form(found)
+        confirmed = True
+        coefficient, own_error = _normal_form(finer)
         if own_error > before:  # Rounding on this mesh is more than the last change.
             continue
         coefficients.append(coefficient)
@@ -174,10 +252,7 @@ def _on_finer_meshes(
         before = change
         if verdict(coefficients[-1], error)["criticality"] != "undecided":
             break
-    if found is None or not confirmed:
-        return None
-    return {**verdict(coefficients[-1], error),
-            "parameter_error": abs(found.parameter - parameter)}
+    return verdict(coefficients[-1], error) if confirmed else None
 
 
 def _normal_form(point: BranchPoint) -> tuple[float, float]:
@@ -191,28 +266,23 @@ def _with_twice_the_intervals(problem: CollocationProblem, u: Array, tangent: Ar
     return _unit(*problem.on_mesh(mesh, u, tangent))
 
 
-def _change_on_finer_meshes(
-    rough: BranchPoint, found: BranchPoint | None, place: Place, reach: float
+def _confirmed(
+    located: _Located, found: BranchPoint | None, reach: float
 ) -> dict[str, Any] | None:
-    """Parameter error of a fold or branch point; None if no two successive meshes agree on it.
+    """Nothing more about a fold or branch point; None if no two successive meshes agree on it.
 
     They agree if both have the point, and the same test function a distance ``reach`` before and
     behind it.
     """
-    kind, parameter = str(rough.kind), (found or rough).parameter
-    problem, u, tangent = place
+    problem, _, tangent = located.place
     before = None if found is None else (problem, found.u, tangent)
-    u = u if found is None else found.u
     for _ in range(_DOUBLINGS):
-        problem, u, tangent = _with_twice_the_intervals(problem, u, tangent)
-        finer = _found((problem, u, tangent), kind)
+        finer = located.next()
         if finer is None:
             return None
-        u = finer.u
-        here = problem, u, tangent
-        if before is not None and _agree(before, here, kind, reach):
-            return {"parameter_error": abs(finer.parameter - parameter)}
-        before = here
+        if before is not None and _agree(before, located.place, located.kind, reach):
+            return {}
+        before = located.place
     return None
 
 

@@ -16,6 +16,27 @@ class Border:
         bordered_kernels.reduce_border(factors, row, self.weights, self.small)
 
 
+def original_rows(factors: CondensedFactors, end: Array, reduced: Array | None = None) -> Array:
+    """Multiples (N m d,) of the collocation rows for those (d,) of the rows of ``factors.end``.
+
+    ``reduced``, if given, are multiples of the pivot rows to be added.
+    """
+    pivots = pivot_rows(factors)
+    out = np.empty(len(factors.local) * factors.inner.shape[1])
+    bordered_kernels.original_rows(factors, np.zeros(pivots) if reduced is None else reduced,
+                                   np.ascontiguousarray(end), out)
+    return out
+
+
+def expand_open(factors: CondensedFactors, start: Array, end: Array) -> Array:
+    """All nodes (N m d,) from both ends (d,), the common unknowns and right-hand sides zero."""
+    d, columns = factors.end.shape
+    out = np.empty(len(factors.local) * factors.inner.shape[1])
+    bordered_kernels.expand(factors, np.zeros(pivot_rows(factors)), np.ascontiguousarray(start),
+                            np.ascontiguousarray(end), np.zeros(columns - 2 * d), out)
+    return out
+
+
 class Bordered:
     """A bordered system, with x(1) = closing x(0)."""
 
@@ -42,6 +63,19 @@ class Bordered:
         out = np.empty(self._nodal + self._small.shape[1] - 2 * d)
         bordered_kernels.solve(self._factors, rhs, self._weights, self._small, self._closing, out)
         return out
+
+    def weakest(self) -> tuple[float, Array, Array]:
+        """Smallest singular value of the reduced matrix, of even rows, and both its vectors.
+
+        The left one is given as multiples (N m d,) of the collocation rows, the right one with all
+        unknowns.
+        """
+        d, matrix = len(self._factors.end), self.matrix
+        balance = 1.0 / np.abs(matrix).max(axis=1)
+        lefts, sizes, rights = np.linalg.svd(matrix * balance[:, None])
+        left = lefts[:, -1] * balance
+        rows = original_rows(self._factors, left[:d], -left[d:] @ self._weights)
+        return float(sizes[-1]), rows, self.expand(rights[-1])
 
     def expand(self, solution: Array) -> Array:
         """All unknowns from x_0 and the common unknowns for a zero right-hand side."""

@@ -10,10 +10,21 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.linalg.condensation import FACTORS
-from fecontact.bifurcation.linalg.lane_lu import back_lanes, forward_lanes, reduce_row_lanes
+from fecontact.bifurcation.linalg.lane_lu import (
+    back_lanes,
+    forward_lanes,
+    forward_lanes_transposed,
+    reduce_row_lanes,
+)
 from fecontact.bifurcation.linalg.simd import WIDTH, gather, read, spread, write
 from fecontact.core.compiled import f8, helper, kernel, matrix, vector
-from fecontact.core.dense_lu import backward, factorise, forward, reduce_row
+from fecontact.core.dense_lu import (
+    backward,
+    factorise,
+    forward,
+    forward_transposed,
+    reduce_row,
+)
 from fecontact.core.dense_lu import solve as solve_dense
 from fecontact.core.references import borrowed
 
@@ -160,6 +171,58 @@ def reduce_side(factors, rhs, reduced, side):
         for i in range(d):
             of_top[lane - 1, i] = both[i]
             side[i] = both[d + i]
+
+
+@kernel(types.void(FACTORS, vector, vector, vector))
+def original_rows(factors, reduced, end, out):
+    """Fill ``out`` (N m d,) with multiples of the collocation rows.
+
+    Their sum is that of the pivot rows times ``reduced`` and of the rows of ``factors.end`` times
+    ``end`` (d,): the transpose of :func:`reduce_side`.
+    """
+    factors, end, out, reduced = (borrowed(factors), borrowed(end), borrowed(out),
+                                  borrowed(reduced))
+    of_inner, of_chain, of_top = _parts(factors, reduced)
+    groups, size, _, _ = factors.inner.shape
+    N, d, _ = factors.local.shape
+    inner = size - d
+    r, pair, mixed = (np.empty((size, WIDTH)), np.zeros((2 * d, WIDTH)),
+                      np.empty((2 * d, WIDTH)))
+    both = np.empty(2 * d)
+    for i in range(d):
+        both[i] = end[i]
+    for lane in range(len(factors.top), 0, -1):
+        for i in range(d):
+            both[d + i] = both[i]
+            both[i] = of_top[lane - 1, i]
+        forward_transposed(factors.top[lane - 1], d, factors.top_pivots[lane - 1], both)
+        for i in range(d):
+            pair[d + i, lane] = both[d + i]
+    for i in range(d):
+        pair[d + i, 0] = both[i]
+    for group in range(groups - 1, -1, -1):
+        if group == 0:
+            for i in range(d):
+                write(r[inner + i], read(pair[d + i]))
+        else:
+            for i in range(d):
+                write(pair[i], read(of_chain[group - 1, i]))
+            forward_lanes_transposed(factors.chain[group - 1], d, pair)
+            for i in range(2 * d):
+                for lane in range(WIDTH):
+                    mixed[factors.chain_order[group - 1, i, lane], lane] = pair[i, lane]
+            for i in range(d):
+                write(pair[d + i], read(mixed[i]))
+                write(r[inner + i], read(mixed[d + i]))
+        for i in range(inner):
+            write(r[i], read(of_inner[group, i]))
+        forward_lanes_transposed(factors.inner[group], inner, r)
+        order = factors.inner_order[group]
+        for i in range(size):
+            for lane in range(WIDTH):
+                j = lane * groups + group
+                if j < N:
+                    out[j * size + (order[i, lane] if inner else i)] = r[i, lane]
 
 
 @kernel(types.void(FACTORS, vector, vector, vector, vector, vector))

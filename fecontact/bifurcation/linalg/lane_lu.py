@@ -108,6 +108,17 @@ def forward_lanes(a, count, r):
 
 
 @helper
+def forward_lanes_transposed(a, count, r):
+    """The transpose of :func:`forward_lanes`."""
+    rows = len(r)
+    for k in range(count - 1, -1, -1):
+        total = read(r[k])
+        for i in range(k + 1, rows):
+            total = total - read(a[i, k]) * read(r[i])
+        write(r[k], total)
+
+
+@helper
 def back_lanes(a, count, r, known):
     """Back-substitution of r (count, 8): fill known[:count] (.., 8) from its other entries."""
     width = len(known)

@@ -17,7 +17,7 @@ from fecontact.bifurcation.continuation.problem import (
     width_of,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
-from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, sharpened
+from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.harmonic import branches as harmonic_branches
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
@@ -51,6 +51,12 @@ class Collocation:
         Number of mesh intervals, at least 2.
     degree : int
         Degree of the polynomial on each interval, 2 to 7.
+    tolerance : float
+        Largest error of the parameter of special points, in widths of the diagram: each is located
+        again on twice the intervals until its ``parameter_error`` is smaller, up to
+        ``most_intervals``. It then keeps the mesh that suffices.
+    most_intervals : int
+        Limit for that.
 
     Raises
     ------
@@ -60,9 +66,20 @@ class Collocation:
 
     intervals: int = 50
     degree: int = 4
+    tolerance: float = 1e-7
+    most_intervals: int = 800
 
     def __post_init__(self) -> None:
         require_mesh(self.intervals, self.degree)
+        require_positive("Collocation", tolerance=self.tolerance)
+        if not (isinstance(self.most_intervals, int | np.integer) and self.most_intervals >= 2):
+            raise InputError(f"Collocation: most_intervals = {self.most_intervals!r} must be a "
+                             f"whole number of at least 2.")
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """How well special points are to be located."""
+        return Accuracy(self.tolerance, int(self.most_intervals))
 
 
 @dataclass(frozen=True)
@@ -216,7 +233,11 @@ def _method_of(point: BranchPoint) -> Method:
     if point.by_shooting:
         return Shooting(int(known["segments"]), float(known.get("rtol", 1e-9)),
                         known.get("derivative_rtol"), solver_of(known))
-    return Collocation(len(point.values["mesh"]) - 1, int(known["degree"]))
+    usual = Collocation()
+    # Special points may have more intervals than their branch.
+    return Collocation(int(known.get("intervals", len(point.values["mesh"]) - 1)),
+                       int(known["degree"]), float(known.get("tolerance", usual.tolerance)),
+                       int(known.get("most_intervals", usual.most_intervals)))
 
 
 def _keeps(point: BranchPoint, method: Method | None) -> bool:
@@ -254,7 +275,7 @@ def _from_hopf(
                                                  method.derivative_rtol, method.solver, options))
     return _first_that_goes(
         starts.at_hopf(field, point, method.intervals, method.degree, options, scales, width),
-        lambda found: _followed(found[0], options, found[1]))
+        lambda found: _followed(found[0], method, options, found[1]))
 
 
 def _from_motion(
@@ -281,7 +302,7 @@ def _from_motion(
         lambda intervals: starts.from_samples(
             field, given, free, motion.times, motion.states, motion.period, intervals,
             method.degree, motion.periods, widths), method.intervals)
-    return _followed((problem, u, None), options, limits, direction=direction, both=both)
+    return _followed((problem, u, None), method, options, limits, direction=direction, both=both)
 
 
 def _beyond(
@@ -310,16 +331,19 @@ def _beyond(
     problem = rescaled(problem, scales, width)
     found = (starts.doubled(problem, u) if point.kind == "period doubling"
              else starts.crossing(problem, u, tangent))
-    problem, u, tangent = starts.on_intervals(
-        found, method.intervals if isinstance(method, Collocation) else None)
+    usual = _method_of(point)
+    assert isinstance(usual, Collocation)
+    intervals = usual.intervals * (2 if point.kind == "period doubling" else 1)
+    chosen = method if isinstance(method, Collocation) else replace(usual, intervals=intervals)
+    problem, u, tangent = starts.on_intervals(found, chosen.intervals)
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
 
     # At the point both branches are indistinguishable, and the new one may bend strongly: step off
     # it, by less if the corrector fails.
     def go(part: float) -> Branch:
         step = max(part * options.step, options.smallest_step)
-        return _followed((problem, u + step * tangent, tangent), replace(options, step=step),
-                         None)
+        return _followed((problem, u + step * tangent, tangent), chosen,
+                         replace(options, step=step), None)
 
     return _first_that_goes(iter(_FIRST_STEPS), go)
 
@@ -341,15 +365,16 @@ def _goes_on(
     limits = None if scales is not None else point.branch.attributes.get("limits")
     found = restored(field, point)
     problem = replace(rescaled(found[0], scales, width), limits=limits)
-    problem, u, tangent = starts.on_intervals(
-        (problem, *found[1:]), method.intervals if isinstance(method, Collocation) else None)
+    chosen = method if isinstance(method, Collocation) else _method_of(point)
+    assert isinstance(chosen, Collocation)
+    problem, u, tangent = starts.on_intervals((problem, *found[1:]), chosen.intervals)
     problem, u, tangent = problem.adapted(u, sign * tangent)
-    return _followed((problem, u, tangent), options, limits, both=both)
+    return _followed((problem, u, tangent), chosen, options, limits, both=both)
 
 
 def _followed(
-    start: tuple[CollocationProblem, Array, Array | None], options: ContinuationOptions,
-    limits: Array | None, **how: Any,
+    start: tuple[CollocationProblem, Array, Array | None], method: Collocation,
+    options: ContinuationOptions, limits: Array | None, **how: Any,
 ) -> Branch:
     """Follow a branch by collocation and refine its special points."""
     problem, u, tangent = start
@@ -357,7 +382,8 @@ def _followed(
     attributes: dict[str, Any] = {
         "state_names": list(field.state_names), "parameter_names": list(field.parameters),
         "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
-        "periods": problem.periods}
+        "periods": problem.periods, "intervals": problem.intervals,
+        "tolerance": method.tolerance, "most_intervals": method.most_intervals}
     if limits is not None:
         attributes["limits"] = limits
     name = list(field.parameters)[problem.free]
@@ -372,14 +398,16 @@ def _followed(
     try:
         for index, point in enumerate(branch.points):
             if point.kind in SHARPENED:
-                points[index] = _sharpened(field, branch, index)
+                points[index] = _sharpened(field, branch, index, method.accuracy)
     except KeyboardInterrupt:
         branch = replace(branch, status=BranchStatus.INTERRUPTED)
     return replace(branch, points=tuple(points))
 
 
-def _sharpened(field: VectorField, branch: Branch, index: int) -> BranchPoint:
+def _sharpened(
+    field: VectorField, branch: Branch, index: int, accuracy: Accuracy
+) -> BranchPoint:
     """A special point, refined on the mesh of its own orbit."""
     point = branch.points[index]
     before = next((one for one in branch.points[index::-1] if one.kind is None), branch.points[-1])
-    return sharpened(point, restored(field, point), restored(field, before))
+    return sharpened(point, restored(field, point), restored(field, before), accuracy)

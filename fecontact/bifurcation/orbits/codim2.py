@@ -15,14 +15,21 @@ from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
+from fecontact.bifurcation.orbits.curves.criticality import (
+    Criticality,
+    Term,
+    along_parameter,
+    gradient,
+    of_doubling,
+    of_fold,
+    of_torus,
+)
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import VANISHED_ON_CURVES, VANISHING, vanishing
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 
-_TEST_STEP = 1e-5  # step of the differences of the test function, in the inner product
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
 
@@ -31,10 +38,9 @@ _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as
 class OrbitCurve(Problem):
     """Orbits on which a test function vanishes, with two free parameters.
 
-    The test function is the product of mu + 1 over the multipliers at period doublings, of
-    mu_i mu_k - 1 over pairs at torus bifurcations. At folds it is the component of the first
-    parameter in the tangent of the branch at fixed second parameter. For orbits of one period it is
-    the difference of their period from that, relative to it.
+    The test functions and their derivatives are those of
+    :mod:`fecontact.bifurcation.orbits.curves.criticality`. For orbits of one period it is the
+    difference of their period from that, relative to it.
 
     The unknowns are those of the orbit, ``u = [nodes, T if it is unknown, second, first]``.
 
@@ -44,15 +50,12 @@ class OrbitCurve(Problem):
         With a second free parameter.
     kind : str
         'fold', 'period doubling', 'Neimark-Sacker' or 'period'.
-    row : (n,) array
-        Border row that normalises the tangent, for folds.
     period : float
         The period [s] of all orbits, for the kind 'period'.
     """
 
     orbit: CollocationProblem
     kind: str
-    row: Array
     period: float = 1.0
 
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
@@ -65,13 +68,14 @@ class OrbitCurve(Problem):
         """Weights of the inner product, those of the orbit."""
         return self.orbit.weights()
 
+    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
+        """Predictor with the curvature of the last step, that of orbits."""
+        return self.orbit.predicted(u, tangent, step)
+
     def adapted(self, u: Array, tangent: Array) -> "tuple[OrbitCurve, Array, Array]":
         """The problem for the next step, on a new mesh."""
         orbit, moved, turned = self.orbit.adapted(u, tangent)
-        result = replace(self, orbit=orbit)
-        if self.kind == "fold":
-            result = replace(result, row=orbit.weights() * result.rest(moved))
-        return result, moved, turned
+        return replace(self, orbit=orbit), moved, turned
 
     def met_again(
         self, origin: Problem, u: Array, tangent: Array, like: Array, heading: Array, within: float,
@@ -80,27 +84,6 @@ class OrbitCurve(Problem):
         if not isinstance(origin, OrbitCurve):
             return None
         return self.orbit.met_again(origin.orbit, u, tangent, like, heading, within)
-
-    def rest(self, u: Array) -> Array:
-        """Tangent (n,) of the branch of orbits at fixed second parameter."""
-        linearised = self.orbit.linearise(u)
-        bordered = linearised.with_rows([_unit(len(u), -2)])
-        _, _, vectors = np.linalg.svd(_even(bordered.matrix))
-        found = bordered.expand(vectors[-1])
-        return np.asarray(found / np.sqrt(self.orbit.weights() @ found**2))
-
-    def test(self, linearised: CollocationLinearisation) -> float:
-        """The test function."""
-        if self.kind == "period":
-            return linearised.period / self.period - 1.0
-        if self.kind != "fold":
-            doubling, _, torus = linearised.floquet.products
-            return doubling if self.kind == "period doubling" else torus
-        n = len(linearised.u)
-        side = np.zeros(n)
-        side[-2] = 1.0
-        return float(linearised.with_rows([self.row, _unit(n, -2)]).solve(side)[-1]
-                     / self.orbit.scales[-1])
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Both parameters and the values stored on a branch of orbits."""
@@ -118,10 +101,9 @@ class OrbitCurve(Problem):
 
     def _codimension_two(self, u: Array, linearisation: Any) -> dict[str, float]:
         if self.kind == "fold":
-            along = self.rest(u)
-            return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}
+            return {"cusp": linearisation.bend}
         if self.kind == "period doubling":
-            expansion = Expansion(self.orbit, u, linearisation.orbit)
+            expansion = Expansion(self.orbit, u, linearisation.orbit, linearisation.terms[0])
             return {"generalised period doubling": expansion.doubling(_NORMAL_FORM_STEP)}
         if self.kind == "period":
             return {}
@@ -149,44 +131,44 @@ class CurveLinearised:
     @cached_property
     def residual(self) -> Array:
         """Residual of the orbit, and the test function."""
-        return np.append(self.orbit.residual, self.problem.test(self.orbit))
+        return np.append(self.orbit.residual, self._critical.value)
 
     @cached_property
-    def _plane(self) -> tuple[Any, list[Array], list[float]]:
-        """Bordered equations of the orbit, their two null directions, the test along these."""
-        weights = self.problem.weights()
-        bordered = self.orbit.with_rows([])
-        _, _, vectors = np.linalg.svd(_even(bordered.matrix))
-        directions: list[Array] = []
-        for vector in vectors[-2:]:
-            found = bordered.expand(vector)
-            for other in directions:
-                found = found - (weights * other @ found) * other
-            directions.append(found / np.sqrt(weights @ found**2))
-        whole = self.orbit.with_rows([weights * one for one in directions])
-        return whole, directions, [self.slope(one) for one in directions]
+    def _fold(self) -> tuple[Criticality, Array]:
+        return of_fold(self.orbit)
 
-    def slope(self, direction: Array) -> float:
-        """Derivative of the test function along a direction."""
-        size = float(np.sqrt(self.problem.weights() @ direction**2))
-        if size == 0.0:
-            return 0.0
-        h = _TEST_STEP / size
-        up, down = (self.problem.test(self.problem.orbit.linearise(self.u + sign * direction))
-                    for sign in (h, -h))
-        return (up - down) / (2.0 * h)
+    @cached_property
+    def _critical(self) -> Criticality:
+        """The test function."""
+        kind = self.problem.kind
+        if kind == "fold":
+            return self._fold[0]
+        if kind == "period":
+            return Criticality(self.orbit.period / self.problem.period - 1.0, ())
+        return of_doubling(self.orbit) if kind == "period doubling" else of_torus(self.orbit)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """What the derivative of the test function is made of."""
+        return self._critical.terms
+
+    @property
+    def bend(self) -> float:
+        """Curvature -w G_uu v v / w G_p of the first parameter over the orbits, at folds."""
+        criticality, v = self._fold
+        slope = along_parameter(self.orbit, criticality.terms[0])
+        return float(self.gradient @ v / slope / (self.problem.weights() @ v**2))
+
+    @cached_property
+    def gradient(self) -> Array:
+        """Derivative (n,) of the test function."""
+        if self.problem.kind == "period":
+            return _unit(len(self.u), -3) / self.problem.period
+        return gradient(self.orbit, self._critical.terms)
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs."""
-        whole, directions, slopes = self._plane
-        part = whole.solve(np.concatenate([rhs[:-2], [0.0, 0.0]]))
-        matrix = np.array([slopes, [float(row @ one) for one in directions]])
-        side = np.array([rhs[-2] - self.slope(part), rhs[-1] - row @ part])
-        determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
-        if determinant == 0.0:
-            return np.full_like(part, np.nan)
-        first, second = np.linalg.solve(matrix, side)
-        return np.asarray(part + first * directions[0] + second * directions[1])
+        return self.orbit.with_rows([self.gradient, row]).solve(rhs)
 
 
 def orbit_curve(
@@ -221,9 +203,7 @@ def orbit_curve(
     if kind == "period" and not orbit.autonomous:
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
                          f"cannot keep; vary the frequency of the excitation instead.")
-    curve = OrbitCurve(orbit, kind, np.zeros(len(start)), problem.period(u))
-    if kind == "fold":
-        curve = replace(curve, row=orbit.weights() * curve.rest(start))
+    curve = OrbitCurve(orbit, kind, problem.period(u))
     return curve, start, {**point.branch.attributes, "scales": orbit.scales}
 
 
@@ -238,8 +218,3 @@ def _critical_mean(multipliers: NDArray[np.complex128]) -> float:
     first, second = np.triu_indices(len(multipliers), 1)
     nearest = np.argmin(np.abs(multipliers[first] * multipliers[second] - 1.0))
     return float((multipliers[first] + multipliers[second])[nearest].real / 2.0)
-
-
-def _even(matrix: Array) -> Array:
-    """A matrix with rows of the same size."""
-    return np.asarray(matrix / np.abs(matrix).max(axis=1)[:, None])

@@ -201,14 +201,28 @@ class CollocationLinearisation:
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array, Array]:
-        """Rates and their derivatives to state and parameter at the Gauss points."""
-        problem, values = self.problem, self.problem.parameters(self.u)
-        f, J, P = problem.field.derivatives(self._times, self._x, values, problem.active)
-        if not problem.autonomous:
-            self._add_forcing(self._x, values, P)
+        """Rates and their derivatives to state and parameter at the Gauss points.
+
+        Of forced systems that to a parameter includes the change of T: it is that of
+        T f(T tau, x, p), divided by T.
+        """
+        return self._derivatives_at(self._times, self._x)
+
+    def derivatives_beside(self, shifts: list[Array]) -> tuple[Array, Array, Array]:
+        """As :attr:`derivatives`, (k, N m, ...), beside the orbit by k shifts (N m, d)."""
+        x = np.concatenate([self._x + shift for shift in shifts])
+        found = self._derivatives_at(np.tile(self._times, len(shifts)), x)
+        f, J, P = (part.reshape(len(shifts), len(self._x), *part.shape[1:]) for part in found)
         return f, J, P
 
-    def _add_forcing(self, x: Array, values: Array, P: Array) -> None:
+    def _derivatives_at(self, times: Array, x: Array) -> tuple[Array, Array, Array]:
+        problem, values = self.problem, self.problem.parameters(self.u)
+        f, J, P = problem.field.derivatives(times, x, values, problem.active)
+        if not problem.autonomous:
+            self._add_forcing(times / self.period, x, values, P)
+        return f, J, P
+
+    def _add_forcing(self, phases: Array, x: Array, values: Array, P: Array) -> None:
         """Add the dependence of T on the parameter to P, the derivative of T f(T tau, x, p) / T."""
         problem, T = self.problem, self.period
         for place, index in enumerate(problem.active):
@@ -222,7 +236,7 @@ class CollocationLinearisation:
                 sides.append((beside, problem.periods * period))
             if sides[0][1] == T == sides[1][1]:
                 continue
-            up, down = (period * problem.field.rates(problem.times * period, x, beside)
+            up, down = (period * problem.field.rates(period * phases, x, beside)
                         for beside, period in sides)
             P[:, :, place] = (up - down) / (2.0 * h * T)
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.linalg.condensation import condense, factors_for
 from fecontact.bifurcation.orbits.collocation_kernels import to_nodes
+from fecontact.bifurcation.orbits.curves.criticality import Term, at_points, of_doubling
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 
 Array = NDArray[Any]
@@ -79,32 +80,35 @@ def _judged(coefficient: Any) -> dict[str, Any]:
 
 
 class Expansion:
-    """The flow about an orbit, to third order, on the points of collocation."""
+    """The flow about an orbit, to third order, on the points of collocation.
+
+    ``doubling`` is the term of :func:`of_doubling`, where it is known.
+    """
 
     def __init__(self, problem: Discretisation, u: Array,
-                 linearised: CollocationLinearisation) -> None:
-        self._problem, self._T = problem, linearised.period
+                 linearised: CollocationLinearisation, doubling: Term | None = None) -> None:
+        self._problem, self._linearised, self._u = problem, linearised, u
+        self._T, self._doubling = linearised.period, doubling
         self._values = problem.parameters(u)
         self._times = problem.times * self._T
         nodes = problem.nodes(u)
-        self._x, slopes = problem.at_gauss_points(nodes)
+        self._x, _ = problem.at_gauss_points(nodes)
         self._scales = problem.scales[: nodes.shape[1]]
         size = np.ptp(nodes, axis=0) / self._scales
         self._range = np.maximum(size, 0.1 * size.max()) * self._scales
         self._f, J, _ = linearised.derivatives
         self._J = self._T * J
         self._h = np.repeat(problem.widths, problem.degree)[:, None]
-        self._motion = slopes / self._h
         self._last: tuple[Array, float, list[Array]] | None = None
 
     def doubling(self, step: float) -> float:
         """Coefficient c of a period doubling, with differences over ``step``."""
-        V = self._doubling_function
+        left, V = self._doubling_functions
         bend, cubic = self._second(V, V, step), self._third(V, V, V, step)
         h2, drift = self._response(bend)
-        third = (cubic / 6.0 + self._second(h2, V, step) / 2.0
+        third = (cubic / 6.0 + self._second(V, h2, step) / 2.0
                  - drift / 2.0 * self._along(V))
-        return float(self._share(self._J, V[:, :, None], V, third, -1.0)[0])
+        return float((left * third).sum() / (left * V).sum())
 
     def torus(self, angle: float, step: float) -> float:
         """Coefficient Re D of a Neimark-Sacker point with multipliers exp(+- i angle)."""
@@ -116,23 +120,24 @@ class Expansion:
                  + self._second(h20, W, step) / 2.0
                  - drift * (self._along(V) - 1j * angle * V))
         columns = np.stack([_split(V), _split(1j * V)], axis=2)
-        return float(self._share(self._turned(angle), columns, _split(V), _split(third), 1.0)[0])
+        return float(self._share(self._turned(angle), columns, _split(V), _split(third))[0])
 
     @cached_property
-    def _doubling_function(self) -> Array:
-        """Eigenfunction of the multiplier -1 at the points (N m, d)."""
-        system = self._bordered(self._J, np.zeros((*self._x.shape, 0)), [], -1.0)
-        return self._normalised(self._function(system, -1.0))
+    def _doubling_functions(self) -> tuple[Array, Array]:
+        """Multiples (N m, d) of the equations at the points, and v at the points.
+
+        The equations w' - A w = g of antiperiodic w are solvable if sum left g is zero.
+        """
+        term = self._doubling or of_doubling(self._linearised).terms[0]
+        return self._h * term.left, self._normalised(term.states)
 
     def _torus_function(self, angle: float) -> Array:
         """Eigenfunction v of the multiplier exp(i angle) at the points, complex (N m, d)."""
         turned = self._turned(angle)
-        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [], 1.0)
-        return self._normalised(_joined(self._function(system, 1.0)))
-
-    def _function(self, system: Bordered, closing: float) -> Array:
+        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [])
         _, _, vectors = np.linalg.svd(system.matrix)
-        return self._at_points(system.expand(vectors[-1]), len(vectors[-1]), closing)
+        nodes = system.expand(vectors[-1])
+        return self._normalised(_joined(self._at_points(nodes, len(vectors[-1]))))
 
     def _normalised(self, V: Array) -> Array:
         weights = (np.tile(self._problem.rule.weights, self._problem.intervals)[:, None] * self._h)
@@ -140,28 +145,28 @@ class Expansion:
 
     def _response(self, bend: Array) -> tuple[Array, float]:
         """Periodic h with h' - A h = bend - a x' at the points, and the phase acceleration a."""
-        system, rows = self._periodic
-        found = system.solve(np.append((self._h * bend).reshape(-1), np.zeros(rows)))
-        h = self._at_points(found[: self._x.size], self._x.shape[1], 1.0)
-        return h, float(found[-1]) if rows else 0.0
+        problem, rows = self._problem, self._at_rest
+        side = np.zeros(len(self._u))
+        side[: self._x.size] = (self._h * bend).reshape(-1)
+        found = rows.solve(side)
+        h = self._at_points(found, self._x.shape[1])
+        return h, -float(found[problem.size]) / self._T if problem.autonomous else 0.0
 
     @cached_property
-    def _periodic(self) -> tuple[Bordered, int]:
-        """Equations of h' - A h + a x' with their phase condition, and its number of rows."""
-        motion = self._motion[:, :, None] if self._problem.autonomous else np.zeros(
-            (*self._x.shape, 0))
-        rows = [np.append(self._problem.phase_row, 0.0)] if self._problem.autonomous else []
-        return self._bordered(self._J, motion, rows, 1.0), len(rows)
+    def _at_rest(self) -> Bordered:
+        """Equations of the orbit at fixed parameters; a change of the period goes with x' / T."""
+        active = len(self._problem.active)
+        return self._linearised.with_rows([*np.eye(active, len(self._u), len(self._u) - active)])
 
     def _oscillating(self, angle: float, bend: Array) -> Array:
         """Periodic h with h' + i angle h - A h = bend at the points, complex."""
         turned = self._turned(angle)
-        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [], 1.0)
+        system = self._bordered(turned, np.zeros((*turned.shape[:2], 0)), [])
         found = system.solve(_split(self._h * bend).reshape(-1))
-        return _joined(self._at_points(found, turned.shape[1], 1.0))
+        return _joined(self._at_points(found, turned.shape[1]))
 
-    def _share(self, A: Array, columns: Array, kernel: Array, g: Array, closing: float) -> Array:
-        """Coefficients c for which w' - A w = g - columns c is solvable.
+    def _share(self, A: Array, columns: Array, kernel: Array, g: Array) -> Array:
+        """Both coefficients c for which w' - A w = g - columns c is solvable.
 
         The equations without the columns have the solution ``kernel``.
         """
@@ -169,24 +174,20 @@ class Expansion:
         row = np.empty((len(A), D))
         to_nodes(np.ascontiguousarray(kernel), problem.rule.weights[:, None] * problem.rule.values,
                  problem.widths, row)
-        if closing < 0.0:
-            row[0] = 0.0
-        rows = [np.append(row.reshape(-1), np.zeros(columns.shape[2]))]
-        if columns.shape[2] == 2:
-            other = _split(1j * _joined(row))
-            rows.append(np.append(other.reshape(-1), np.zeros(2)))
-        system = self._bordered(A, columns, rows, closing)
+        both = (row, _split(1j * _joined(row)))
+        rows = [np.append(one.reshape(-1), np.zeros(2)) for one in both]
+        system = self._bordered(A, columns, rows)
         side = np.append((self._h * g).reshape(-1), np.zeros(len(rows)))
         return system.solve(side)[len(A) * D :]
 
-    def _bordered(self, A: Array, columns: Array, rows: list[Array], closing: float) -> Bordered:
-        """Equations of w' - A w + columns c, with border rows and w(1) = closing w(0)."""
+    def _bordered(self, A: Array, columns: Array, rows: list[Array]) -> Bordered:
+        """Equations of w' - A w + columns c for periodic w, with border rows."""
         problem = self._problem
         N, m, (_, D, q) = problem.intervals, problem.degree, columns.shape
         factors = factors_for(N, m, D, q)
         condense(np.ascontiguousarray(A), np.zeros((N * m, D)), np.ascontiguousarray(-columns),
                  problem.widths, 1.0, problem.rule.values, problem.rule.slopes, 0, factors)
-        return Bordered(factors, [Border(factors, row) for row in rows], closing)
+        return Bordered(factors, [Border(factors, row) for row in rows], 1.0)
 
     def _turned(self, angle: float) -> Array:
         """A - i angle as a real matrix of twice the size."""
@@ -200,24 +201,16 @@ class Expansion:
     def _along(self, V: Array) -> Array:
         return np.einsum("cij,cj->ci", self._J, V)
 
-    def _at_points(self, nodes: Array, D: int, closing: float) -> Array:
-        problem = self._problem
-        m = problem.degree
+    def _at_points(self, nodes: Array, D: int) -> Array:
         shaped = nodes[: len(self._x) * D].reshape(-1, D)
-        closed = np.concatenate([shaped, closing * shaped[:1]])
-        patches = closed[np.arange(problem.intervals)[:, None] * m + np.arange(m + 1)]
-        return np.einsum("ck,jkd->jcd", problem.rule.values, patches).reshape(shaped.shape)
-
-    def _jacobian(self, shift: Array) -> Array:
-        x = np.ascontiguousarray(self._x + shift)
-        _, J, _ = self._problem.field.derivatives(self._times, x, self._values, ())
-        return self._T * J
+        return at_points(self._problem, shaped, shaped[0])
 
     def _jacobians(self, a: Array, h: float) -> list[Array]:
         """Jacobians at h, -h, 2 h and -2 h along a, shared by second and third derivatives."""
         if self._last is None or self._last[1] != h or self._last[0] is not a:
-            self._last = a, h, [self._jacobian(part * h * a)
-                                for part in (1.0, -1.0, 2.0, -2.0)]
+            x = np.concatenate([self._x + part * h * a for part in (1.0, -1.0, 2.0, -2.0)])
+            _, J, _ = self._problem.field.derivatives(np.tile(self._times, 4), x, self._values, ())
+            self._last = a, h, [*(self._T * J).reshape(4, *self._J.shape)]
         return self._last[2]
 
     def _scaled(self, direction: Array, step: float) -> float:

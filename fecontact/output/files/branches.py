@@ -217,8 +217,9 @@ def _stored(group: Any, path: str | Path) -> Branch:
     with reading(path):
         kinds = texts(group, "kind") if len(member(group, "kind")) else []
         count = len(kinds)
-        u = array(group, "u", (count, None) if count else (0,))
-        tangent = array(group, "tangent", u.shape)
+        u, tangent = (_vectors(group, name, count) for name in ("u", "tangent"))
+        if [len(each) for each in u] != [len(each) for each in tangent]:
+            raise DamagedError("'u' and 'tangent' differ in length")
         stored = {name: _read(item, count)
                   for name, item in _members(group, "values").items()}
         details = {int(index): {name: _value(item) for name, item in part.items()}
@@ -240,6 +241,13 @@ def _write(group: Any, name: str, values: list[Any]) -> None:
         return
     for index, value in enumerate(values):
         group.create_dataset(f"{name}/{index}", data=value)
+
+
+def _vectors(group: Any, name: str, count: int) -> list[Any]:
+    """Vectors written by :func:`_write`."""
+    if hasattr(member(group, name), "shape"):
+        return [*array(group, name, (count, None) if count else (0,))]
+    return [array(group, f"{name}/{index}", (None,)) for index in range(count)]
 
 
 def _members(group: Any, name: str) -> Any:

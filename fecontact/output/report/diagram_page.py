@@ -211,7 +211,7 @@ def point_texts(point: BranchPoint) -> list[str]:
     unstable = point.values.get("unstable")
     kind = point.kind or ("orbit" if point.is_orbit else "steady sliding")
     return [kind + (f", {point.criticality}" if point.criticality else ""),
-            f"{point.parameter:.7g}", "" if period is None else f"{float(period):.6g} s",
+            point.parameter_text(), "" if period is None else f"{float(period):.6g} s",
             "" if period is None else f"{1.0 / float(period):.6g} Hz",
             "" if unstable is None
             else count(int(unstable), "unstable direction") if unstable else "stable"]
