@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.normal_forms import Expansion
@@ -21,6 +20,7 @@ from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import VANISHED_ON_CURVES, VANISHING, vanishing
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 _TEST_STEP = 1e-5  # step of the differences of the test function, in the inner product
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
