@@ -13,6 +13,7 @@ from .output.files.branches import (
 from .output.files.case import Case
 from .output.files.dataset import to_pandas, to_xarray
 from .output.files.export import export_csv, export_fields, export_mat, export_netcdf
+from .output.files.field_runs import read_run, write_run
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
 from .output.files.stored_system import read_system
@@ -44,6 +45,7 @@ __all__ = [
     "read_mode",
     "read_resonance_curve",
     "read_response",
+    "read_run",
     "read_system",
     "read_table",
     "read_uff",
@@ -63,5 +65,6 @@ __all__ = [
     "write_mode",
     "write_resonance_curve",
     "write_response",
+    "write_run",
     "write_wear",
 ]

@@ -12,6 +12,7 @@ from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
 from .output.plots.modes import plot_convergence, plot_modes
+from .output.plots.phase_space import plot_phase_space
 from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
 from .output.plots.responses.response import plot_response
@@ -22,6 +23,7 @@ from .output.plots.wear import plot_wear
 from .output.render.mode_movie import render_mode
 from .output.render.movie import picture
 from .output.render.offscreen import rendering_problem
+from .output.render.phase_movie import render_phase_space
 from .sweeps.plots import plot_sobol, plot_strobed, plot_sweep
 
 __all__ = [
@@ -44,6 +46,7 @@ __all__ = [
     "plot_modes",
     "plot_nonlinear_mode",
     "plot_phase",
+    "plot_phase_space",
     "plot_poincare",
     "plot_receptance",
     "plot_resonance_curve",
@@ -58,6 +61,7 @@ __all__ = [
     "plot_sweep",
     "plot_wear",
     "render_mode",
+    "render_phase_space",
     "rendering_problem",
     "styled",
 ]

@@ -20,9 +20,8 @@ from .diagram_options import BranchSettings
 from .equilibria.branches import equilibrium_branch
 from .equilibria.equilibrium import Equilibrium, find_equilibrium
 from .equilibria.stability_map import StabilityMap, stability_map
+from .fields import VectorField, vector_field
 from .fields.contact_field import ContactField, contact_field
-from .fields.function_field import vector_field
-from .fields.vector_field import VectorField
 from .harmonic.method import HarmonicBalance
 from .harmonic.response import FrequencyResponse, frequency_response
 from .nonlinear_modes.mode_response import ModeResponse, Resonance, mode_response

@@ -23,11 +23,11 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium_curve
 from fecontact.bifurcation.equilibria.problem import equilibrium_at
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Smallest component of a tangent of length one that tells the sign of a parameter's change.
 _RESTS = 1e-6

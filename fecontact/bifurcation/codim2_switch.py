@@ -12,10 +12,10 @@ from fecontact.bifurcation.continuation.points import (
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, newton
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Distances from the Bautin point along the second parameter, in the width of the diagram, at which
 # the fold is looked for, and the range of the first parameter about the Hopf point there.

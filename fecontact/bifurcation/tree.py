@@ -17,11 +17,11 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.diagram_options import SWITCHES
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError, choices
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.orbits.branches import Method

@@ -1,5 +1,6 @@
 from .ensemble import Ensemble, strobe
 from .events import ContactEvents, Crossing, Events
+from .field_runs.field_run import FieldRun
 from .initial_state import PointStart, initial_state
 from .sensitivity import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
@@ -14,6 +15,7 @@ __all__ = [
     "Energies",
     "Ensemble",
     "Events",
+    "FieldRun",
     "PointStart",
     "Rodas5P",
     "Scipy",

@@ -20,13 +20,15 @@ from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.events import AnyEvent, Events, as_events
-from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.integrate.field_runs.start import start_any, start_state
+from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.rodas5p import step_loop
-from fecontact.integrate.rodas5p.driver import ENDS, start
-from fecontact.integrate.simulate import require_max_step
+from fecontact.integrate.rodas5p.driver import ENDS
+from fecontact.integrate.simulate import require_max_step, require_rodas
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import MOVING, Moving, in_time, state_size
 from fecontact.system.forcing_period import forcing_period
 
 
@@ -72,7 +74,7 @@ class Ensemble(Summarised):
 
 
 def ensemble(
-    systems: ContactSystem | Sequence[ContactSystem],
+    systems: Moving | Sequence[Moving],
     times: ArrayLike,
     *,
     initial: Initial | Sequence[Any] = "rest",
@@ -84,15 +86,16 @@ def ensemble(
     workers: int | None = None,
     progress: bool | Callable[[int], None] | None = None,
 ) -> Ensemble:
-    """Run many systems, or one from many initial states, and keep states at a few times.
+    """Run many systems or fields, or one from many initial states; keep states at a few times.
 
     The results are those of :func:`fecontact.simulate`, except that Rodas5P does not integrate
     powers, which do not limit its steps. Threads share the cores.
 
     Parameters
     ----------
-    systems : ContactSystem or sequence of E ContactSystem
-        The modal bases may differ in everything but the size of the state.
+    systems : ContactSystem or VectorField, or sequence of E
+        The modal bases may differ in everything but the size of the state; fields count at their
+        base values, see :meth:`VectorField.with_`.
     times : (K,) or (E, K) array
         Start of each run and the times to keep states at, ascending [s].
     initial : (E, size) array, sequence of E, or one for all
@@ -129,19 +132,21 @@ def ensemble(
         if not (isinstance(value, Integral) and value >= 1):
             raise InputError(f"{name} = {value!r} must be a whole number from 1 on.")
     count, kept = instants.shape
-    states = np.full((count, kept, members[0].size), np.nan)
+    states = np.full((count, kept, state_size(members[0])), np.nan)
     status = [Status.INTERRUPTED] * count
     steps = np.zeros(count, dtype=np.int64)
     watched = as_events(events)
     if watched and not solver.locates_events:
         raise InputError(f"Events are located only by Rodas5P() and SetValued(), not by "
                          f"{solver!r}; leave them out.")
-    seen = [Events.none(members[0].size)] * count
+    seen = [Events.none(state_size(members[0]))] * count
+    if not all(isinstance(member, ContactSystem) for member in members):
+        require_rodas(solver)
     done, leave = [0], [False]
 
     def compiled(index: int, state: Array) -> None:
-        run = start(members[index], state, instants[index], rtol=float(rtol), max_step=max_step,
-                    work=False, events=watched)
+        run = start_any(members[index], state, instants[index], rtol=float(rtol),
+                        max_step=max_step, events=watched)
         result = step_loop.RUNNING
         while result == step_loop.RUNNING:
             if leave[0]:
@@ -159,7 +164,9 @@ def ensemble(
         if kept == 1:
             states[index, 0], status[index] = state, Status.FINISHED
             return
-        found = solver.run(Task(members[index], state, instants[index], float(rtol), max_step,
+        system = members[index]
+        assert isinstance(system, ContactSystem)
+        found = solver.run(Task(system, state, instants[index], float(rtol), max_step,
                                 watched, look))
         outputs = int(np.searchsorted(instants[index], found.time[-1], side="right"))
         states[index, :outputs] = found.states[:outputs]
@@ -200,7 +207,7 @@ class _LeftError(Exception):
 
 
 def strobe(
-    systems: ContactSystem | Sequence[ContactSystem],
+    systems: Moving | Sequence[Moving],
     *,
     transient_periods: int,
     keep: int,
@@ -211,7 +218,7 @@ def strobe(
 
     Parameters
     ----------
-    systems : ContactSystem or sequence of E ContactSystem
+    systems : ContactSystem or VectorField, or sequence of E
         The systems.
     transient_periods : int
         Number of periods before the first state that is kept.
@@ -236,7 +243,7 @@ def strobe(
             ("transient_periods", transient_periods, 0), ("keep", keep, 1)):
         if not (isinstance(value, Integral) and value >= least):
             raise InputError(f"{name} = {value!r} must be a whole number from {least} on.")
-    given = [systems] if isinstance(systems, ContactSystem) else list(systems)
+    given = [systems] if isinstance(systems, MOVING) else list(systems)
     if period is None:
         periods = np.array([forcing_period(system) for system in given])
     else:
@@ -254,20 +261,22 @@ def strobe(
 
 
 def _members(
-    systems: ContactSystem | Sequence[ContactSystem], initial: Any, times: ArrayLike,
-) -> tuple[list[ContactSystem], Callable[[int], Array], Array]:
+    systems: Moving | Sequence[Moving], initial: Any, times: ArrayLike,
+) -> tuple[list[Moving], Callable[[int], Array], Array]:
     """System and times of each run, and a function that returns its initial state."""
-    require_kind("ensemble", (ContactSystem, Sequence), systems=systems)
+    require_kind("ensemble", (*MOVING, Sequence), systems=systems)
     instants = np.array(as_floats(times, "times"))
-    single = isinstance(systems, ContactSystem)
-    members = [systems] if isinstance(systems, ContactSystem) else list(systems)
-    if not members or not all(isinstance(system, ContactSystem) for system in members):
-        raise InputError("systems must be a ContactSystem or a list of them, not empty.")
+    single = isinstance(systems, MOVING)
+    given = [systems] if isinstance(systems, MOVING) else list(systems)
+    if not given or not all(isinstance(system, MOVING) for system in given):
+        raise InputError("systems must be a ContactSystem, a VectorField or a list of them, not "
+                         "empty.")
+    members = [in_time("ensemble", system) for system in given]
     many = initial if _is_many(initial) else None
     count = len(members) if not single else len(many) if many is not None else (
         len(instants) if instants.ndim == 2 else 1)
     members = members * count if single else members
-    sizes = {system.size for system in members}
+    sizes = {state_size(system) for system in members}
     if len(sizes) > 1:
         raise InputError(f"The states of all systems must have the same size, not {sorted(sizes)}.")
     if many is not None and len(many) != count:
@@ -281,11 +290,13 @@ def _members(
 
     def state(index: int) -> Array:
         given = initial if many is None else many[index]
-        return initial_state(members[index], given, float(instants[index, 0]))
+        return start_state(members[index], given, float(instants[index, 0]))
 
     return members, state, np.ascontiguousarray(instants)
 
 
 def _is_many(initial: Any) -> bool:
-    return (isinstance(initial, np.ndarray) and initial.ndim == 2) or isinstance(
-        initial, list | tuple)
+    """Whether there is an initial state for each run; a list of numbers is one state."""
+    if isinstance(initial, list | tuple):
+        return not all(isinstance(value, Real) for value in initial)
+    return isinstance(initial, np.ndarray) and initial.ndim == 2

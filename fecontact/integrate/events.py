@@ -12,6 +12,8 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.event_kernels import EVENT, FIRST_OWN
 from fecontact.reduction.modal_basis import COMPONENTS, Component
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import state_size
+from fecontact.system.fields.vector_field import VectorField
 
 CONTACT_EVENTS = ("touch-down", "lift-off", "stick", "slip")
 _SENSES = {"both": 0, "rising": 1, "falling": -1}
@@ -105,7 +107,7 @@ class Event:
             raise InputError(f"Event: parameters = {self.parameters!r} must be a list of finite "
                              f"numbers.")
 
-    def row(self, system: ContactSystem) -> Array:
+    def row(self, system: ContactSystem | VectorField) -> Array:
         """Parameters of the function for a system."""
         return np.atleast_1d(np.array(self.parameters, dtype=float))
 
@@ -122,16 +124,20 @@ def _plane(t, y, p):
 class Crossing:
     """Passage of a displacement or velocity of a point through a value (Poincare section).
 
+    Of a vector field that of one of its states: ``Crossing("x", value=1.0)``.
+
     Parameters
     ----------
     point : str or int
-        'B', 'C' or a further named point; a contact node by its number from 0.
+        'B', 'C' or a further named point; a contact node by its number from 0. The name of a state
+        of a vector field.
     component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
         Along the ground, away from it, or counter-clockwise; of solids along or about the axes.
+        None for a vector field.
     value : float
-        The value [m], [rad], [m/s] or [rad/s].
+        The value [m], [rad], [m/s] or [rad/s]; of a state in its unit.
     of : 'displacement' or 'velocity'
-        Quantity.
+        Quantity; not for a vector field.
     sense : 'both', 'rising' or 'falling'
         Direction of the passages.
     stop : bool
@@ -146,7 +152,7 @@ class Crossing:
     kernel: ClassVar[CompiledLaw] = _plane
 
     point: str | int
-    component: Component
+    component: Component | None = None
     value: float = 0.0
     of: Literal["displacement", "velocity"] = "displacement"
     sense: Literal["both", "rising", "falling"] = "both"
@@ -154,23 +160,53 @@ class Crossing:
 
     def __post_init__(self) -> None:
         _require_sense("Crossing", self.sense)
-        for name, names in (("component", COMPONENTS), ("of", ("displacement", "velocity"))):
-            value = getattr(self, name)
-            if value not in names:
-                raise InputError(f"Crossing: {name} = {value!r} must be one of {choices(names)}"
-                                 f"{nearest(str(value), names)}.")
+        require_quantity("Crossing", self.component, self.of)
         if not np.isfinite(self.value):
             raise InputError(f"Crossing: value = {self.value!r} must be finite.")
 
-    def row(self, system: ContactSystem) -> Array:
-        """Parameters of the function for a system."""
-        basis = system.basis
-        m = basis.modes
-        row = np.zeros(1 + system.size)
-        row[0] = self.value
-        first = 1 if self.of == "displacement" else 1 + m
-        row[first : first + m] = basis.point_row(self.point, self.component)
+    def row(self, system: ContactSystem | VectorField) -> Array:
+        """Parameters of the function for a system: the value, and the row (size,) of the quantity.
+
+        Raises
+        ------
+        InputError
+            If there is no such point, component or state.
+        """
+        return np.append(self.value, quantity_row(system, self.point, self.component, self.of))
+
+
+def require_quantity(owner: str, component: Any, of: Any) -> None:
+    """Raise InputError unless these are a component, or None, and a displacement or velocity."""
+    for name, value, names in (("component", component, COMPONENTS),
+                               ("of", of, ("displacement", "velocity"))):
+        if value not in names and not (name == "component" and value is None):
+            raise InputError(f"{owner}: {name} = {value!r} must be one of {choices(names)}"
+                             f"{nearest(str(value), names)}.")
+
+
+def quantity_row(
+    system: ContactSystem | VectorField, point: str | int, component: Component | None, of: str
+) -> Array:
+    """Row (size,) of a displacement or velocity of a point, or of a state of a vector field.
+
+    Raises
+    ------
+    InputError
+        If there is no such point, component or state.
+    """
+    row = np.zeros(state_size(system))
+    if isinstance(system, VectorField):
+        if component is not None or of != "displacement":
+            raise InputError(f"A vector field has states, but no points: give the name of one "
+                             f"alone, such as {system.state_names[0]!r}.")
+        row[system.state_index(point)] = 1.0
         return row
+    if component is None:
+        raise InputError(f"component is missing: the direction in which {point!r} moves, one of "
+                         f"{choices(COMPONENTS)}.")
+    first = 0 if of == "displacement" else system.basis.modes
+    row[first : first + system.basis.modes] = system.basis.point_row(point, component)
+    return row
 
 
 @dataclass(frozen=True, eq=False)

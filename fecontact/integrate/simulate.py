@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from numbers import Real
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -13,10 +13,13 @@ from fecontact.core.memory import require_memory
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.events import AnyEvent, as_events
+from fecontact.integrate.field_runs.field_run import FieldRun, field_state, run_field
 from fecontact.integrate.initial_state import Initial, initial_state
-from fecontact.integrate.solvers import RODAS5P, Solver, Task, require_solver
+from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import in_time
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.kernels import PENETRATION
 from fecontact.system.model_limits import warn_of_limits
 from fecontact.system.powers import POWERS
@@ -34,36 +37,52 @@ _SHORTEST, _SPACINGS = 1e-100, 1e5
 _GIVEN = 1e-3
 
 
+@overload
 def simulate(
-    system: ContactSystem,
+    system: ContactSystem, t_end: float, *, t_start: float | None = None,
+    initial: Initial = "rest", outputs: int | ArrayLike = 1001, solver: Solver = RODAS5P,
+    rtol: float = 1e-6, max_step: float | None = None,
+    events: AnyEvent | Sequence[AnyEvent] | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> Trajectory: ...
+@overload
+def simulate(
+    system: VectorField, t_end: float, *, t_start: float | None = None,
+    initial: FieldRun | ArrayLike, outputs: int | ArrayLike = 1001, solver: Solver = RODAS5P,
+    rtol: float = 1e-6, max_step: float | None = None,
+    events: AnyEvent | Sequence[AnyEvent] | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> FieldRun: ...
+def simulate(
+    system: ContactSystem | VectorField,
     t_end: float,
     *,
     t_start: float | None = None,
-    initial: Initial = "rest",
+    initial: Any = "rest",
     outputs: int | ArrayLike = 1001,
     solver: Solver = RODAS5P,
     rtol: float = 1e-6,
     max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     progress: bool | Callable[[float], None] | None = None,
-) -> Trajectory:
-    """Integrate a contact system in time.
+) -> Trajectory | FieldRun:
+    """Integrate a contact system or a vector field in time.
 
     Parameters
     ----------
-    system : ContactSystem
-        The system.
+    system : ContactSystem or VectorField
+        The system; a field at its base values, see :meth:`VectorField.with_`.
     t_end, t_start : float
         End and start of the run [s]; by default it starts where the run that it continues ends, or
         at zero.
     initial : 'rest', 'sliding', RigidStart, Trajectory, LoadHistory, RestState or array
-        Initial state; see :func:`fecontact.integrate.initial_state`.
+        Initial state; see :func:`fecontact.integrate.initial_state`. Of a field a state, or a run.
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or ascending times [s].
     solver : Rodas5P, SetValued, Scipy or CVODE
         Default integrator; set-valued friction and rigid stops; stiff reference solvers.
     rtol : float
-        Relative tolerance; absolute ones follow from it and the scales of the contact laws.
+        Relative tolerance; absolute ones follow from it and the scales of laws, or of states.
     max_step : float, optional
         Longest step [s]; at most a fraction of the shortest period of drive, loads and waves.
     events : ContactEvents, Crossing, Event or sequence of them, optional
@@ -73,7 +92,7 @@ def simulate(
 
     Returns
     -------
-    Trajectory
+    Trajectory or FieldRun
         Also if the run ended early, by Ctrl-C or because the solver failed; see its ``status``.
         Each of its ``limits_exceeded`` is a ModelWarning, and so is friction that gave energy to
         the motion, as LuGre friction with large bristle damping can.
@@ -85,12 +104,11 @@ def simulate(
     AnalysisError
         If there is no equilibrium to start from.
     """
-    if not isinstance(system, ContactSystem):
-        raise InputError(f"simulate needs a ContactSystem, not {type(system).__name__}.")
+    moving = in_time("simulate", system)
     if t_start is None:
-        t_start = float(initial.time[-1]) if isinstance(initial, Trajectory) else 0.0
+        t_start = float(initial.time[-1]) if isinstance(initial, Trajectory | FieldRun) else 0.0
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
-        require_memory("outputs", int(outputs), _row_size(system))
+        require_memory("outputs", int(outputs), _row_size(moving))
     times = output_times(t_start, t_end, outputs)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
@@ -100,6 +118,18 @@ def simulate(
         raise InputError(f"Events are located only by Rodas5P() and SetValued(), not by "
                          f"{solver!r}; leave them out, or evaluate the outputs of the run.")
     watched = as_events(events)
+    if isinstance(system, VectorField):
+        state = field_state(system, initial)
+        if isinstance(moving, ContactSystem):
+            run = simulate(moving, t_end, t_start=t_start, initial=state, outputs=times,
+                           solver=solver, rtol=rtol, max_step=max_step, events=watched,
+                           progress=progress)
+            return FieldRun(system.parameters, system.state_names, run.time, run.states, run.status,
+                            run.statistics, run.events)
+        require_rodas(solver)
+        with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:
+            return run_field(system, state, times, rtol=float(rtol), max_step=max_step,
+                             events=watched, progress=tell)
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory | LoadHistory | RestState):
         _warn_of_depth(system, state, t_start)
@@ -161,8 +191,10 @@ def _warn_of_active_friction(run: Trajectory, rtol: float) -> None:
                       f"fecontact.laws.check_law tells more.", ModelWarning, stacklevel=3)
 
 
-def _row_size(system: ContactSystem) -> float:
+def _row_size(system: ContactSystem | VectorField) -> float:
     """Memory per output time [bytes]: two copies of states and work, and contact quantities."""
+    if isinstance(system, VectorField):
+        return 16.0 * system.dimension
     n = system.basis.contact_nodes
     states = 2 * system.basis.modes + n * system.memory
     return 8.0 * (2 * (states + len(POWERS) + n) + 10 * n)
@@ -190,6 +222,13 @@ def _depth_at_rest(system: ContactSystem, time: float) -> float:
         return _depth(system, initial_state(system, "rest", time), time)
     except AnalysisError:
         return 0.0
+
+
+def require_rodas(solver: Solver) -> None:
+    """Raise InputError unless a solver runs vector fields."""
+    if not isinstance(solver, Rodas5P) or solver.checkpoint is not None:
+        raise InputError(f"solver = {solver!r}: vector fields are run by Rodas5P() without a "
+                         f"checkpoint.")
 
 
 def require_max_step(max_step: Any) -> None:

@@ -37,6 +37,28 @@ class Status(Enum):
     FAILED = "The integrator could not go on; what was computed until then is kept."
 
 
+def output_part(t: Array, t_start: float | None, t_end: float | None) -> slice:
+    """Output times from ``t_start`` to ``t_end``, both included; the ends of the run by default.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two output times between them.
+    """
+    for name, value in (("t_start", t_start), ("t_end", t_end)):
+        if value is not None and not (isinstance(value, Real) and value == value):
+            raise InputError(f"{name} = {value!r} must be a time of the run.")
+    first = float(t[0]) if t_start is None else float(t_start)
+    last = float(t[-1]) if t_end is None else float(t_end)
+    rounding = 1e-12 * max(abs(float(t[0])), abs(float(t[-1])))
+    chosen = slice(int(np.searchsorted(t, first - rounding, side="left")),
+                   int(np.searchsorted(t, last + rounding, side="right")))
+    if chosen.stop - chosen.start < 2:
+        raise InputError(f"There are fewer than two output times from t_start = {first:g} s to "
+                         f"t_end = {last:g} s; the run goes from {t[0]:g} s to {t[-1]:g} s.")
+    return chosen
+
+
 @dataclass(frozen=True, eq=False)
 class Energies:
     """Energies, work put in and energy lost, each (N,) [J]; work and losses count from the start.
@@ -234,25 +256,14 @@ class Trajectory(ContactQuantities, Summarised):
         InputError
             If there are fewer than two output times between them.
         """
-        t = self.time
-        for name, value in (("t_start", t_start), ("t_end", t_end)):
-            if value is not None and not (isinstance(value, Real) and value == value):
-                raise InputError(f"{name} = {value!r} must be a time of the run.")
-        first = float(t[0]) if t_start is None else float(t_start)
-        last = float(t[-1]) if t_end is None else float(t_end)
-        rounding = 1e-12 * max(abs(float(t[0])), abs(float(t[-1])))
-        begin = int(np.searchsorted(t, first - rounding, side="left"))
-        chosen = slice(begin, int(np.searchsorted(t, last + rounding, side="right")))
-        if chosen.stop - begin < 2:
-            raise InputError(f"There are fewer than two output times from t_start = {first:g} s to "
-                             f"t_end = {last:g} s; the run goes from {t[0]:g} s to {t[-1]:g} s.")
+        chosen = output_part(self.time, t_start, t_end)
         kept: dict[str, Any] = {
             name: values[chosen]
             for name in ("time", "modal_coordinates", "modal_velocities", "memory",
                          "held_normal_force", "held_friction_force")
             if (values := getattr(self, name)) is not None}
         counted: dict[str, Any] = {
-            name: values[chosen] - values[begin]
+            name: values[chosen] - values[chosen.start]
             for name in ("work", "node_friction_work", "node_creep_work")
             if (values := getattr(self, name)) is not None}
         return replace(self, **kept, **counted)

@@ -12,6 +12,8 @@ from fecontact.laws.ground.profile import Profile, Sine
 from fecontact.laws.ground.random_roughness import RandomRoughness
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import in_time
+from fecontact.system.fields.vector_field import VectorField
 
 _REPEATING = (Harmonic, Harmonics)
 
@@ -60,18 +62,22 @@ def common_period(system: ContactSystem) -> float | None:
     return _common(periods)
 
 
-def forcing_period(system: ContactSystem) -> float:
-    """Period of the excitation of a system [s], see :func:`common_period`.
+def forcing_period(system: ContactSystem | VectorField) -> float:
+    """Period of the excitation of a system, or of a vector field at its base values [s].
+
+    That of a contact system is the common period of drive, loads and ground.
 
     Raises
     ------
     InputError
         If the system is autonomous.
     AnalysisError
-        As :func:`common_period`.
+        If one of them is not periodic, or the periods have no common multiple up to 1000 times the
+        longest.
     """
-    require_kind("forcing_period", ContactSystem, system=system)
-    period = common_period(system)
+    moving = in_time("forcing_period", system)
+    period = (common_period(moving) if isinstance(moving, ContactSystem)
+              else moving.forcing_period(moving.values))
     if period is None:
         raise InputError("The system has no time-dependent excitation, and so no period; give "
                          "period, or a periodic drive.")

@@ -7,28 +7,34 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
-from fecontact.integrate.events import Crossing
+from fecontact.integrate.events import Crossing, quantity_row, require_quantity
 from fecontact.integrate.solvers import RODAS5P, Solver
-from fecontact.reduction.modal_basis import COMPONENTS, Component
+from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import Moving, in_time, state_size
+
+# Looks at the second half of a run, in parts of the first.
+_LATE = (1.0 + 0.5 / np.sqrt(3.0), 1.0 + 1.0 / np.sqrt(2.0))
 
 
 @dataclass(frozen=True)
 class Axis:
     """A direction in the space of initial states: one displacement or velocity of a point.
 
+    Of a vector field one of its states: ``Axis("x")``.
+
     Parameters
     ----------
     point : str or int
-        'B', 'C' or a further named point; a contact node by its number from 0.
+        'B', 'C' or a further named point; a contact node by its number from 0. The name of a state
+        of a vector field.
     component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
-        Along the ground, away from it, counter-clockwise.
+        Along the ground, away from it, counter-clockwise. None for a vector field.
     of : 'displacement' or 'velocity'
-        Which of them [m], [rad], [m/s], [rad/s].
+        Which of them [m], [rad], [m/s], [rad/s]; not for a vector field.
 
     Raises
     ------
@@ -37,18 +43,15 @@ class Axis:
     """
 
     point: str | int
-    component: Component
+    component: Component | None = None
     of: Literal["displacement", "velocity"] = "displacement"
 
     def __post_init__(self) -> None:
-        for name, names in (("component", COMPONENTS), ("of", ("displacement", "velocity"))):
-            value = getattr(self, name)
-            if value not in names:
-                raise InputError(f"Axis: {name} = {value!r} must be one of {choices(names)}.")
+        require_quantity("Axis", self.component, self.of)
 
-    def row(self, system: ContactSystem) -> Array:
+    def row(self, system: Moving) -> Array:
         """The quantity as a row (size,) that acts on states."""
-        return Crossing(self.point, self.component, of=self.of).row(system)[1:]
+        return quantity_row(in_time("Axis", system), self.point, self.component, self.of)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,7 @@ class Basins:
 
 
 def basins(
-    system: ContactSystem,
+    system: Moving,
     first: tuple[Axis, ArrayLike],
     second: tuple[Axis, ArrayLike],
     *,
@@ -110,8 +113,8 @@ def basins(
 
     Parameters
     ----------
-    system : ContactSystem
-        Excited with one period, or not excited at all.
+    system : ContactSystem or VectorField
+        Excited with one period, or not excited at all; a field at its base values.
     first, second : (Axis, values)
         The plane: at each start these two quantities have these values, by the smallest change
         of the ``base`` state.
@@ -125,10 +128,10 @@ def basins(
         States on the section that are looked at, at least 4.
     section : Crossing, optional
         Poincare section of a system that is not excited; motions that do not meet it in the last
-        half of the run are equilibria.
+        half of the run, or keep one place there, are equilibria.
     tolerance : float
         States that differ by less are the same, in parts of the largest modal displacement, and
-        velocity, of all starts and sections.
+        velocity, of all starts and sections; of a field each state in parts of its largest.
     solver, rtol, workers, progress
         As for :func:`fecontact.ensemble`.
 
@@ -138,21 +141,22 @@ def basins(
         For values out of range, for two quantities that no state has independently, and as
         :func:`fecontact.ensemble`.
     """
-    require_kind("basins", ContactSystem, system=system)
+    moving = in_time("basins", system)
+    size = state_size(moving)
     if keep < 4:
         raise InputError(f"keep = {keep!r} must be at least 4.")
     if not 0.0 < tolerance < 1.0:
         raise InputError(f"tolerance = {tolerance!r} must be between 0 and 1.")
     a, b = (_values(name, given) for name, given in (("first", first), ("second", second)))
-    start = np.zeros(system.size) if base is None else np.array(base, dtype=float)
-    if start.shape != (system.size,):
-        raise InputError(f"base must have {system.size} values [q, q', z], not shape "
-                         f"{start.shape}.")
-    rows = np.array([axis.row(system) for axis, _ in (first, second)])
+    start = np.zeros(size) if base is None else np.array(base, dtype=float)
+    if start.shape != (size,):
+        values = "values [q, q', z]" if isinstance(moving, ContactSystem) else "values"
+        raise InputError(f"base must have {size} {values}, not shape {start.shape}.")
+    rows = np.array([axis.row(moving) for axis, _ in (first, second)])
     lengths = np.linalg.norm(rows, axis=1)
     if not lengths.all() or np.linalg.matrix_rank(rows / lengths[:, None], tol=1e-9) < 2:
         raise InputError(f"first = {first[0]} and second = {second[0]} cannot be chosen each by "
-                         f"itself with the modes of this body; take other points or axes.")
+                         f"itself, as the modes of a body or the same state; take other axes.")
     wanted = np.stack(np.meshgrid(a, b, indexing="ij"), axis=-1).reshape(-1, 2)
     states = start + (wanted - rows @ start) @ np.linalg.pinv(rows).T
     settings: dict[str, Any] = {"initial": states, "solver": solver, "rtol": rtol,
@@ -161,7 +165,7 @@ def basins(
         if transient_periods is None or transient is not None:
             raise InputError("basins: without a section give transient_periods, the periods of "
                              "the excitation before states count, and no transient.")
-        found = strobe(system, transient_periods=transient_periods, keep=keep, **settings)
+        found = strobe(moving, transient_periods=transient_periods, keep=keep, **settings)
         sets: list[Array | None] = [
             points if fine else None
             for points, fine in zip(found.states, found.finished, strict=True)]
@@ -172,15 +176,18 @@ def basins(
             raise InputError(f"basins: transient = {transient!r} must be a time above zero [s] "
                              f"before passages of the section count, without "
                              f"transient_periods.")
-        found = ensemble(system, [0.0, float(transient), 2.0 * float(transient)],
-                         events=section, **settings)
-        sets, still = [], []
+        # At times without a common measure: no motion is at one place at all of them.
+        late = float(transient) * np.array([0.0, 1.0, *_LATE, 2.0])
+        found = ensemble(moving, late, events=section, **settings)
+        sets, still, farthest = [], [], np.abs(states).max(axis=0)[np.newaxis]
         for events, ends, fine in zip(found.events or (), found.states, found.finished,
                                       strict=True):
-            late = events.states[events.time > transient][-keep:]
-            still.append(len(late) == 0)
-            sets.append(None if not fine else ends[-1:] if len(late) == 0 else late)
-    labels, attractors = _told_apart(sets, still, _scale(system, states, sets), tolerance)
+            passed = events.states[events.time > transient][-keep:]
+            kept = np.vstack([ends[1:], passed])
+            still.append(len(passed) == 0 or bool(
+                (np.ptp(kept, axis=0) < tolerance * _scale(moving, farthest, [kept])).all()))
+            sets.append(None if not fine else ends[-1:] if still[-1] else passed)
+    labels, attractors = _told_apart(sets, still, _scale(moving, states, sets), tolerance)
     return Basins(a, b, labels.reshape(len(a), len(b)), attractors)
 
 
@@ -197,12 +204,16 @@ def _values(name: str, given: Any) -> Array:
     return found
 
 
-def _scale(system: ContactSystem, starts: Array, sets: list[Array | None]) -> Array:
-    """Size (size,) of displacements, velocities and internal variables, each the same for all."""
-    m = system.basis.modes
+def _scale(moving: Moving, starts: Array, sets: list[Array | None]) -> Array:
+    """Size (size,) of displacements, velocities and internal variables, each the same for all.
+
+    Of a field the size of each state.
+    """
     size = np.abs(np.vstack([starts, *(points for points in sets if points is not None)])).max(
         axis=0)
-    scale = np.ones(system.size)
+    if not isinstance(moving, ContactSystem):
+        return np.where(size > 0.0, size, 1.0)
+    m, scale = moving.basis.modes, np.ones(len(size))
     for part in (slice(0, m), slice(m, 2 * m), slice(2 * m, None)):
         scale[part] = size[part].max(initial=0.0) or 1.0
     return scale

@@ -1,23 +1,36 @@
 """Lyapunov exponents: mean growth rates of small differences."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Integral, Real
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_positive
+from fecontact.core.errors import (
+    AnalysisError,
+    FecontactError,
+    InputError,
+    ModelWarning,
+    require_positive,
+)
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array
-from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.integrate.field_runs.field_run import FieldRun
+from fecontact.integrate.field_runs.start import start_any, start_state
+from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.rodas5p import step_loop
-from fecontact.integrate.rodas5p.driver import ENDS, finish, start
-from fecontact.system.contact_system import ContactSystem
+from fecontact.integrate.rodas5p.driver import ENDS, finish
+from fecontact.system.fields.in_time import Moving, in_time, state_size
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.forcing_period import forcing_period
 
 # Intervals integrated in one call, and blocks for the error of the mean.
 _INTERVALS, _BLOCKS = 256, 10
+# Growth over an interval, relative to the largest, that is lost in rounding.
+_LOST = 1e-13
+# Change of differences over an interval, as a power of e, that leaves what shrinks resolved.
+_KEPT = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +59,10 @@ class LyapunovExponents:
 
 
 def lyapunov_exponents(
-    system: ContactSystem,
+    system: Moving,
     duration: float,
     *,
-    initial: Initial = "rest",
+    initial: Initial | FieldRun = "rest",
     transient: float = 0.0,
     interval: float | None = None,
     count: int = 1,
@@ -65,17 +78,17 @@ def lyapunov_exponents(
 
     Parameters
     ----------
-    system : ContactSystem
-        What moves.
+    system : ContactSystem or VectorField
+        What moves; a field at its base values.
     duration : float
         Time over which growth is averaged [s].
-    initial : 'rest', 'sliding', RigidStart, Trajectory or (size,) array
-        Where the motion starts.
+    initial : 'rest', 'sliding', RigidStart, Trajectory, FieldRun or (size,) array
+        Where the motion starts; a vector field needs one of the last two.
     transient : float
         Time before that [s].
     interval : float, optional
         Time between orthogonalisations [s]; default the period of the excitation, or a thousandth
-        of the duration.
+        of the duration, for a vector field shorter where its rates are steep.
     count : int
         Number of exponents.
     rtol : float
@@ -83,6 +96,8 @@ def lyapunov_exponents(
     progress : bool or callable, optional
         True for a progress bar on a terminal or in a notebook; a function is called with the time
         reached [s] now and then.
+
+    A ModelWarning says so where the last of the exponents are lost in rounding.
 
     Raises
     ------
@@ -95,36 +110,39 @@ def lyapunov_exponents(
     ----------
     G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9.
     """
-    require_kind("lyapunov_exponents", ContactSystem, system=system)
+    moving = in_time("lyapunov_exponents", system)
+    size = state_size(moving)
     require_positive("lyapunov_exponents", duration=duration, rtol=rtol,
                      **({} if interval is None else {"interval": interval}))
     if not (isinstance(transient, Real) and 0.0 <= transient < np.inf):
         raise InputError(f"transient = {transient!r} must be zero or above [s].")
-    if not (isinstance(count, Integral) and 1 <= count <= system.size):
-        raise InputError(f"count = {count!r} must be a whole number from 1 to {system.size}.")
-    if interval is None:
-        try:
-            interval = min(forcing_period(system), duration)
-        except FecontactError:
-            interval = duration / 1000.0
-    state, time = initial_state(system, initial, 0.0), float(transient)
-    steps = max(round(duration / interval), 1)
-    instants = time + interval * np.arange(steps + 1)
-    Q = np.linalg.qr(np.random.default_rng(0).normal(size=(system.size, count)))[0]
-    growth = np.empty((steps, count))
-    with shown(progress, lambda: progress_bar("Lyapunov exponents", instants[-1])) as tell:
+    if not (isinstance(count, Integral) and 1 <= count <= size):
+        raise InputError(f"count = {count!r} must be a whole number from 1 to {size}.")
+    state, time = start_state(moving, initial, 0.0), float(transient)
+    with shown(progress, lambda: progress_bar("Lyapunov exponents", time + duration)) as tell:
         if transient > 0.0:
-            run = start(system, state, np.array([0.0, transient]), rtol=rtol, work=False)
+            run = start_any(moving, state, np.array([0.0, transient]), rtol=rtol)
             _reach_end(finish(run, tell), run.time)
             state = run.states[-1]
+        if interval is None:
+            interval = _usual_interval(moving, duration, state, count)
+        steps = max(round(duration / interval), 1)
+        instants = time + interval * np.arange(steps + 1)
+        Q = np.linalg.qr(np.random.default_rng(0).normal(size=(size, count)))[0]
+        growth = np.empty((steps, count))
         for first in range(0, steps, _INTERVALS):
             piece = instants[first : first + _INTERVALS + 1]
-            run = start(system, state, piece, rtol=rtol, work=False, vary=True)
+            run = start_any(moving, state, piece, rtol=rtol, vary=True)
             _reach_end(finish(run, tell), run.time)
             state = run.states[-1]
-            for k, columns in enumerate(run.variation.transitions[1:], first):
-                Q, R = np.linalg.qr(columns.T @ Q)
+            for k, transition in enumerate(run.transitions[1:], first):
+                Q, R = np.linalg.qr(transition @ Q)
                 growth[k] = np.log(np.maximum(np.abs(np.diag(R)), np.finfo(float).tiny))
+    lost = growth.min(axis=1) - growth[:, 0] < np.log(_LOST)
+    if lost.mean() > 0.01:
+        warnings.warn(f"Directions that shrink most are lost in rounding within interval = "
+                      f"{interval:g} s, and so are the last of the exponents; choose a shorter "
+                      f"interval, or a smaller count.", ModelWarning, stacklevel=2)
     times = instants[1:] - time
     history = np.cumsum(growth, axis=0) / times[:, None]
     parts = np.array([part.mean(axis=0) / interval
@@ -132,6 +150,23 @@ def lyapunov_exponents(
     error = parts.std(axis=0, ddof=1) / np.sqrt(len(parts)) if len(parts) > 1 else (
         np.full(count, np.nan))
     return LyapunovExponents(history[-1], error, history, times, state)
+
+
+def _usual_interval(moving: Moving, duration: float, state: Array, count: int) -> float:
+    """The period of the excitation, or a thousandth of the duration [s].
+
+    Where several exponents of a field are wanted, not longer than its Jacobian at a state allows.
+    """
+    try:
+        return min(forcing_period(moving), duration)
+    except FecontactError:
+        interval = duration / 1000.0
+    if count == 1 or not isinstance(moving, VectorField):
+        return interval
+    sizes = np.maximum(np.abs(state), moving.state_scales(moving.values))
+    J = moving.derivatives(np.zeros(1), state[np.newaxis], moving.values)[1][0]
+    steep = float((np.abs(J) @ sizes / sizes).max())
+    return min(interval, _KEPT / max(steep, 1e-300))
 
 
 def _reach_end(status: int, time: float) -> None:

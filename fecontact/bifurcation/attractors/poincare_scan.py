@@ -3,31 +3,31 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, require_choice
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
-from fecontact.integrate.ensemble import strobe
+from fecontact.integrate.ensemble import ensemble, strobe
+from fecontact.integrate.events import Crossing, quantity_row, require_quantity
 from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import Moving, in_time, state_size
 from fecontact.system.forcing_period import forcing_period
 
-Change = str | Callable[[ContactSystem, float], ContactSystem]
-
+Change = str | Callable[[Any, float], Moving]
 
 
 @dataclass(frozen=True, eq=False)
 class PoincareScan:
-    """States once per period of the excitation over a parameter.
+    """States once per period of the excitation, or on a section, over a parameter.
 
     Attributes
     ----------
-    system : ContactSystem
+    system : ContactSystem or VectorField
         The system before the parameter was changed.
     parameter : str
         Its name.
@@ -35,34 +35,41 @@ class PoincareScan:
         Its values, ascending.
     up, down : (V, K, size) arrays
         The last K states of each value, where it was approached from below and from above; NaN
-        where a run could not go on. ``down`` is empty if that was not asked for.
+        where a run could not go on, or met the section less often. ``down`` is empty if that was
+        not asked for.
     """
 
-    system: ContactSystem
+    system: Moving
     parameter: str
     values: Array
     up: Array
     down: Array
 
     def observed(
-        self, point: str | int = "B", component: Component = "y",
+        self, point: str | int = "B", component: Component | None = None,
         of: Literal["displacement", "velocity"] = "displacement",
     ) -> tuple[Array, Array]:
-        """A displacement [m], [rad] or velocity of a point, (V, K) up and down."""
-        require_choice("PoincareScan", "of", of, ("displacement", "velocity"))
-        basis = self.system.basis
-        row = basis.point_row(point, component)
-        first = 0 if of == "displacement" else basis.modes
-        columns = slice(first, first + basis.modes)
-        return self.up[..., columns] @ row, self.down[..., columns] @ row
+        """A displacement [m], [rad] or velocity of a point, or a state, (V, K) up and down.
+
+        ``component`` is 'y' by default; a vector field has states by name, and no components.
+        """
+        require_quantity("PoincareScan", component, of)
+        if component is None and isinstance(self.system, ContactSystem):
+            component = "y"
+        row = quantity_row(self.system, point, component, of)
+        # States that are missing are so as a whole: 0 times NaN is no number.
+        used = np.flatnonzero(row)
+        return self.up[..., used] @ row[used], self.down[..., used] @ row[used]
 
 
 def poincare_scan(
-    system: ContactSystem,
+    system: Moving,
     parameter: Change,
     values: ArrayLike,
     *,
-    transient_periods: int = 200,
+    transient_periods: int | None = None,
+    transient: float | None = None,
+    section: Crossing | None = None,
     keep: int = 100,
     initial: Any = "rest",
     down: bool = True,
@@ -72,7 +79,7 @@ def poincare_scan(
     workers: int | None = None,
     progress: bool | Callable[[int], None] | None = None,
 ) -> PoincareScan:
-    """Move a parameter up and down in small steps and keep states once per period.
+    """Move a parameter up and down in small steps; keep states once per period or on a section.
 
     The values are cut into chains that run side by side on all cores; within a chain each value
     starts where the one before it ended, so that coexisting motions show as a difference between
@@ -80,15 +87,21 @@ def poincare_scan(
 
     Parameters
     ----------
-    system : ContactSystem
-        With an excitation of one period at every value.
+    system : ContactSystem or VectorField
+        Excited with one period at every value, unless there is a section.
     parameter : str or function
-        Dotted name of a number of the system, ``"drive.angular_frequency"``, or a function that
-        makes the system for a value, ``(system, value) -> system``.
+        Dotted name of a number of the system, ``"drive.angular_frequency"``, the name of one of
+        the field, or a function that makes the system for a value, ``(system, value) -> system``.
     values : (V,) array
         Ascending.
-    transient_periods, keep : int
-        Periods that are not kept, and states that are, of each value.
+    transient_periods : int, optional
+        Periods that are not kept of each value, 200 by default; not with a section.
+    transient : float, optional
+        Time before passages of the section count, and after that in which they do [s].
+    section : Crossing, optional
+        Poincare section, where states are kept in place of once per period.
+    keep : int
+        States that are kept of each value, the last ones.
     initial : any
         Start of the first value of each chain; see :func:`fecontact.ensemble`.
     down : bool
@@ -103,7 +116,18 @@ def poincare_scan(
     InputError
         For values that do not ascend, or as :func:`fecontact.integrate.strobe`.
     """
-    require_kind("poincare_scan", ContactSystem, system=system)
+    moving = in_time("poincare_scan", system)
+    settings: dict[str, Any] = {"initial": initial, "solver": solver, "rtol": rtol,
+                                "workers": workers, "progress": progress}
+    if not (isinstance(keep, Integral) and keep >= 1):
+        raise InputError(f"keep = {keep!r} must be a whole number from 1 on.")
+    if section is None and transient is not None:
+        raise InputError("poincare_scan: transient is the time before passages of a section "
+                         "count; give a section too, or transient_periods.")
+    if section is not None and (transient_periods is not None or not (
+            isinstance(transient, Real) and 0.0 < transient < np.inf)):
+        raise InputError(f"poincare_scan: transient = {transient!r} must be a time above zero [s] "
+                         f"before passages of the section count, without transient_periods.")
     try:
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):
@@ -114,15 +138,17 @@ def poincare_scan(
     if chains is not None and not (isinstance(chains, Integral) and chains >= 1):
         raise InputError(f"chains = {chains!r} must be a whole number from 1 on.")
     if isinstance(parameter, str):
-        name, made = parameter, [system.with_(**{parameter: float(p)}) for p in points]
+        name, made = parameter, [in_time("poincare_scan", system.with_(**{parameter: float(p)}))
+                                 for p in points]
     else:
         if not callable(parameter):
             raise InputError(f"poincare_scan: parameter must be a text or a function, not "
                              f"{type(parameter).__name__}.")
         name = getattr(parameter, "__name__", "parameter")
         made = [parameter(system, float(p)) for p in points]
-    for one in made:
-        forcing_period(one)
+    if section is None:
+        for one in made:
+            forcing_period(one)
     count = len(points)
     most = chains or min(8 * (os.cpu_count() or 1), max(count // 8, 1))
     length = -(-count // min(most, count))
@@ -131,10 +157,26 @@ def poincare_scan(
     order = np.minimum(order, count - 1)
     both = [order] + ([count - 1 - order] if down else [])
     index = np.concatenate(both)
-    found = strobe([made[k] for k in index], transient_periods=transient_periods, keep=keep,
-                   initial=initial,
-                   chain=length, solver=solver, rtol=rtol, workers=workers, progress=progress)
-    states = np.empty((2, count, keep, system.size))
+    runs = [made[k] for k in index]
+    states = np.empty((2, count, keep, state_size(moving)))
+    if section is None:
+        periods = 200 if transient_periods is None else transient_periods
+        kept = strobe(runs, transient_periods=periods, keep=keep, chain=length, **settings).states
+    else:
+        kept = _passages(runs, section, float(transient or 0.0), keep, chain=length, **settings)
     for way, part in enumerate(both):
-        states[way, part] = found.states[way * len(order) : (way + 1) * len(order)]
-    return PoincareScan(system, name, points, states[0], states[1] if down else states[1, :0])
+        states[way, part] = kept[way * len(order) : (way + 1) * len(order)]
+    return PoincareScan(moving, name, points, states[0], states[1] if down else states[1, :0])
+
+
+def _passages(
+    runs: list[Moving], section: Crossing, transient: float, keep: int, **settings: Any
+) -> Array:
+    """The last states (E, keep, size) of each run on a section, after a transient; else NaN."""
+    found = ensemble(runs, [0.0, transient, 2.0 * transient], events=section, **settings)
+    kept = np.full((len(runs), keep, found.states.shape[2]), np.nan)
+    for row, events, fine in zip(kept, found.events or (), found.finished, strict=True):
+        late = events.states[events.time > transient][-keep:]
+        if fine and len(late):
+            row[-len(late) :] = late
+    return kept

@@ -20,11 +20,11 @@ from fecontact.bifurcation.continuation.points import (
 )
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, span
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Relative distance within which a value of the parameter is reached.
 _REACHED = 1e-9

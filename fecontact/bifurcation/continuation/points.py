@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, ComplexArray
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.orbits.motions import PeriodicMotion

@@ -23,9 +23,9 @@ from fecontact.bifurcation.equilibria.equilibrium import (
     require_autonomous,
 )
 from fecontact.bifurcation.equilibria.problem import EquilibriumProblem, equilibrium_at
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 _GROWTH = 1e4
 

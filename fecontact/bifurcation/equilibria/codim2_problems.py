@@ -24,9 +24,9 @@ from fecontact.bifurcation.equilibria.equilibrium import solution, sorted_eigenv
 from fecontact.bifurcation.equilibria.normal_forms import hopf, null_vectors
 from fecontact.bifurcation.equilibria.problem import pair_test
 from fecontact.bifurcation.fields.multilinear_forms import bend
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.system.fields.vector_field import VectorField
 
 # Smallest |w^2| in divisions by l, relative to w^2 at the start.
 _NEAR_ZERO = 1e-12

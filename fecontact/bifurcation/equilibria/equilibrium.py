@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.system.complex_modes import ComplexModes
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 _RESIDUAL = 1e-8
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.multilinear_forms import Bend, bend
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.system.fields.vector_field import VectorField
 
 # Rounding of l1: relative to the sum of its terms, and to the l1 of a Jacobian that changes by its
 # own size over the scales.

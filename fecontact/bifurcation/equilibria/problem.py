@@ -26,9 +26,9 @@ from fecontact.bifurcation.equilibria.normal_forms import (
     null_vectors,
 )
 from fecontact.bifurcation.fields.multilinear_forms import bend
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.system.fields.vector_field import VectorField
 
 # Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.
 _TRANSVERSALITY = 1e-5

@@ -12,11 +12,11 @@ from fecontact.bifurcation.equilibria.equilibrium import (
     unstable_count,
 )
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.core.units import Summarised, span
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.parametrised_system import AffineArrays, ParametrisedSystem
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.forcing_period import common_period
 from fecontact.system.nodes import SystemArrays
 
@@ -61,6 +61,10 @@ class ContactField(VectorField):
             If a value is out of its parameter's range.
         """
         return self._family.system(self.values if values is None else values)
+
+    def in_time(self) -> ContactSystem:
+        """The contact system for the base values."""
+        return self.system()
 
     def arrays(self, values: Array) -> SystemArrays:
         """Arrays of the system for kernels, for parameter values (k,)."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Central differences of order eight and six: weights of f(h k) - f(-h k) for the first, and of
 # f(h k) + f(-h k) - 2 f(0) for the second derivative, k = 1..4.

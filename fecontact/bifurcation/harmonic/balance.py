@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, made_values
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
@@ -15,6 +14,7 @@ from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march
 from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Relative step of differences in a parameter that changes the period.
 _DIFFERENCE = 1e-5

@@ -13,7 +13,6 @@ from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     sizes_of,
 )
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -21,6 +20,7 @@ from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 # Factors of the first step, tried in this order to leave a special point.
 _FIRST_STEPS = (1.0, 0.2, 0.04)

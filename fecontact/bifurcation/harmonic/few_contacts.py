@@ -15,8 +15,8 @@ import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Unknowns from which this is faster, and largest part of them that may be left.
 _LEAST, _MOST_LEFT = 400, 0.5

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.types import Array, Integers
+from fecontact.system.fields.vector_field import VectorField
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.series import differentiated, uniform_basis
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 # Samples a period of what is observed, and harmonics of it that are stored.
 _SAMPLES, _HARMONICS = 512, 15

@@ -22,7 +22,6 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
@@ -36,6 +35,7 @@ from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.statics import equilibrium
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 

@@ -12,7 +12,6 @@ import numpy as np
 from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic.balance import turn_of
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.layout import element_rows, layout_of
@@ -23,6 +22,7 @@ from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.orbits import starts as orbit_starts
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 Start = tuple[HarmonicProblem, Array, Array]
 

@@ -11,7 +11,6 @@ from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, width_of
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.branches import attributes_of
 from fecontact.bifurcation.harmonic.layout import layout_of
@@ -24,6 +23,7 @@ from fecontact.core.errors import AnalysisError, InputError, require_choice
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.vector_field import VectorField
 
 # Points at most and largest step, unless options say so; largest step on the first response.
 _POINTS, _LARGEST, _RESPONSE = 400, 0.05, 0.03

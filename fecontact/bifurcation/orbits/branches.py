@@ -18,7 +18,6 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
-from fecontact.bifurcation.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.harmonic import branches as harmonic_branches
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbits import shooting_branches, starts
@@ -32,6 +31,7 @@ from fecontact.core.errors import FecontactError, InputError, require_finite, re
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Factors of the first step, tried in this order to leave a special point.
 _FIRST_STEPS = (1.0, 0.2, 0.04)

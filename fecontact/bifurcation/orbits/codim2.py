@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.criticality import (
     Criticality,
@@ -29,6 +28,7 @@ from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import VANISHED_ON_CURVES, VANISHING, vanishing
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero

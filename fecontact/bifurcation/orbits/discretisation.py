@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbits.collocation_kernels import (
@@ -20,6 +19,7 @@ from fecontact.bifurcation.orbits.mesh import (
     rule,
 )
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,12 @@ import numpy as np
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 P = TypeVar("P", CollocationProblem, ShootingProblem)
 

@@ -10,7 +10,6 @@ from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_text
 from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
@@ -24,6 +23,7 @@ from fecontact.bifurcation.orbits.starts import Start, from_samples
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.solvers import Solver
+from fecontact.system.fields.vector_field import VectorField
 
 # Distance of the two halves of an orbit, relative to the largest one, at which a branch of doubled
 # orbits ends. Single orbits solve the equations too: closer to them the corrector may find either,

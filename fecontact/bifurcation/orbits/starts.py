@@ -11,11 +11,11 @@ import numpy as np
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
 from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 Start = tuple[CollocationProblem, Array, Array]
 

@@ -3,7 +3,7 @@
 import time as clock
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -167,8 +167,23 @@ def _ground_bounds(system: ContactSystem, times: Array) -> Array:
                      sum(one.largest_acceleration(start, end) for one in motions)])
 
 
+class Advancing(Protocol):
+    """A run that can be left and taken up again."""
+
+    @property
+    def attempts(self) -> int:
+        """Steps so far, those that failed included."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+
+    def advance(self, most: int) -> int:
+        """Try so many steps; ``step_loop.RUNNING`` while output times are left."""
+
+
 def finish(
-    run: Run, progress: Callable[[float], None] | None = None, seconds: float = 0.2,
+    run: Advancing, progress: Callable[[float], None] | None = None, seconds: float = 0.2,
     keep: Callable[[], None] | None = None,
 ) -> int:
     """Go on to the end or a failure, reporting about every ``seconds``; the status.

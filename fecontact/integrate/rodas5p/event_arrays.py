@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.integrate.events import (
     CONTACT_EVENTS,
     AnyEvent,
@@ -15,6 +16,7 @@ from fecontact.integrate.events import (
 )
 from fecontact.integrate.rodas5p.event_kernels import (
     FIRST_OWN,
+    FOUND,
     KINKS,
     NODES,
     PLACES,
@@ -22,21 +24,30 @@ from fecontact.integrate.rodas5p.event_kernels import (
     note_events,
 )
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import state_size
+from fecontact.system.fields.vector_field import VectorField
 
 # Slip velocities at which the friction of laws with memory in steady sliding is tabulated.
 _CURVE = np.logspace(-9.0, 2.0, 441)
 
 
-def watch_for(system: ContactSystem, events: Sequence[AnyEvent], kinks: bool) -> Watch:
+def watch_for(
+    system: ContactSystem | VectorField, events: Sequence[AnyEvent], kinks: bool
+) -> Watch:
     """Room for what is watched for, and nothing found yet.
 
     Raises
     ------
     InputError
-        For what is no event.
+        For what is no event, and for contact events of a field, which has no contact nodes.
     """
-    n, states = system.basis.contact_nodes, system.size
+    n, states = 0, state_size(system)
+    if isinstance(system, ContactSystem):
+        n = system.basis.contact_nodes
     for one in events:
+        if isinstance(one, ContactEvents) and not isinstance(system, ContactSystem):
+            raise InputError("events: a vector field has no contact nodes; watch for a Crossing "
+                             "of one of its states, or for an Event.")
         if not isinstance(one, AnyEvent):
             raise InputError(f"events: {one!r} must be a ContactEvents, Crossing or Event.")
     own = [one for one in events if not isinstance(one, ContactEvents)]
@@ -50,7 +61,7 @@ def watch_for(system: ContactSystem, events: Sequence[AnyEvent], kinks: bool) ->
     width = max((len(row) for row in rows), default=0)
     stick_speed = np.zeros(n)
     curve_speed, curve = np.zeros(0), np.zeros((n, 0))
-    if contact:
+    if contact and isinstance(system, ContactSystem):
         curve_speed, curve = _steady_friction(system)
         for nodes, _, law in system.law_groups("friction"):
             stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
@@ -67,6 +78,24 @@ def watch_for(system: ContactSystem, events: Sequence[AnyEvent], kinks: bool) ->
         np.zeros((n + len(own), PLACES)), np.zeros(n + len(own), dtype=np.int64), np.zeros(64),
         note_events.address if events else 0, stops,
         np.zeros((places, 3)), np.zeros((places, states)), counts)
+
+
+def take_events(watch: Watch, found: list[tuple[Array, Array]], time: float) -> None:
+    """Move what was noted up to a time to a list of rows and states.
+
+    Raises
+    ------
+    InputError
+        If a user's function is not finite there.
+    """
+    count = int(watch.counts[FOUND])
+    if count:
+        found.append((watch.found[:count].copy(), watch.states[:count].copy()))
+        watch.counts[FOUND] = 0
+    if not np.isfinite(watch.own_values).all():
+        number = int(np.argmin(np.isfinite(watch.own_values)))
+        raise InputError(f"'event {number}' is not a finite number before t = {time:.6g} s; its "
+                         f"function g(t, y, p) must be finite for every state.")
 
 
 def _steady_friction(system: ContactSystem) -> Any:

@@ -246,7 +246,7 @@ def _own(k, left, right, view, watch):
 
 
 @helper
-def _end(step, begun, watch):
+def first_stop(step, begun, watch):
     """Drop the events after the first at which the run stops; its part of the step, or 2."""
     stop = np.inf
     for row in range(begun, watch.counts[FOUND]):
@@ -310,6 +310,26 @@ def _keep_between(count, row, watch):
 
 
 @helper
+def set_own_places(before, room, watch):
+    """Fill the rows of ``watch.places`` of users' functions for a step."""
+    b, row = room.bound[0], room.bound[2]
+    for k in range(len(watch.own)):
+        count = 0
+        if watch.linear[k] != 0:
+            p = watch.own_parameters[k]
+            for i in range(COEFFICIENTS):
+                b[i] = -p[0]
+            for i in range(len(before)):
+                b[0] += p[1 + i] * before[i]
+                b[1] += p[1 + i] * room.inner[0, i]
+                b[2] += p[1 + i] * room.inner[1, i]
+                b[3] += p[1 + i] * room.inner[2, i]
+                b[4] += p[1 + i] * room.after[i]
+            count = bernstein.sign_changes(b, room.halves, row, watch.changed[:MOST])
+        _keep_between(count, len(watch.zones) + k, watch)
+
+
+@helper
 def _set_places(step, problem, before, room, watch):
     """Fill ``watch.places`` for a step."""
     s, control = problem.system, problem.control
@@ -333,20 +353,7 @@ def _set_places(step, problem, before, room, watch):
             course = Course(what, j, shift, step, s, control.ground, room.courses, row)
             count += changes(b, course, room.halves, watch.changed[count : count + MOST])
         _keep_between(count, j, watch)
-    for k in range(len(watch.own)):
-        count = 0
-        if watch.linear[k] != 0:
-            p = watch.own_parameters[k]
-            for i in range(COEFFICIENTS):
-                b[i] = -p[0]
-            for i in range(len(before)):
-                b[0] += p[1 + i] * before[i]
-                b[1] += p[1 + i] * room.inner[0, i]
-                b[2] += p[1 + i] * room.inner[1, i]
-                b[3] += p[1 + i] * room.inner[2, i]
-                b[4] += p[1 + i] * room.after[i]
-            count = bernstein.sign_changes(b, room.halves, row, watch.changed[:MOST])
-        _keep_between(count, n + k, watch)
+    set_own_places(before, room, watch)
 
 
 @helper
@@ -371,7 +378,7 @@ def _note_changes(j, zone, left, right, view, watch):
 
 
 @helper
-def _note_own(k, left, right, view, watch):
+def note_own(k, left, right, view, watch):
     """Note the events of a user's function between two looks; view.y is the state at the right."""
     row = len(watch.zones) + k
     first = left
@@ -420,10 +427,10 @@ def _note_events(step, problem, progress, room, watch):
         left, right = look / looks, (look + 1) / looks
         _look(right, view)
         for k in range(len(watch.own)):
-            _note_own(k, left, right, view, watch)
+            note_own(k, left, right, view, watch)
         for j in range(len(watch.zones)):
             _note_node(j, left, right, view, watch)
-    return _end(step, begun, watch)
+    return first_stop(step, begun, watch)
 
 
 # By its address, so that it is not compiled into every step of runs that watch for nothing.

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import state
-from fecontact.integrate.rodas5p.event_kernels import FOUND, Watch
+from fecontact.integrate.rodas5p.event_arrays import take_events
+from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.rodas5p.small_systems import advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.variational import Vary
@@ -94,6 +94,11 @@ class Run:
                 "right_hand_sides": int(counts[state.RATES]),
                 "jacobians": int(counts[state.STEPS]) + 1}
 
+    @property
+    def transitions(self) -> Array:
+        """Derivatives (N, size, columns) of the states to those at the output time before."""
+        return np.swapaxes(self.variation.transitions, 1, 2)
+
     @cached_property
     def _advance(self) -> Any:
         return advance_for(self.problem, self.variation)
@@ -102,12 +107,5 @@ class Run:
         """So many steps more, those that fail included; returns the status."""
         status = self._advance(self.problem, self.progress, self.room, self.output,
                                self.variation, self.watch, steps)
-        found = int(self.watch.counts[FOUND])
-        if found:
-            self.found.append((self.watch.found[:found].copy(), self.watch.states[:found].copy()))
-            self.watch.counts[FOUND] = 0
-        if not np.isfinite(self.watch.own_values).all():
-            number = int(np.argmin(np.isfinite(self.watch.own_values)))
-            raise InputError(f"'event {number}' is not a finite number before t = {self.time:.6g} "
-                             f"s; its function g(t, y, p) must be finite for every state.")
+        take_events(self.watch, self.found, self.time)
         return int(status)

@@ -2,12 +2,18 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
+from copy import copy
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices, nearest
-from fecontact.core.types import Array
+from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.core.types import Array, Integers
+
+if TYPE_CHECKING:
+    from fecontact.system.contact_system import ContactSystem
 
 
 class VectorField(ABC):
@@ -48,6 +54,32 @@ class VectorField(ABC):
         """Typical size (d,) of each state; ones where nothing is known."""
         return np.ones(self.dimension)
 
+    def in_time(self) -> "VectorField | ContactSystem":
+        """What runs in time: this field, or the contact system that it is made of."""
+        return self
+
+    def kernel(self) -> Any:
+        """The field at its base values as a FieldKernel; None if Python evaluates it."""
+        return None
+
+    def heed(self, wrong: Integers) -> None:
+        """Told how often each column (d,) of Jacobians of the :meth:`kernel` was wrong."""
+        return
+
+    def with_(self, **changes: float) -> Self:
+        """The same field with other base values of some parameters.
+
+        Raises
+        ------
+        InputError
+            If there is no parameter of such a name, or a value is no finite number.
+        """
+        require_finite("with_", **changes)
+        changed = self.values_with(**changes).tolist()
+        made = copy(self)
+        made.parameters = MappingProxyType(dict(zip(self.parameters, changed, strict=True)))
+        return made
+
     @property
     def dimension(self) -> int:
         """Number d of states."""
@@ -72,6 +104,23 @@ class VectorField(ABC):
             raise InputError(f"The vector field has no parameter {name!r}{nearest(name, names)}; "
                              f"its parameters are: {choices(names)}.")
         return names.index(name)
+
+    def state_index(self, name: str | int) -> int:
+        """Place of a state, by its name or its number from 0.
+
+        Raises
+        ------
+        InputError
+            If there is none; it lists those that exist.
+        """
+        number = isinstance(name, int | np.integer) and not isinstance(name, bool)
+        if number and 0 <= int(name) < self.dimension:
+            return int(name)
+        if name not in self.state_names:
+            raise InputError(f"The vector field has no state {name!r}"
+                             f"{nearest(str(name), self.state_names)}; its states are: "
+                             f"{choices(self.state_names)}.")
+        return self.state_names.index(str(name))
 
     def parameter_or_only(self, name: str | None) -> str:
         """The name, checked; without one the only parameter that there is.

@@ -6,18 +6,19 @@ from types import CodeType, MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecontact.bifurcation.fields import function_kernels as kernels
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array, ArrayLike, Integers
+from fecontact.system.fields import function_kernels as kernels
+from fecontact.system.fields.one_place import compiled_field
+from fecontact.system.fields.vector_field import VectorField
 
 _FORM = "f(t, x, p, out)"
 _WAYS = ("automatic", "complex", "differences")
 # Samples at which the complex step is checked against differences before it is used.
 _SAMPLES = 16
+_NONE = np.zeros(0, dtype=np.int64)
 # Functions that accept complex numbers but are not analytic.
 _NOT_ANALYTIC = {"abs", "absolute", "fabs", "sign", "real", "imag", "conj", "conjugate", "angle"}
 
@@ -74,17 +75,12 @@ class FunctionField(VectorField):
         """
         chosen = np.array(tuple(active), dtype=np.int64)
         f, J, P, wrong = self.checked(t, x, values, chosen)
-        if wrong.any():
-            told = self.complaint(wrong, chosen)
-            if self._required:
-                raise AnalysisError(told)
-            warnings.warn(f"{told} Where the step is wrong, differences take its place.",
-                          stacklevel=2)
+        self.heed(wrong, chosen)
         return f, J, P
 
     def checked(
-        self, t: Array, x: Array, values: Array, active: NDArray[np.int64]
-    ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        self, t: Array, x: Array, values: Array, active: Integers
+    ) -> tuple[Array, Array, Array, Integers]:
         """As :meth:`derivatives`, with counts (d + a,) of failures of the complex step."""
         n, d = x.shape
         f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(active)))
@@ -104,7 +100,22 @@ class FunctionField(VectorField):
                                   kernels.complex_room_for(d, len(values)), J, P, wrong)
         return f, J, P, wrong
 
-    def complaint(self, wrong: NDArray[np.int64], active: NDArray[np.int64]) -> str:
+    def heed(self, wrong: Integers, active: Integers = _NONE) -> None:
+        """Warn of a complex step that failed at places (d + a,), or raise; see derivatives."""
+        if wrong.any():
+            told = self.complaint(wrong, active)
+            if self._required:
+                raise AnalysisError(told)
+            warnings.warn(f"{told} Where the step is wrong, differences take its place.",
+                          stacklevel=3)
+
+    def kernel(self) -> Any:
+        """The field for kernels; see :meth:`VectorField.kernel`."""
+        jacobian, analytic = (0 if one is None else one.address
+                              for one in (self._jacobian, self._complex))
+        return compiled_field(self._rates.address, jacobian, analytic, self.values, self._scales)
+
+    def complaint(self, wrong: Integers, active: Integers) -> str:
         """Message for which states and parameters the complex step fails."""
         parameters = list(self.parameters)
         names = [*self.state_names, *(parameters[index] for index in active)]

@@ -28,9 +28,9 @@ RATES = types.void(f8, vector, vector, vector)
 JACOBIAN = types.void(f8, vector, vector, matrix)
 COMPLEX_RATES = types.void(f8, complex_vector, complex_vector, complex_vector)
 
-_rates_at = function_at(RATES)
-_jacobian_at = function_at(JACOBIAN)
-_complex_rates_at = function_at(COMPLEX_RATES)
+rates_at = function_at(RATES)
+jacobian_at = function_at(JACOBIAN)
+complex_rates_at = function_at(COMPLEX_RATES)
 
 # Step of the complex step: its square is lost against one.
 _TINY = 1e-30
@@ -78,7 +78,7 @@ PLACES = types.NamedTuple([vector, matrix, matrix, vector, vector, vector, integ
                           Places)
 
 
-class _Place(NamedTuple):
+class Place(NamedTuple):
     """One place: time, state and parameters that may be moved, and the rates there."""
 
     t: float
@@ -253,10 +253,43 @@ def _correct(function, place, moved, at, size, room):
     return wrong
 
 
+@helper
+def columns_by_complex_step(function, analytic, place, x, scales, room, complex_room, J, wrong):
+    """Fill J (d, d) at a place by the complex step; ``wrong`` counts columns put right.
+
+    Room holds the state x and the parameters of the place.
+    """
+    d = len(x)
+    z, w, out = complex_room[0, :d], complex_room[1, : len(place.q)], complex_room[2, :d]
+    column = room.column
+    for j in range(d):
+        z[j] = complex(x[j], _TINY)
+        analytic(place.t, z, w, out)
+        z[j] = x[j]
+        for i in range(d):
+            column[i] = out[i].imag / _TINY
+        size = max(abs(x[j]), scales[j])
+        if _correct(function, place, place.y, j, size, room):
+            wrong[j] += 1
+        for i in range(d):
+            J[i, j] = column[i]
+
+
+@helper
+def columns_by_differences(function, place, x, scales, room, J):
+    """Fill J (d, d) at a place by differences; room holds the state x and the parameters."""
+    best = room.best
+    for j in range(len(x)):
+        size = max(abs(x[j]), scales[j])
+        _extrapolated(function, place, place.y, j, size, room)
+        for i in range(len(x)):
+            J[i, j] = best[i]
+
+
 @kernel(types.void(i8, vector, matrix, vector, matrix))
 def batch_rates(address, t, x, p, f):
     """Fill f (N, d)."""
-    function = _rates_at(address)
+    function = rates_at(address)
     for k in range(len(t)):
         function(t[k], x[k], p, f[k])
 
@@ -264,7 +297,7 @@ def batch_rates(address, t, x, p, f):
 @kernel(types.void(i8, vector, matrix, vector, block))
 def batch_jacobians(address, t, x, p, J):
     """Fill J (N, d, d) by the function that gives one."""
-    function = _jacobian_at(address)
+    function = jacobian_at(address)
     for k in range(len(t)):
         function(t[k], x[k], p, J[k])
 
@@ -277,7 +310,7 @@ def complex_steps(address, complex_address, places, room, complex_room, J, P, wr
     ``wrong`` (d + a,) counts the places at which that is so, by columns of J and P.
     ``complex_room`` is that of :func:`complex_room_for`.
     """
-    function, complex_function = _rates_at(address), _complex_rates_at(complex_address)
+    function, complex_function = rates_at(address), complex_rates_at(complex_address)
     places, room, complex_room = borrowed(places), borrowed(room), borrowed(complex_room)
     t, x, p, active, column = places.t, places.x, places.p, places.active, room.column
     d, k = x.shape[1], len(p)
@@ -288,20 +321,12 @@ def complex_steps(address, complex_address, places, room, complex_room, J, P, wr
         w[a] = p[a]
     wrong[:] = 0
     for n in range(len(t)):
-        place = _Place(t[n], y, q, places.f[n])
+        place = Place(t[n], y, q, places.f[n])
         for i in range(d):
             z[i], y[i] = x[n, i], x[n, i]
-        for j in range(d if places.states else 0):
-            z[j] = complex(x[n, j], _TINY)
-            complex_function(t[n], z, w, out)
-            z[j] = x[n, j]
-            for i in range(d):
-                column[i] = out[i].imag / _TINY
-            size = max(abs(x[n, j]), places.scales[j])
-            if _correct(function, place, y, j, size, room):
-                wrong[j] += 1
-            for i in range(d):
-                J[n, i, j] = column[i]
+        if places.states:
+            columns_by_complex_step(function, complex_function, place, x[n], places.scales, room,
+                                    complex_room, J[n], wrong)
         for a in range(len(active)):
             at = active[a]
             w[at] = complex(p[at], _TINY)
@@ -319,21 +344,18 @@ def complex_steps(address, complex_address, places, room, complex_room, J, P, wr
 @kernel(types.void(i8, PLACES, ROOM, block, block))
 def differences(address, places, room, J, P):
     """Fill J (N, d, d) if wanted, and P (N, d, a), by extrapolated central differences."""
-    function = _rates_at(address)
+    function = rates_at(address)
     places, room = borrowed(places), borrowed(room)
     t, x, p, active, best = places.t, places.x, places.p, places.active, room.best
     d = x.shape[1]
     y, q = room.y, room.q
     q[:] = p
     for n in range(len(t)):
-        place = _Place(t[n], y, q, places.f[n])
+        place = Place(t[n], y, q, places.f[n])
         for i in range(d):
             y[i] = x[n, i]
-        for j in range(d if places.states else 0):
-            size = max(abs(x[n, j]), places.scales[j])
-            _extrapolated(function, place, y, j, size, room)
-            for i in range(d):
-                J[n, i, j] = best[i]
+        if places.states:
+            columns_by_differences(function, place, x[n], places.scales, room, J[n])
         for a in range(len(active)):
             at = active[a]
             size = max(abs(p[at]), places.sizes[at])

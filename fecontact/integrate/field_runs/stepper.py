@@ -1,0 +1,177 @@
+"""A run of a vector field by the compiled integrator."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array
+from fecontact.integrate.bernstein import DEPTH
+from fecontact.integrate.courses import COEFFICIENTS
+from fecontact.integrate.events import AnyEvent, Events
+from fecontact.integrate.field_runs import step_loop
+from fecontact.integrate.field_runs.python_functions import PythonFunction
+from fecontact.integrate.field_runs.step_loop import Output, Progress, Room
+from fecontact.integrate.field_runs.variational import Varied, varied_for
+from fecontact.integrate.rodas5p import tableau
+from fecontact.integrate.rodas5p.event_arrays import take_events, watch_for
+from fecontact.integrate.rodas5p.event_kernels import Watch
+from fecontact.integrate.rodas5p.step_loop import RUNNING
+from fecontact.system.fields.one_place import FieldKernel, python_field
+from fecontact.system.fields.vector_field import VectorField
+
+# Errors of a state count relative to its largest size so far, or to this part of its scale.
+_FLOOR = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class FieldSteps:
+    """A run of a vector field that can be left and taken up again.
+
+    Attributes
+    ----------
+    moving : VectorField
+        At its base values.
+    kernel : FieldKernel
+        The same for the integrator, with room of its own.
+    function : PythonFunction or None
+        Where Python evaluates it.
+    progress, room, output, varied, watch
+        What the integrator goes on from, works with and fills.
+    """
+
+    moving: VectorField
+    kernel: FieldKernel
+    function: PythonFunction | None
+    progress: Progress
+    room: Room
+    output: Output
+    varied: Varied
+    watch: Watch
+    found: list[tuple[Array, Array]] = field(default_factory=list)
+
+    @property
+    def states(self) -> Array:
+        """States (N, d) at the output times; those passed are filled."""
+        return self.output.states
+
+    @property
+    def transitions(self) -> Array:
+        """Derivatives (N, d, d) of the states to those at the output time before."""
+        return self.varied.transitions
+
+    @property
+    def outputs(self) -> int:
+        """Number of output times passed."""
+        return int(self.progress.counts[step_loop.OUTPUTS])
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return float(self.progress.numbers[step_loop.TIME])
+
+    @property
+    def attempts(self) -> int:
+        """Steps so far, those that failed included."""
+        counts = self.progress.counts
+        return int(counts[step_loop.STEPS] + counts[step_loop.REJECTIONS])
+
+    @property
+    def statistics(self) -> dict[str, Any]:
+        """Counts of steps, rejected steps, right-hand sides of the stages and Jacobians."""
+        counts = self.progress.counts
+        steps = int(counts[step_loop.STEPS])
+        return {"steps": steps, "rejected": int(counts[step_loop.REJECTIONS]),
+                "right_hand_sides": int(counts[step_loop.RATES]), "jacobians": steps + 1}
+
+    @property
+    def events(self) -> Events:
+        """Events so far."""
+        rows = [np.zeros((0, 3)), *(rows for rows, _ in self.found)]
+        states = [np.zeros((0, self.moving.dimension)), *(states for _, states in self.found)]
+        return Events.of_rows(np.vstack(rows), np.vstack(states))
+
+    def advance(self, most: int) -> int:
+        """Try so many steps; how the run stands, see :mod:`.step_loop`.
+
+        Raises
+        ------
+        Exception
+            What a field of Python raised.
+        AnalysisError
+            If a complex step that was asked for turned out wrong.
+        InputError
+            If an event is not finite.
+        """
+        status = step_loop.advance(self.kernel, self.progress, self.room, self.output, self.varied,
+                                   self.watch, most)
+        if self.function is not None and self.function.error is not None:
+            raise self.function.error
+        take_events(self.watch, self.found, self.time)
+        if status != RUNNING:
+            self.moving.heed(self.kernel.wrong)
+        return int(status)
+
+
+def start_field(
+    field: VectorField,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float,
+    max_step: float | None = None,
+    vary: bool = False,
+    events: Sequence[AnyEvent] = (),
+) -> FieldSteps:
+    """A run of a field at its base values from ``times[0]``, before its first step.
+
+    Parameters
+    ----------
+    field : VectorField
+        What moves.
+    state : (d,) array
+        At the start.
+    times : (N,) array
+        Output times, ascending [s].
+    rtol : float
+        Error of one step, of each state relative to its largest size so far, or to a thousandth of
+        its scale where that is more.
+    max_step : float, optional
+        Longest step [s]; at most a quarter of the period of a field that depends on time.
+    vary : bool
+        Whether to carry derivatives to the state at the output time before along.
+    events : sequence of Crossing and Event
+        What to watch for.
+
+    Raises
+    ------
+    InputError
+        For a state that is not finite, and events that are none.
+    """
+    if not np.isfinite(state).all():
+        raise InputError("The initial state holds values that are not finite.")
+    d, times, values = field.dimension, np.array(times, dtype=float), field.values
+    kernel, function = field.kernel(), None
+    if kernel is None:
+        function = PythonFunction(field)
+        kernel = python_field(function.address, values, field.state_scales(values))
+    period, longest = field.forcing_period(values), float(times[-1] - times[0])
+    if period is not None:
+        longest = min(longest, 0.25 * period)
+    if max_step is not None:
+        longest = min(longest, float(max_step))
+    numbers = np.zeros(5)
+    numbers[step_loop.TIME], numbers[step_loop.LENGTH] = times[0], longest
+    vectors, squares = np.zeros((6, d)), np.zeros((2, d, d))
+    return FieldSteps(
+        field, kernel, function,
+        Progress(numbers, np.zeros(5, dtype=np.int64), np.array(state, dtype=float), np.zeros(d),
+                 _FLOOR * np.array(field.state_scales(values), dtype=float), np.zeros((d, d))),
+        Room(vectors[0], vectors[1], squares[0], np.zeros((tableau.STAGES, d)), vectors[2],
+             vectors[3], vectors[4], vectors[5], squares[1], np.zeros(d, dtype=np.int64),
+             np.zeros((3, d)), np.zeros((3, d)), np.zeros((3, COEFFICIENTS)),
+             np.zeros((DEPTH, COEFFICIENTS + 1))),
+        Output(times, np.zeros((len(times), d)), float(rtol), longest),
+        varied_for(d if vary else 0, len(times)), watch_for(field, events, False))

@@ -1,0 +1,140 @@
+r"""Derivatives of a motion to its start, carried along with the steps of a run.
+
+.. math::
+
+    \dot{Y} = J(t, x(t)) Y, \qquad Y(0) = I
+
+over each step by the three-stage Radau IIA method of order five along the interpolant of the step.
+It is linear, so that its stages are one system of 3 d equations.
+
+References
+----------
+E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., section IV.5.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import block, helper, integers, matrix, routine, vector
+from fecontact.core.dense_lu import factorise, solve_rows
+from fecontact.core.types import Array, Integers
+from fecontact.integrate.rodas5p import tableau
+from fecontact.system.fields.one_place import derive_at
+
+_ROOT = np.sqrt(6.0)
+_NODES = np.array([0.4 - 0.1 * _ROOT, 0.4 + 0.1 * _ROOT, 1.0])
+_WEIGHTS = np.array([
+    [(88.0 - 7.0 * _ROOT) / 360.0, (296.0 - 169.0 * _ROOT) / 1800.0, (-2.0 + 3.0 * _ROOT) / 225.0],
+    [(296.0 + 169.0 * _ROOT) / 1800.0, (88.0 + 7.0 * _ROOT) / 360.0, (-2.0 - 3.0 * _ROOT) / 225.0],
+    [(16.0 - _ROOT) / 36.0, (16.0 + _ROOT) / 36.0, 1.0 / 9.0],
+])
+
+# Change of differences over a part of a step, at most, and the most parts.
+_LARGEST, _MOST_PARTS = 0.5, 64.0
+
+
+class Varied(NamedTuple):
+    """Derivatives that go with a run of d states, or nothing where they are empty.
+
+    Attributes
+    ----------
+    columns : (d, d) array
+        Y since the last output time.
+    transitions : (N, d, d) array
+        Y from each output time to the next; the first is not used.
+    J, slopes : (3, d, d), (3, d, d) arrays
+        Jacobians at the stages, and J Y.
+    factors, increments : (3 d, 3 d), (3 d, d) arrays
+        The system of the stages, and its solution.
+    pivots : (3 d,) array
+    x, f : (d,) arrays
+        A state of the step, and its rates.
+    """
+
+    columns: Array
+    transitions: Array
+    J: Array
+    slopes: Array
+    factors: Array
+    increments: Array
+    pivots: Integers
+    x: Array
+    f: Array
+
+
+VARIED = types.NamedTuple(
+    [matrix, block, block, block, matrix, matrix, integers, vector, vector], Varied)
+
+
+def varied_for(states: int, outputs: int) -> Varied:
+    """Derivatives for a run of so many states and output times; none for no states."""
+    d = states
+    return Varied(np.eye(d), np.zeros((outputs if d else 0, d, d)), np.zeros((3, d, d)),
+                  np.zeros((3, d, d)), np.zeros((3 * d, 3 * d)), np.zeros((3 * d, d)),
+                  np.zeros(3 * d, dtype=np.int64), np.zeros(d), np.zeros(d))
+
+
+@helper
+def _steepest(J, sizes):
+    """Bound of the growth rates of differences by a Jacobian, whatever the units of the states."""
+    largest = 0.0
+    for i in range(len(sizes)):
+        total = 0.0
+        for k in range(len(sizes)):
+            total += abs(J[i, k]) * sizes[k]
+        largest = max(largest, total / sizes[i])
+    return largest
+
+
+@helper
+def _solve(h, varied):
+    """Carry the columns over a step h with the Jacobians at its stages."""
+    d, J, slopes, factors = len(varied.columns), varied.J, varied.slopes, varied.factors
+    for stage in range(3):
+        for i in range(d):
+            for c in range(d):
+                total = 0.0
+                for k in range(d):
+                    total += J[stage, i, k] * varied.columns[k, c]
+                slopes[stage, i, c] = total
+    for row in range(3):
+        for i in range(d):
+            for column in range(3):
+                factor = h * _WEIGHTS[row, column]
+                for k in range(d):
+                    factors[row * d + i, column * d + k] = -factor * J[column, i, k]
+            factors[row * d + i, row * d + i] += 1.0
+            for c in range(d):
+                varied.increments[row * d + i, c] = h * (
+                    _WEIGHTS[row, 0] * slopes[0, i, c] + _WEIGHTS[row, 1] * slopes[1, i, c]
+                    + _WEIGHTS[row, 2] * slopes[2, i, c])
+    factorise(factors, 3 * d, varied.pivots)
+    solve_rows(factors, varied.pivots, varied.increments)
+    for i in range(d):
+        for c in range(d):
+            varied.columns[i, c] += varied.increments[2 * d + i, c]
+
+
+@routine
+def propagate(step, field, progress, room, varied):
+    """Carry the columns over an accepted step, whose last Jacobian is ``room.J_after``.
+
+    A step over which differences may change much is divided: what shrinks has to be as accurate as
+    what grows.
+    """
+    steep = max(_steepest(progress.J, progress.sizes), _steepest(room.J_after, progress.sizes))
+    parts = int(min(max(np.ceil(step.h * steep / _LARGEST), 1.0), _MOST_PARTS))
+    for part in range(parts):
+        for stage in range(3):
+            J = varied.J[stage]
+            if part == parts - 1 and stage == 2:
+                for i in range(len(J)):
+                    for k in range(len(J)):
+                        J[i, k] = room.J_after[i, k]
+            else:
+                at = (part + _NODES[stage]) / parts
+                tableau.interpolated(at, progress.state, room.after, room.dense, varied.x)
+                derive_at(field.derive)(step.t + at * step.h, varied.x, field, varied.f, J)
+        _solve(step.h / parts, varied)

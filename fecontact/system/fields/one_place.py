@@ -1,0 +1,143 @@
+"""Vector fields for compiled integrators: rates and Jacobian at one place, by addresses.
+
+A field comes as a tuple :class:`FieldKernel`, whose two addresses lead to a function that is
+compiled or to one of Python.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import compile_law, f8, function_at, i8, integers, matrix, vector
+from fecontact.core.references import Reference
+from fecontact.core.types import Array, ComplexArray, Integers
+from fecontact.system.fields.function_kernels import (
+    ROOM,
+    Place,
+    Room,
+    columns_by_complex_step,
+    columns_by_differences,
+    complex_matrix,
+    complex_rates_at,
+    complex_room_for,
+    jacobian_at,
+    rates_at,
+    room_for,
+)
+
+
+class FieldKernel(NamedTuple):
+    """A vector field of d states with fixed parameters, as kernels take it.
+
+    Attributes
+    ----------
+    evaluate, derive : int
+        Addresses of what gives the rates, and rates with their Jacobian.
+    function, jacobian, analytic : int
+        Addresses of the field's own functions: rates, Jacobian, rates of complex numbers; zero
+        for those that it does not have.
+    p, scales : (k,), (d,) arrays
+        Parameters, and typical sizes of the states.
+    room, complex_room : Room, (3, max(d, k)) array
+        Room for derivatives.
+    wrong : (d,) array
+        Columns of Jacobians that the complex step got wrong, counted.
+    """
+
+    evaluate: int
+    derive: int
+    function: int
+    jacobian: int
+    analytic: int
+    p: Array
+    scales: Array
+    room: Room
+    complex_room: ComplexArray
+    wrong: Integers
+
+
+FIELD = types.NamedTuple(
+    [i8, i8, i8, i8, i8, vector, vector, ROOM, complex_matrix, integers], FieldKernel)
+EVALUATE = types.void(f8, vector, Reference(FIELD), vector)
+DERIVE = types.void(f8, vector, Reference(FIELD), vector, matrix)
+# Functions of Python: t, and the addresses of x (d,), f (d,) and J (d, d), which may be zero.
+PYTHON = types.void(f8, i8, i8, i8)
+
+evaluate_at, derive_at = function_at(EVALUATE), function_at(DERIVE)
+_python_at = function_at(PYTHON)
+
+
+def _by_function(t, x, field, f):
+    rates_at(field.function)(t, x, field.p, f)
+
+
+def _by_python(t, x, field, f):
+    _python_at(field.function)(t, np.int64(x.ctypes.data), np.int64(f.ctypes.data), 0)
+
+
+def _with_jacobian(t, x, field, f, J):
+    rates_at(field.function)(t, x, field.p, f)
+    jacobian_at(field.jacobian)(t, x, field.p, J)
+
+
+def _with_complex_step(t, x, field, f, J):
+    function, room, complex_room = rates_at(field.function), field.room, field.complex_room
+    y, q = room.y, room.q
+    function(t, x, field.p, f)
+    for i in range(len(x)):
+        y[i], complex_room[0, i] = x[i], x[i]
+    for a in range(len(q)):
+        q[a], complex_room[1, a] = field.p[a], field.p[a]
+    columns_by_complex_step(function, complex_rates_at(field.analytic), Place(t, y, q, f), x,
+                            field.scales, room, complex_room, J, field.wrong)
+
+
+def _with_differences(t, x, field, f, J):
+    function, room = rates_at(field.function), field.room
+    y, q = room.y, room.q
+    function(t, x, field.p, f)
+    for i in range(len(x)):
+        y[i] = x[i]
+    for a in range(len(q)):
+        q[a] = field.p[a]
+    columns_by_differences(function, Place(t, y, q, f), x, field.scales, room, J)
+
+
+def _with_python(t, x, field, f, J):
+    _python_at(field.function)(t, np.int64(x.ctypes.data), np.int64(f.ctypes.data),
+                               np.int64(J.ctypes.data))
+
+
+_FORM = "evaluate(t, x, field, f)"
+_by_function_law = compile_law(EVALUATE, _FORM, _by_function)
+_by_python_law = compile_law(EVALUATE, _FORM, _by_python)
+_derivatives = {way: compile_law(DERIVE, "derive(t, x, field, f, J)", function)
+                for way, function in (("jacobian", _with_jacobian),
+                                      ("complex", _with_complex_step),
+                                      ("differences", _with_differences),
+                                      ("python", _with_python))}
+
+
+def compiled_field(
+    rates: int, jacobian: int, analytic: int, values: Array, scales: Array
+) -> FieldKernel:
+    """A field of compiled functions, by their addresses; zero for a function that there is not."""
+    way = "jacobian" if jacobian else "complex" if analytic else "differences"
+    return _field(_by_function_law.address, _derivatives[way].address,
+                  (rates, jacobian, analytic), values, scales)
+
+
+def python_field(function: int, values: Array, scales: Array) -> FieldKernel:
+    """A field that Python evaluates, by the address of a function of the form :data:`PYTHON`."""
+    return _field(_by_python_law.address, _derivatives["python"].address, (function, 0, 0), values,
+                  scales)
+
+
+def _field(
+    evaluate: int, derive: int, functions: tuple[int, int, int], values: Array, scales: Array
+) -> FieldKernel:
+    d, k = len(scales), len(values)
+    return FieldKernel(evaluate, derive, *functions, np.array(values, dtype=float),
+                       np.array(scales, dtype=float), room_for(d, k), complex_room_for(d, k),
+                       np.zeros(d, dtype=np.int64))
