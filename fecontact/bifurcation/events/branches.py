@@ -25,6 +25,9 @@ from fecontact.integrate.solvers import SetValued
 
 # First steps beyond a border, in those of the branch, and the largest residual there.
 _BEYOND, _FITS = (0.1, 0.01, 1e-3), 1e-5
+# What is left of a condition at a border counts as nothing below this; at most so many borders are
+# met at once.
+_NOTHING, _DEPTH = 1e-6, 4
 # Most borders on one branch.
 _MOST = 40
 # Distance from a border within which turns of the branch belong to it.
@@ -137,7 +140,7 @@ def _side(
             return Going([*points, *stored], piece.status, piece.message)
         condition = problem.linearise(last.u).least
         kind = border_of(problem, last.u, condition)
-        following = None if kind in stops else _following(problem, last, condition, options)
+        following = None if kind in stops else _following(problem, last, options)
         stored[-1] = _border(problem, last, stored[-1], condition, kind, following is not None)
         points += stored
         if kind in stops:
@@ -177,24 +180,46 @@ def _border(
 
 
 def _following(
-    problem: EventOrbit, last: BranchPoint, condition: Condition, options: ContinuationOptions
+    problem: EventOrbit, last: BranchPoint, options: ContinuationOptions
 ) -> tuple[EventOrbit, Array, Array] | None:
-    """Problem, unknowns and tangent of the orbits beyond a border; None if there are none."""
-    for successor in beyond(problem, last.u, condition):
-        made = successor.made()
-        if made is None:
-            continue
-        candidate, u = made
+    """Problem, unknowns and tangent of the orbits beyond a border; None if there are none.
+
+    On symmetric orbits several conditions have nothing left at once: all are looked at, one after
+    the other.
+    """
+    ahead, known = [(problem, last.u, 0)], {problem.phases}
+    while ahead:
+        here, at, depth = ahead.pop(0)
         try:
-            linearised = candidate.linearise(u)
-            if np.abs(linearised.residual).max() > _FITS:
-                continue
-            tangent = _null_vector(candidate, linearised.matrix)
+            made = [successor.made() for condition in _nothing_left(here, at)
+                    for successor in beyond(here, at, condition)]
         except FecontactError:
             continue
-        for start in _starts(candidate, u, tangent, options):
-            return start
+        for candidate, u in [each for each in made if each is not None]:
+            if candidate.phases in known:
+                continue
+            known.add(candidate.phases)
+            try:
+                linearised = candidate.linearise(u)
+                if np.abs(linearised.residual).max() > _FITS:
+                    continue
+                tangent = _null_vector(candidate, linearised.matrix)
+            except FecontactError:
+                continue
+            for start in _starts(candidate, u, tangent, options):
+                return start
+            if depth + 1 < _DEPTH:
+                ahead.append((candidate, u, depth + 1))
     return None
+
+
+def _nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
+    """The conditions that have nothing left at a border."""
+    found = problem.linearise(u).conditions
+    least = min(abs(condition.left) for condition in found)
+    return sorted((condition for condition in found
+                   if abs(condition.left) < max(_NOTHING, 10.0 * least)),
+                  key=lambda condition: abs(condition.left))
 
 
 def _null_vector(problem: EventOrbit, matrix: Array) -> Array:

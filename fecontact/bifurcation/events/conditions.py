@@ -17,8 +17,11 @@ from fecontact.integrate.nonsmooth.problem import STICK
 
 # What has nothing left.
 DURATION, RATE, WITHIN, BEGIN, CROSSING = range(5)
-# Parts of a phase at which conditions are looked at, and places of the polynomial about a minimum.
-_PARTS, _PLACES = 48, 9
+# Parts of a phase at which conditions are looked at, closer together at its ends, and places of the
+# polynomial about a minimum.
+_NEAR = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
+_PARTS = np.concatenate([[0.0], _NEAR, np.linspace(0.02, 0.98, 49), 1.0 - _NEAR[::-1], [1.0]])
+_PLACES = 9
 # Minima below this part of the scale are looked at closely.
 _CLOSE = 0.3
 
@@ -57,11 +60,6 @@ class Course:
         return float(self.durations.sum())
 
 
-def least_of(found: Iterator[Condition]) -> Condition:
-    """The condition with the least left."""
-    return min(found, key=lambda condition: condition.left)
-
-
 def conditions(course: Course, rates: list[float]) -> Iterator[Condition]:
     """All conditions of the phases; ``rates`` are those of what vanishes at their ends."""
     T = course.period
@@ -90,7 +88,7 @@ def sampled(course: Course, i: int, after: Array) -> Array:
 def _within(course: Course, i: int) -> Iterator[Condition]:
     """The least value within a phase of each margin that has a minimum there."""
     duration = float(course.durations[i])
-    times = np.linspace(0.0, duration, _PARTS + 1)
+    times = duration * _PARTS
     found = sampled(course, i, times)
     for event in range(found.shape[1]):
         column = found[:, event]

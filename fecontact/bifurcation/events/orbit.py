@@ -9,17 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
-from fecontact.bifurcation.events.conditions import Condition, Course, conditions, least_of
+from fecontact.bifurcation.events.conditions import Condition, Course, conditions
 from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase, scales_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
+from fecontact.bifurcation.orbits.shooting import run_from
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
+from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.integrate.solvers import SetValued
 
 # Name of the test function that is negative where an orbit breaks the conditions of its phases.
 ADMISSIBLE = "admissible"
 _SAMPLES = 33  # of a phase, for the extremes of the states
+# Runs check orbits whose conditions have this much left; they come back to this part of the scales.
+_CLEAR, _RETURNS = 1e-3, 1e-6
 # Steps are followed to this part of the tolerance of the orbits.
 _FINER, _FINEST = 1e-2, 1e-13
 # Part of the period below which equations divided by a duration are interpolated over it.
@@ -147,13 +151,43 @@ class EventOrbit(FloquetTests, Problem):
         return max(1e-10, self.rtol)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
-        """Period, stability, and the extremes of the states from samples."""
+        """Period, stability, and the extremes of the states from samples.
+
+        Raises
+        ------
+        AnalysisError
+            If a run does not come back to its start.
+        """
         found = linearisation.floquet
+        if linearisation.least.left > _CLEAR:
+            self._require_return(u, float(np.abs(found.multipliers).max()))
         states = linearisation.samples
         return {"period": self.period(u), "multipliers": found.multipliers,
                 "unstable": found.unstable, "stable": found.stable,
                 "trivial_error": found.trivial_error, "mesh": np.array([0.0, 1.0]),
                 "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
+
+    def _require_return(self, u: Array, growth: float) -> None:
+        """Raise AnalysisError unless a run that knows nothing of the phases closes."""
+        i, after = anchor(self, u)
+        begin = float(self.begins(u)[i]) + after
+        start = self.runs_from(u)
+        times = begin + np.array([[0.0, self.period(u)]])
+        end = run_from(self.field.system(self.parameters(u)), times, start[None], self.rtol,
+                       self.solver)[0, -1]
+        off = float((np.abs(end - start) / self.scales[: self.dimension]).max())
+        if off > _RETURNS * max(1.0, growth):
+            raise AnalysisError("A run from the orbit does not come back: an event between its "
+                                "phases was not seen.")
+
+    def runs_from(self, u: Array) -> Array:
+        """The state (d,) from which runs of the orbit start; see :func:`anchor`."""
+        i, after = anchor(self, u)
+        begin, start = float(self.begins(u)[i]), self.starts(u)[i]
+        if after == 0.0:
+            return start
+        return np.asarray(self.motion(u).run(begin, np.array([after]), start,
+                                             self.phases[i])[0][-1])
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Those of the multipliers, and what the conditions of the phases have left."""
@@ -175,6 +209,27 @@ class EventOrbit(FloquetTests, Problem):
     def adapted(self, u: Array, tangent: Array) -> "tuple[EventOrbit, Array, Array]":
         """The same problem at the values of u."""
         return replace(self, values=self.parameters(u)), u, tangent
+
+
+def anchor(problem: EventOrbit, u: Array) -> tuple[int, float]:
+    """Phase in which runs of an orbit start, and when in it [s].
+
+    With an excitation at a multiple of the period, else in the middle of the longest phase, of
+    those in which something slips or flies if there are any.
+    """
+    durations = problem.durations(u)
+    if not problem.forced:
+        moving = [any(status != STICK for status in phase.status) or (
+            problem.solver.restitution is not None and not all(phase.closed))
+            for phase in problem.phases]
+        i = int(np.argmax(durations * (1.0 + 1e6 * np.array(moving))))
+        return i, 0.5 * float(durations[i])
+    begins, T = problem.begins(u), problem.period(u)
+    time = T * np.ceil(begins[0] / T)
+    i = int(np.searchsorted(begins, time, side="right")) - 1
+    if i >= problem.count:
+        return 0, 0.0
+    return i, float(time - begins[i])
 
 
 @dataclass(frozen=True, eq=False)
@@ -409,11 +464,16 @@ class EventLinearisation:
         return Floquet(found, trivial)
 
     @cached_property
-    def least(self) -> Condition:
-        """The condition of the phases that has the least left."""
+    def conditions(self) -> list[Condition]:
+        """What the conditions of the phases have left."""
         problem = self.problem
         course = Course(self.motion, problem.phases, self.begins, problem.starts(self.u),
                         problem.durations(self.u), problem.margins)
         rates = [float(end.margin_slopes[: len(end.rates)] @ end.rates
                        + end.margin_slopes[len(end.rates)]) for end in self._ends]
-        return least_of(conditions(course, rates))
+        return list(conditions(course, rates))
+
+    @property
+    def least(self) -> Condition:
+        """The condition that has the least left."""
+        return min(self.conditions, key=lambda condition: condition.left)
