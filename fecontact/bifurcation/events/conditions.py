@@ -62,16 +62,20 @@ class Course:
 
 def conditions(course: Course, rates: list[float]) -> Iterator[Condition]:
     """All conditions of the phases; ``rates`` are those of what vanishes at their ends."""
-    T = course.period
-    for i, phase in enumerate(course.phases):
-        duration = float(course.durations[i])
-        yield Condition(duration / T, DURATION, i, phase.event, duration)
-        if phase.event != PERIOD:
-            scale = scales_of(phase, course.margins)[phase.event]
-            yield Condition(-rates[i] * T / scale, RATE, i, phase.event, duration)
-        if duration > 0.0:
-            yield from _within(course, i)
-        yield from _at_begin(course, i)
+    for i, rate in enumerate(rates):
+        yield from of_phase(course, i, rate)
+
+
+def of_phase(course: Course, i: int, rate: float) -> Iterator[Condition]:
+    """The conditions of one phase; ``rate`` is that of what vanishes at its end."""
+    phase, T, duration = course.phases[i], course.period, float(course.durations[i])
+    yield Condition(duration / T, DURATION, i, phase.event, duration)
+    if phase.event != PERIOD:
+        scale = scales_of(phase, course.margins)[phase.event]
+        yield Condition(-rate * T / scale, RATE, i, phase.event, duration)
+    if duration > 0.0:
+        yield from _within(course, i)
+    yield from _at_begin(course, i)
 
 
 def sampled(course: Course, i: int, after: Array) -> Array:
