@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import (
     BranchPoint,
+    DiscontinuityPoint,
     FoldPoint,
     HopfPoint,
     NeimarkSackerPoint,
@@ -23,6 +24,7 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium_curve
 from fecontact.bifurcation.equilibria.problem import equilibrium_at
+from fecontact.bifurcation.events.curves import border_curve
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
@@ -54,9 +56,9 @@ def codim2_curve(
     ----------
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
-    point : FoldPoint, HopfPoint, PeriodDoublingPoint or NeimarkSackerPoint
-        A point of a branch over the first parameter; of orbits, one by collocation. Or a point of a
-        curve: 'Bautin', 'zero-Hopf', 'double Hopf', 'Bogdanov-Takens', for the other curve there.
+    point : FoldPoint, HopfPoint, PeriodDoublingPoint, NeimarkSackerPoint, DiscontinuityPoint
+        A point of a branch over the first parameter; of orbits by collocation, or where set-valued
+        ones meet a border of their contact states. Or a point of a curve: 'Bautin', 'zero-Hopf', 'double Hopf', 'Bogdanov-Takens', for the other curve there.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
@@ -98,10 +100,11 @@ def codim2_curve(
         raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
     crossing = point.kind in _CROSSINGS
     if keep == "kind" and not crossing and not isinstance(
-            point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
+            point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint
+            | DiscontinuityPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
-                         f"'period doubling', 'Neimark-Sacker' or 'Bautin', or an orbit with "
-                         f"keep='period'.")
+                         f"'period doubling', 'Neimark-Sacker' or 'Bautin', a border that "
+                         f"set-valued orbits meet, or an orbit with keep='period'.")
     if keep == "period" and not point.is_orbit:
         raise InputError(f"{point.place} is no orbit, whose period keep='period' could keep.")
     names = (point.branch.parameter_name, parameter)
@@ -114,7 +117,9 @@ def codim2_curve(
     widths = {name: high - low for name, (low, high) in ranges.items() if np.isfinite(high - low)}
     problem: Problem
     kind = "period" if keep == "period" else str(point.kind)
-    if point.is_orbit:
+    if isinstance(point, DiscontinuityPoint):
+        problem, u, attributes = border_curve(field, point, parameter, widths)
+    elif point.is_orbit:
         problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
     else:
         if crossing:

@@ -372,6 +372,30 @@ class UnresolvedPoint(BranchPoint):
         return int(self._detail("unstable_after"))
 
 
+class DiscontinuityPoint(BranchPoint):
+    """Where an orbit with set-valued friction or rigid stops meets a border of its contact states.
+
+    Kinds are 'grazing' of a stop, 'grazing-sliding', 'crossing-sliding', 'switching-sliding' and
+    'adding-sliding' of a cluster of nodes with one slip velocity, 'lift-off' from a closed stop, and
+    'corner', where events of two contacts coincide; see docs/orbits.md.
+    """
+
+    @property
+    def time(self) -> float:
+        """When the orbit meets it, from the begin of its first phase [s]."""
+        return float(self._detail("time"))
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """The contact nodes that meet it."""
+        return tuple(int(node) for node in np.atleast_1d(self._detail("nodes")))
+
+    @property
+    def persists(self) -> bool:
+        """Whether the branch goes on with orbits of another kind; if not, it ends."""
+        return bool(self._detail("persists"))
+
+
 class ZeroHopfPoint(BranchPoint):
     """Where a curve of folds or Hopf points has both a zero and an imaginary pair."""
 
@@ -396,7 +420,11 @@ class DoubleHopfPoint(BranchPoint):
         return float(self._detail("second_frequency_hz"))
 
 
+# Kinds of points at which orbits meet a border of their contact states.
+BORDERS = ("grazing", "grazing-sliding", "crossing-sliding", "switching-sliding", "adding-sliding",
+           "lift-off", "corner")
 _KINDS: Mapping[str | None, type[BranchPoint]] = {
+    **dict.fromkeys(BORDERS, DiscontinuityPoint),
     "fold": FoldPoint, "Hopf": HopfPoint, "period doubling": PeriodDoublingPoint,
     "Neimark-Sacker": NeimarkSackerPoint, "branch point": CrossingPoint,
     UNRESOLVED: UnresolvedPoint, "zero-Hopf": ZeroHopfPoint, "double Hopf": DoubleHopfPoint}

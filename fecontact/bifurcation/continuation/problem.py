@@ -23,6 +23,8 @@ class BranchStatus(Enum):
             "folds at a Bautin point.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
+    DISCONTINUITY = ("The orbit meets a border of its contact states, which the last point names: "
+                     "beyond it no orbit of its neighbourhood goes on.")
     STOPPED = "The branch reached a point at which it was to stop."
     CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
               "again.")

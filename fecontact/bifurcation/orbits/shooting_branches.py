@@ -22,7 +22,7 @@ from fecontact.bifurcation.orbits.shooting import (
 from fecontact.bifurcation.orbits.starts import Start, from_samples
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike
-from fecontact.integrate.solvers import Solver
+from fecontact.integrate.solvers import SetValued, Solver
 from fecontact.system.fields.vector_field import VectorField
 
 # Distance of the two halves of an orbit, relative to the largest one, at which a branch of doubled
@@ -88,6 +88,9 @@ def from_motion(
     found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
                          motion.periods, widths)
     problem, u = shooting_from(*found, segments, rtol, derivative_rtol, solver)
+    branch = _from_event_to_event(problem, u, options, direction=direction, both=both)
+    if branch is not None:
+        return branch
     try:
         return continue_branch(problem, u, options, name=_name(problem), direction=direction,
                                both=both,
@@ -97,6 +100,40 @@ def from_motion(
                             f"near the motion: Newton's method does not converge; run it longer "
                             f"until it has settled, or take more than {segments} segments."
                             ) from error
+
+
+def _from_event_to_event(
+    problem: ShootingProblem, u: Array, options: ContinuationOptions, **how: Any
+) -> Branch | None:
+    """The branch of a set-valued orbit whose events are known; None for others.
+
+    Those are orbits of time-stepping, without events though nothing excites them, with chatter, or
+    with compliant contacts that open.
+
+    Raises
+    ------
+    AnalysisError
+        If Newton's method finds no orbit near the start.
+    """
+    if not isinstance(problem.solver, SetValued):
+        return None
+    from fecontact.bifurcation.events.branches import followed, orbit_from
+
+    values, d = problem.parameters(u), problem.field.dimension
+    try:
+        found = orbit_from(problem.field, values, problem.free, 0.0, problem.starts(u)[0].copy(),
+                           problem.period(u), problem.periods,
+                           np.append(problem.scales[:d], problem.scales[-1]), problem.rtol,
+                           problem.solver)
+    except AnalysisError:
+        return None
+    whole = {**_attributes(problem), "segments": 1}
+    try:
+        return followed(*found, options, name=_name(problem), attributes=whole, **how)
+    except InputError as error:
+        raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {u[-1]:.6g} near "
+                            f"the motion: Newton's method does not converge; run it longer until "
+                            f"it has settled.") from error
 
 
 def _to_fastest(
@@ -124,6 +161,10 @@ def goes_on(
     problem = rescaled(problem, scales, width)
     if rtol is not None:
         problem = replace(problem, rtol=rtol)
+    ahead = float(np.copysign(1.0, sign * tangent[-1]))
+    branch = _from_event_to_event(problem, u, options, direction=ahead, both=both)
+    if branch is not None:
+        return branch
     return continue_branch(problem, u, options, name=_name(problem), tangent=sign * tangent,
                            both=both,
                            attributes=_attributes(problem))

@@ -113,7 +113,7 @@ def integrate_set_valued(
     """
     times = np.ascontiguousarray(times, dtype=float)
     longest = longest_step(system, times) if longest is None else longest
-    problem, rubbing = _problem(system, restitution, static_coefficient, longest)
+    problem, rubbing = nonsmooth_problem(system, restitution, static_coefficient, longest)
     problem = problem._replace(tangential=float(tangential_restitution),
                                poisson=int(impact_law == "poisson"))
     scheme = _chosen(problem, scheme)
@@ -212,7 +212,7 @@ class _Found:
         return Events.of_rows(np.vstack(found), np.vstack(states))
 
 
-def _problem(
+def nonsmooth_problem(
     system: ContactSystem,
     restitution: float | None,
     static_coefficient: float | Sequence[float] | None,

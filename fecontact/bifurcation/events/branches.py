@@ -1,0 +1,252 @@
+"""Branches of set-valued orbits from event to event, through the borders that they meet."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch, regular
+from fecontact.bifurcation.continuation.newton import corrected, norm
+from fecontact.bifurcation.continuation.points import BranchPoint, special_point
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
+from fecontact.bifurcation.events.conditions import Condition
+from fecontact.bifurcation.events.orbit import EventOrbit
+from fecontact.bifurcation.events.phases import Motion
+from fecontact.bifurcation.events.reduced import reduced
+from fecontact.bifurcation.events.tracing import Traced, traced
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.core.errors import FecontactError
+from fecontact.core.types import Array
+from fecontact.integrate.nonsmooth.problem import STICK
+from fecontact.integrate.solvers import SetValued
+
+# First steps beyond a border, in those of the branch, and the largest residual there.
+_BEYOND, _FITS = (0.1, 0.01, 1e-3), 1e-5
+# What is left of a condition at a border counts as nothing below this; at most so many borders are
+# met at once.
+_NOTHING, _DEPTH = 1e-6, 4
+# Most borders on one branch.
+_MOST = 40
+# Distance from a border within which turns of the branch belong to it.
+_BESIDE = 1e-3
+
+
+def orbit_from(
+    field: ContactField, values: Array, free: int, begin: float, start: Array, period: float,
+    periods: int, widths: Array, rtol: float, solver: SetValued,
+) -> tuple[EventOrbit, Array]:
+    """Problem and first guess from a state of a motion of this period.
+
+    ``widths`` (d + 1,) are the scales of states and parameter.
+
+    Raises
+    ------
+    AnalysisError
+        If the motion cannot be taken apart into phases; see
+        :func:`fecontact.bifurcation.events.tracing.traced`.
+    """
+    scales = np.concatenate([widths[:-1], [period, widths[-1]]])
+    motion = Motion(field, values, free, solver, widths[:-1], float(widths[-1]), period,
+                    max(1e-13, 1e-2 * rtol))
+    forced = field.forcing_period(values) is not None
+    found = traced(motion, begin, start, period, forced)
+    problem = EventOrbit(field, values.copy(), free, found.phases, solver, scales,
+                         _margins(motion, found), periods, rtol)
+    return problem, np.concatenate([found.starts.reshape(-1), found.durations,
+                                    found.begins[:1] if forced else [], [values[free]]])
+
+
+def _margins(motion: Motion, found: Traced) -> Array:
+    """Scales (2, 2 k + n) of speeds and heights, and of forces, from the samples of an orbit."""
+    k = motion.clusters
+    scales = np.zeros((2, 2 * k + motion.nodes))
+    for phase, begin, start, duration in zip(found.phases, found.begins, found.starts,
+                                             found.durations, strict=True):
+        times = np.linspace(0.0, duration, 33)
+        states = np.vstack([start, motion.run(begin, times[1:], start, phase)[0]])
+        margins = motion.observed(begin + times, states, phase)[0]
+        largest = np.where(np.isfinite(margins), np.abs(margins), 0.0).max(axis=0)
+        for c in range(k):
+            if phase.status[c] == STICK:
+                limit = 0.5 * np.abs(margins[:, 2 * c] + margins[:, 2 * c + 1]).max()
+                scales[1, 2 * c : 2 * c + 2] = np.maximum(scales[1, 2 * c : 2 * c + 2], limit)
+            else:
+                scales[0, 2 * c] = max(scales[0, 2 * c], largest[2 * c])
+                scales[1, 2 * c + 1] = max(scales[1, 2 * c + 1], largest[2 * c + 1])
+        for j in range(2 * k, 2 * k + motion.nodes):
+            row = int(phase.closed[j - 2 * k])
+            scales[row, j] = max(scales[row, j], largest[j])
+    for row in scales:
+        row[row == 0.0] = row.max() or 1.0
+    return scales
+
+
+@dataclass(frozen=True, eq=False)
+class Going:
+    """One side of a branch: its points, how it ended, and the error of the last failed step."""
+
+    points: list[BranchPoint]
+    status: BranchStatus
+    message: str = ""
+
+
+def followed(
+    problem: EventOrbit, u: Array, options: ContinuationOptions, *, name: str,
+    attributes: dict[str, Any], tangent: Array | None = None, direction: float = 1.0,
+    both: bool = False,
+) -> Branch:
+    """Follow orbits from event to event through the borders that they meet.
+
+    Points hold their orbit as by shooting with one segment.
+
+    Raises
+    ------
+    FecontactError
+        If there is no orbit near the start.
+    """
+    ahead = _side(problem, u, options, name, tangent, direction)
+    if not both or ahead.status in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
+        return Branch(name, tuple(ahead.points), ahead.status, ahead.message, attributes)
+    kept = max(options.points // 2 + 1, 2)
+    left = max(options.points + 1 - min(regular(ahead.points), kept), 2)
+    back = _side(problem, u, replace(options, points=left), name,
+                 None if tangent is None else -tangent, -direction)
+    turned = [replace(point, tangent=-point.tangent) for point in back.points[:0:-1]]
+    return Branch(name, (*turned, *ahead.points), ahead.status, ahead.message, attributes)
+
+
+def _side(
+    problem: EventOrbit, u: Array, options: ContinuationOptions, name: str,
+    tangent: Array | None, direction: float,
+) -> Going:
+    points: list[BranchPoint] = []
+    stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
+    begun = False
+    for _ in range(_MOST):
+        left = replace(options, points=max(options.points - regular(points), 2), locate=True)
+        piece = continue_branch(problem, u, left, name=name, tangent=tangent, direction=direction)
+        found = list(piece.points)
+        last = found[-1]
+        ended = piece.status is BranchStatus.DISCONTINUITY
+        ends = ([found[0].u] if begun else []) + ([last.u] if ended else [])
+        found = [point for point in found if point is last or not _is_turn(problem, point, ends)]
+        if not options.locate:
+            found = [point for point in found if point.kind is None]
+        stored = [reduced(problem, point) for point in found]
+        if not ended:
+            return Going([*points, *stored], piece.status, piece.message)
+        condition = problem.linearise(last.u).least
+        kind = border_of(problem, last.u, condition)
+        following = None if kind in stops else _following(problem, last, options)
+        stored[-1] = _border(problem, last, stored[-1], condition, kind, following is not None)
+        points += stored
+        if kind in stops:
+            return Going(points, BranchStatus.STOPPED)
+        if following is None:
+            return Going(points, BranchStatus.DISCONTINUITY)
+        problem, u, tangent = following
+        begun = True
+    return Going(points, BranchStatus.STALLED, f"The orbit meets more than {_MOST} borders.")
+
+
+def _is_turn(problem: EventOrbit, point: BranchPoint, ends: list[Array]) -> bool:
+    """Whether a special point is only the turn of the equations at a border."""
+    return point.kind in ("fold", "branch point", "unresolved") and any(
+        norm(problem, point.u - end) < _BESIDE for end in ends)
+
+
+def _border(
+    problem: EventOrbit, last: BranchPoint, stored: BranchPoint, condition: Condition, kind: str,
+    persists: bool,
+) -> BranchPoint:
+    """The point at a border, with what curves over two parameters need."""
+    motion = problem.motion(last.u)
+    begins = problem.begins(last.u)
+    time = float(begins[condition.phase] - begins[0] + condition.after)
+    phases = np.array([[*phase.status, *phase.closed, phase.event, phase.order]
+                       for phase in problem.phases], dtype=np.int64)
+    strikes = np.array([[0, *([0] * motion.nodes), *([0] * motion.clusters)]
+                        if phase.strike is None else
+                        [1, *(int(j in phase.strike.nodes) for j in range(motion.nodes)),
+                         *phase.strike.modes] for phase in problem.phases], dtype=np.int64)
+    return special_point(stored.u, stored.tangent, stored.values, kind, {
+        "time": time, "nodes": np.array(nodes_of(problem, motion, condition)),
+        "persists": persists, "unknowns": last.u, "phases": phases, "strikes": strikes,
+        "margins": problem.margins,
+        "condition": np.array([condition.what, condition.phase, condition.event])})
+
+
+def _following(
+    problem: EventOrbit, last: BranchPoint, options: ContinuationOptions
+) -> tuple[EventOrbit, Array, Array] | None:
+    """Problem, unknowns and tangent of the orbits beyond a border; None if there are none.
+
+    On symmetric orbits several conditions have nothing left at once: all are looked at, one after
+    the other.
+    """
+    ahead, known = [(problem, last.u, 0)], {problem.phases}
+    while ahead:
+        here, at, depth = ahead.pop(0)
+        try:
+            made = [successor.made() for condition in _nothing_left(here, at)
+                    for successor in beyond(here, at, condition)]
+        except FecontactError:
+            continue
+        for candidate, u in [each for each in made if each is not None]:
+            if candidate.phases in known:
+                continue
+            known.add(candidate.phases)
+            try:
+                linearised = candidate.linearise(u)
+                if np.abs(linearised.residual).max() > _FITS:
+                    continue
+                tangent = _null_vector(candidate, linearised.matrix)
+            except FecontactError:
+                continue
+            for start in _starts(candidate, u, tangent, options):
+                return start
+            if depth + 1 < _DEPTH:
+                ahead.append((candidate, u, depth + 1))
+    return None
+
+
+def _nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
+    """The conditions that have nothing left at a border."""
+    found = problem.linearise(u).conditions
+    least = min(abs(condition.left) for condition in found)
+    return sorted((condition for condition in found
+                   if abs(condition.left) < max(_NOTHING, 10.0 * least)),
+                  key=lambda condition: abs(condition.left))
+
+
+def _null_vector(problem: EventOrbit, matrix: Array) -> Array:
+    sizes = 1.0 / np.sqrt(problem.weights())
+    vector = np.linalg.svd(matrix * sizes)[2][-1] * sizes
+    return np.asarray(vector / norm(problem, vector))
+
+
+def _starts(
+    problem: EventOrbit, u: Array, tangent: Array, options: ContinuationOptions
+) -> Iterator[tuple[EventOrbit, Array, Array]]:
+    """The orbit a small step to the side where all conditions hold."""
+    for part in _BEYOND:
+        step = part * options.step
+        for sign in (1.0, -1.0):
+            row = problem.weights() * sign * tangent
+            try:
+                found = corrected(problem, u + sign * step * tangent, row, options.tolerance,
+                                  options.iterations)
+                if found is None or not problem.linearise(found[0]).least.left > 0.0:
+                    continue
+                unit = np.zeros(len(u))
+                unit[-1] = 1.0
+                ahead = found[1].solve(row, unit)
+            except FecontactError:
+                continue
+            if np.isfinite(ahead).all():
+                yield problem, found[0], ahead / norm(problem, ahead)
+                return
+

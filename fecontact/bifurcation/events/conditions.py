@@ -1,0 +1,163 @@
+"""What the conditions of the phases of an orbit have left.
+
+An orbit ends to be of its kind where one of them has nothing left: a phase has no duration, what
+ends it vanishes without any rate (the orbit only touches there), something else vanishes within a
+phase or at its begin, or what slips through zero could stick there.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase, scales_of
+from fecontact.core.types import Array
+from fecontact.integrate.nonsmooth.problem import STICK
+
+# What has nothing left.
+DURATION, RATE, WITHIN, BEGIN, CROSSING = range(5)
+# Parts of a phase at which conditions are looked at, closer together at its ends, and places of the
+# polynomial about a minimum.
+_NEAR = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
+_PARTS = np.concatenate([[0.0], _NEAR, np.linspace(0.02, 0.98, 49), 1.0 - _NEAR[::-1], [1.0]])
+_PLACES = 9
+# Minima below this part of the scale are looked at closely.
+_CLOSE = 0.3
+
+
+class Condition(NamedTuple):
+    """What is left of a condition, in parts of its scale, and which one it is.
+
+    ``what`` is DURATION, RATE, WITHIN, BEGIN or CROSSING, of the phase with this number, ``event``
+    what vanishes and ``after`` when, from the begin of the phase [s].
+    """
+
+    left: float
+    what: int
+    phase: int
+    event: int
+    after: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Phases with their begins (K + 1,), states (K, d) and durations (K,).
+
+    ``margins`` (2, 2 k + n) are the scales of :func:`fecontact.bifurcation.events.phases.scales_of`.
+    """
+
+    motion: Motion
+    phases: tuple[Phase, ...]
+    begins: Array
+    starts: Array
+    durations: Array
+    margins: Array
+
+    @property
+    def period(self) -> float:
+        """Sum of the durations [s]."""
+        return float(self.durations.sum())
+
+
+def conditions(course: Course, rates: list[float]) -> Iterator[Condition]:
+    """All conditions of the phases; ``rates`` are those of what vanishes at their ends."""
+    for i, rate in enumerate(rates):
+        yield from of_phase(course, i, rate)
+
+
+def of_phase(course: Course, i: int, rate: float) -> Iterator[Condition]:
+    """The conditions of one phase; ``rate`` is that of what vanishes at its end."""
+    phase, T, duration = course.phases[i], course.period, float(course.durations[i])
+    yield Condition(duration / T, DURATION, i, phase.event, duration)
+    if phase.event != PERIOD:
+        scale = scales_of(phase, course.margins)[phase.event]
+        yield Condition(-rate * T / scale, RATE, i, phase.event, duration)
+    if duration > 0.0:
+        yield from _within(course, i)
+    yield from _at_begin(course, i)
+
+
+def sampled(course: Course, i: int, after: Array) -> Array:
+    """Margins (N, 2 k + n) of a phase at times (N,) after its begin, in their scales."""
+    phase, motion, begin = course.phases[i], course.motion, float(course.begins[i])
+    states = np.empty((len(after), len(course.starts[i])))
+    moves = after != 0.0
+    states[~moves] = course.starts[i]
+    if moves.any():
+        states[moves] = motion.run(begin, after[moves], course.starts[i], phase)[0]
+    return motion.observed(begin + after, states, phase)[0] / scales_of(phase, course.margins)
+
+
+def _within(course: Course, i: int) -> Iterator[Condition]:
+    """The least value within a phase of each margin that has a minimum there."""
+    duration = float(course.durations[i])
+    times = duration * _PARTS
+    found = sampled(course, i, times)
+    for event in range(found.shape[1]):
+        column = found[:, event]
+        if not np.isfinite(column).all():
+            continue
+        low = 1 + np.flatnonzero((column[1:-1] < column[:-2]) & (column[1:-1] <= column[2:]))
+        for place in low:
+            after, value = float(times[place]), float(column[place])
+            if value < _CLOSE:
+                after, value = _minimum(course, i, event, float(times[place - 1]),
+                                        float(times[place + 1]))
+            yield Condition(value, WITHIN, i, event, after)
+
+
+def _minimum(course: Course, i: int, event: int, first: float, last: float) -> tuple[float, float]:
+    """Time and value of a minimum between two times, of the polynomial through nine places."""
+    nodes = -np.cos(np.pi * np.arange(_PLACES) / (_PLACES - 1))
+    middle, half = 0.5 * (first + last), 0.5 * (last - first)
+    values = sampled(course, i, middle + half * nodes)[:, event]
+    polynomial = np.polynomial.Chebyshev.fit(nodes, values, _PLACES - 1, domain=[-1.0, 1.0])
+    turns = [float(root.real) for root in np.atleast_1d(polynomial.deriv().roots())
+             if abs(root.imag) < 1e-6 and abs(root.real) <= 1.0]
+    places = [*turns, float(nodes[np.argmin(values)])]
+    at = min(places, key=lambda place: float(polynomial(place)))
+    return middle + half * at, float(polynomial(at))
+
+
+def _at_begin(course: Course, i: int) -> Iterator[Condition]:
+    """What is left where a phase begins, of what its first event has not just brought to zero."""
+    phase, before = course.phases[i], course.phases[i - 1]
+    if before.event == PERIOD:
+        return
+    k, event = course.motion.clusters, before.event
+    margins = sampled(course, i, np.zeros(1))[0]
+    cluster = before.cluster()
+    for place in np.flatnonzero(np.isfinite(margins)):
+        if cluster is not None and phase.cluster(int(place)) == cluster:
+            if phase.status[cluster] != STICK or before.status[cluster] == STICK:
+                continue
+        elif cluster is None and place == event and not phase.closed[event - 2 * k]:
+            continue
+        yield Condition(float(margins[place]), BEGIN, i, int(place))
+    if cluster is not None and crosses(before, phase):
+        held = Phase((*phase.status[:cluster], STICK, *phase.status[cluster + 1 :]), phase.closed,
+                     PERIOD)
+        start, begin = course.starts[i], course.begins[i : i + 1]
+        place = crossing_event(cluster, phase)
+        found = course.motion.observed(begin, start[None], held)[0][0, place]
+        scale = friction_scale(course, i, cluster, held)
+        yield Condition(-float(found) / scale, CROSSING, i, place)
+
+
+def crosses(before: Phase, phase: Phase) -> bool:
+    """Whether the event between two phases turns the sense of slip of its cluster."""
+    cluster = before.cluster()
+    return cluster is not None and (before.status[cluster], phase.status[cluster]) in (
+        (1, -1), (-1, 1))
+
+
+def crossing_event(cluster: int, phase: Phase) -> int:
+    """The margin in stick that is negative where a cluster begins to slip in its sense."""
+    return 2 * cluster + (0 if phase.status[cluster] == 1 else 1)
+
+
+def friction_scale(course: Course, i: int, cluster: int, held: Phase) -> float:
+    """Limit of stick at the begin of a phase: half the sum of what is left to both sides."""
+    margins = course.motion.observed(course.begins[i : i + 1], course.starts[i][None], held)[0][0]
+    return float(0.5 * (margins[2 * cluster] + margins[2 * cluster + 1])) or 1.0

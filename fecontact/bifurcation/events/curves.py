@@ -1,0 +1,237 @@
+"""Borders of the contact states of orbits over two parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.points import DiscontinuityPoint
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.events.conditions import Condition, Course, of_phase
+from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventLinearisation, EventOrbit
+from fecontact.bifurcation.events.phases import PERIOD, Phase, Strike
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.system.fields.vector_field import VectorField
+from fecontact.bifurcation.orbits.motions import solver_of
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array
+from fecontact.integrate.solvers import SetValued
+
+# Step of differences of a condition, in scales of the states and parameters.
+_STEP = 1e-5
+# Conditions with less left than this at the start belong to the border that is followed.
+_SAME = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class BorderCurve(Problem):
+    """Orbits at which one condition of their phases has nothing left, with two free parameters.
+
+    The unknowns are those of the orbit, with the second parameter before the first one. The curve
+    ends where another condition has nothing left.
+
+    Attributes
+    ----------
+    orbit : EventOrbit
+        Over the first parameter.
+    second : int
+        Index of the second parameter.
+    width : float
+        Its width in the diagram.
+    what, phase, event : int
+        The condition; see :class:`fecontact.bifurcation.events.conditions.Condition`.
+    beside : frozenset
+        Other conditions, (what, phase, event), that have nothing left either at the border.
+    """
+
+    orbit: EventOrbit
+    second: int
+    width: float
+    what: int
+    phase: int
+    event: int
+    beside: frozenset[tuple[int, int, int]] = frozenset()
+
+    ends: ClassVar[Mapping[str, BranchStatus]] = {ADMISSIBLE: BranchStatus.DISCONTINUITY}
+
+    def along_first(self, u: Array) -> tuple[EventOrbit, Array]:
+        """The orbit and its unknowns over the first parameter."""
+        values = self.orbit.values.copy()
+        values[self.second], values[self.orbit.free] = u[-2], u[-1]
+        return replace(self.orbit, values=values), np.append(u[:-2], u[-1])
+
+    def along_second(self, u: Array) -> tuple[EventOrbit, Array]:
+        """The same over the second one."""
+        first, _ = self.along_first(u)
+        scales = np.append(first.scales[:-1], self.width)
+        return replace(first, free=self.second, scales=scales), u[:-1]
+
+    def linearise(self, u: Array) -> "BorderLinearisation":
+        """The equations about u."""
+        return BorderLinearisation(self, u)
+
+    def weights(self) -> Array:
+        """Weights of the inner product, those of the orbit."""
+        found = self.orbit.weights()
+        return np.concatenate([found[:-1], [1.0 / self.width**2], found[-1:]])
+
+    @property
+    def rounding(self) -> float:
+        """Relative size of Newton steps below which rounding dominates."""
+        return 1e-8
+
+    def left(self, orbit: EventOrbit, u: Array, start: Array, begin: float, tau: float) -> float:
+        """What the condition has left, for a phase with another start, begin and duration."""
+        i, motion = self.phase, orbit.motion(u)
+        begins, starts = orbit.begins(u).copy(), orbit.starts(u).copy()
+        durations = orbit.durations(u).copy()
+        starts[i], begins[i], durations[i] = start, begin, tau
+        course = Course(motion, orbit.phases, begins, starts, durations, orbit.margins)
+        phase, rate = orbit.phases[i], 0.0
+        if phase.event != PERIOD:
+            state = motion.run(begin, np.array([tau]), start, phase)[0][-1]
+            slopes = motion.margin_slopes(begin + tau, state, phase, phase.event)
+            rates = motion.observed(np.array([begin + tau]), state[None], phase)[1][0]
+            rate = float(slopes[: len(rates)] @ rates + slopes[len(rates)])
+        found = [each.left for each in of_phase(course, i, rate)
+                 if (each.what, each.event) == (self.what, self.event)]
+        if not found:
+            raise AnalysisError("The orbit does not come near its border any more.")
+        return min(found)
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Both parameters, and what is stored of orbits."""
+        names = list(self.orbit.field.parameters)
+        orbit = linearisation.orbit
+        found = orbit.problem.point(orbit.u, orbit, tangent)
+        del found["mesh"]
+        return {names[self.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]), **found,
+                "unstable": 0}
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """What the other conditions have left."""
+        others = [each.left for each in linearisation.orbit.conditions
+                  if named(each) not in self.beside]
+        return {ADMISSIBLE: min(others, default=1.0)}
+
+
+def named(condition: Condition) -> tuple[int, int, int]:
+    """Which condition it is."""
+    return condition.what, condition.phase, condition.event
+
+
+class BorderLinearisation:
+    """The equations of a border at u."""
+
+    def __init__(self, problem: BorderCurve, u: Array) -> None:
+        self.problem, self.u = problem, u
+
+    @cached_property
+    def orbit(self) -> EventLinearisation:
+        """Those of the orbit, over the first parameter."""
+        found, u = self.problem.along_first(self.u)
+        return found.linearise(u)
+
+    @cached_property
+    def residual(self) -> Array:
+        """The residual (N,)."""
+        return np.append(self.orbit.residual, self._left())
+
+    def _left(self, offset: Array | None = None) -> float:
+        """What the condition has left, with an offset (d + 4,) of start, begin, tau, parameters."""
+        problem, u = self.problem, self.u.copy()
+        d = problem.orbit.dimension
+        moved = np.zeros(d + 4) if offset is None else offset
+        u[-2:] += moved[-2:]
+        orbit, known = problem.along_first(u)
+        i = problem.phase
+        return problem.left(orbit, known, orbit.starts(known)[i] + moved[:d],
+                            float(orbit.begins(known)[i] + moved[d]),
+                            float(orbit.durations(known)[i] + moved[d + 1]))
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The derivative (N, N + 1)."""
+        problem, u = self.problem, self.u
+        d, K, i = problem.orbit.dimension, problem.orbit.count, problem.phase
+        other, beside = problem.along_second(u)
+        first = self.orbit.matrix
+        matrix = np.zeros((len(u) - 1, len(u)))
+        matrix[:-1, :-2], matrix[:-1, -1] = first[:, :-1], first[:, -1]
+        matrix[:-1, -2] = other.linearise(beside).matrix[:, -1]
+        scales, row = problem.orbit.scales, matrix[-1]
+        sizes = np.concatenate([scales[:d], scales[-2:-1], scales[-2:-1], [problem.width],
+                                scales[-1:]])
+        slopes = np.empty(d + 4)
+        for k, size in enumerate(sizes):
+            offset = np.zeros(d + 4)
+            offset[k] = _STEP * size
+            slopes[k] = (self._left(offset) - self._left(-offset)) / (2.0 * _STEP * size)
+        row[i * d : (i + 1) * d] = slopes[:d]
+        row[K * d + i] += slopes[d + 1]
+        if problem.orbit.forced:
+            row[K * d : K * d + i] += slopes[d]
+            row[K * d + K] += slopes[d]
+        row[-2:] = slopes[-2:]
+        return matrix
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        try:
+            return np.linalg.solve(np.vstack([self.matrix, row]), rhs)
+        except np.linalg.LinAlgError:
+            return np.full(len(rhs), np.nan)
+
+
+def border_curve(
+    field: VectorField, point: DiscontinuityPoint, parameter: str, widths: Mapping[str, float]
+) -> tuple[BorderCurve, Array, dict[str, Any]]:
+    """Problem, unknowns and attributes of a border over the parameter of its branch and another.
+
+    Raises
+    ------
+    InputError
+        If the field is not that of a contact system.
+    """
+    if not isinstance(field, ContactField):
+        raise InputError(f"{point.place} is of a contact system; make the field with "
+                         f"contact_field.")
+    orbit, u = _restored(field, point)
+    name = point.branch.parameter_name
+    scales = orbit.scales.copy()
+    scales[-1] = widths.get(name, scales[-1])
+    orbit = replace(orbit, scales=scales)
+    second = field.index(parameter)
+    value = float(orbit.values[second])
+    width = widths.get(parameter, abs(value) or 1.0)
+    what, phase, event = (int(each) for each in np.asarray(point._detail("condition")))
+    beside = frozenset(named(each) for each in orbit.linearise(u).conditions
+                       if abs(each.left) < _SAME) | {(what, phase, event)}
+    problem = BorderCurve(orbit, second, width, what, phase, event, beside)
+    return problem, np.concatenate([u[:-1], [value], u[-1:]]), {
+        "parameter_names": list(field.parameters), "parameter_values": orbit.values,
+        "scales": scales}
+
+
+def _restored(field: ContactField, point: DiscontinuityPoint) -> tuple[EventOrbit, Array]:
+    """The orbit of a border in its unknowns from event to event."""
+    known = point.branch.attributes
+    solver = solver_of(known)
+    assert isinstance(solver, SetValued)
+    margins = np.asarray(point._detail("margins"), dtype=float)
+    strikes = np.atleast_2d(np.asarray(point._detail("strikes"), dtype=np.int64))
+    rows = np.atleast_2d(np.asarray(point._detail("phases"), dtype=np.int64))
+    nodes = 2 * (rows.shape[1] - 2) - margins.shape[1]
+    phases = []
+    for row, strike in zip(rows.tolist(), strikes.tolist(), strict=True):
+        status, closed = row[: -2 - nodes], row[-2 - nodes : -2]
+        pressed = tuple(j for j in range(nodes) if strike[1 + j])
+        phases.append(Phase(tuple(status), tuple(closed), row[-2],
+                            Strike(pressed, tuple(strike[1 + nodes :])) if strike[0] else None,
+                            row[-1]))
+    values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
+    return EventOrbit(field, values, free, tuple(phases), solver,
+                      np.asarray(known["scales"], dtype=float), margins, int(known["periods"]),
+                      float(known.get("rtol", 1e-9))), np.asarray(point._detail("unknowns"))

@@ -1,0 +1,311 @@
+"""Phases of set-valued orbits: contact states between events, their motion, and impacts."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, product
+
+import numpy as np
+
+from fecontact.bifurcation.events.flow import (
+    PART,
+    flow,
+    kinetic_coefficients,
+    observe,
+    strike_rows,
+)
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array
+from fecontact.integrate.nonsmooth.driver import nonsmooth_problem
+from fecontact.integrate.nonsmooth.problem import STICK, NonsmoothProblem, workspace_for
+from fecontact.integrate.solvers import SetValued
+from fecontact.system.powers import POWER_COUNT
+
+# In place of an event: the end of a period of the forcing.
+PERIOD = -1
+# Change of the parameter in widths of the diagram for its derivatives.
+_CHANGE = 1e-5
+# Steps are at most this part of the period.
+_LONGEST = 0.02
+# Impulses and speeds within rounding of zero, relative to the largest.
+_ROUNDING = 1e-9
+# Offsets and weights of a difference of fourth order.
+_OFFSETS, _WEIGHTS = np.array([-2.0, -1.0, 1.0, 2.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
+
+
+@dataclass(frozen=True)
+class Strike:
+    """An impact: the nodes that are pressed, and the clusters whose slip it stops or rubs.
+
+    ``modes`` are 0 for clusters without impulse, STICK, or the sense of slip.
+    """
+
+    nodes: tuple[int, ...]
+    modes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A contact state, and the event at which it ends.
+
+    Attributes
+    ----------
+    status : (k,) tuple
+        Status of the clusters, as in :mod:`fecontact.integrate.nonsmooth.problem`.
+    closed : (n,) tuple
+        Whether stops are closed.
+    event : int
+        Place of what vanishes at the end among those of
+        :func:`fecontact.bifurcation.events.flow.observe`, or PERIOD.
+    strike : Strike, optional
+        The impact at the end.
+    order : int
+        How often what vanishes at the end vanishes at the begin too: the equation of the end is
+        divided by that power of the duration.
+    """
+
+    status: tuple[int, ...]
+    closed: tuple[int, ...]
+    event: int
+    strike: Strike | None = None
+    order: int = 0
+
+    @property
+    def state(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The contact state."""
+        return self.status, self.closed
+
+    @cached_property
+    def arrays(self) -> tuple[Array, Array]:
+        """Status (k,) and closed stops (n,) for kernels."""
+        return np.array(self.status, dtype=np.int64), np.array(self.closed, dtype=np.int64)
+
+    def cluster(self, event: int | None = None) -> int | None:
+        """The cluster to which an event belongs, by default its own; None for stops."""
+        event = self.event if event is None else event
+        return event // 2 if 0 <= event < 2 * len(self.status) else None
+
+    def ending(self, event: int, strike: Strike | None = None, order: int = 0) -> "Phase":
+        """The same contact state with another end."""
+        return replace(self, event=event, strike=strike, order=order)
+
+
+def scales_of(phase: Phase, margins: Array) -> Array:
+    """Scales (2 k + n,) of the margins of a phase, of ``margins`` (2, 2 k + n).
+
+    The first row has speeds of clusters and heights of stops, the second one forces.
+    """
+    k = len(phase.status)
+    forces = np.zeros(margins.shape[1], dtype=int)
+    forces[: 2 * k : 2] = np.array(phase.status) == STICK
+    forces[1 : 2 * k : 2] = 1
+    forces[2 * k :] = phase.closed
+    return np.asarray(margins[forces, np.arange(margins.shape[1])])
+
+
+class Motion:
+    """A system at one value of the free parameter, moving within given contact states.
+
+    Parameters
+    ----------
+    field, values, free
+        The system, its parameters, and the index of the free one.
+    solver : SetValued
+        Its friction and stops.
+    sizes : (d,) array
+        Sizes of the states.
+    width, period, rtol : float
+        Width of the diagram, about the period [s], tolerance of the steps.
+    """
+
+    def __init__(
+        self, field: ContactField, values: Array, free: int, solver: SetValued, sizes: Array,
+        width: float, period: float, rtol: float,
+    ) -> None:
+        self.solver, self.sizes, self.rtol = solver, np.ascontiguousarray(sizes), rtol
+        self.longest, self._period = _LONGEST * period, period
+        self._field, self._values, self._free, self._width = field, values, free, width
+        forcing = field.forcing_period(values)
+        self.tick = 0.0 if forcing is None else PART * forcing
+        self.problem, self.rubbing = self._problem(values)
+        self.clusters, self.nodes = len(self.problem.rows), len(self.problem.cluster)
+        self.modes = self.problem.rows.shape[1]
+        self._workspace = workspace_for(self.problem)
+        full = np.zeros((2, 2 * self.modes + POWER_COUNT + self.nodes))
+        self._full, self._rate = full[0].copy(), full[1].copy()
+
+    @cached_property
+    def kinetic(self) -> Array:
+        """Coefficients of friction (n,) at the begin of slip."""
+        found = np.empty(self.nodes)
+        kinetic_coefficients(self.problem, found)
+        return found
+
+    def _problem(self, values: Array) -> tuple[NonsmoothProblem, Array]:
+        solver = self.solver
+        found, rubbing = nonsmooth_problem(
+            self._field.system(values), solver.restitution, solver.static_coefficient,
+            self.longest)
+        return found._replace(tangential=float(solver.tangential_restitution)), rubbing
+
+    @cached_property
+    def _beside(self) -> tuple[NonsmoothProblem, NonsmoothProblem, float]:
+        """Problems at larger and smaller parameters, and half their distance."""
+        change, found = _CHANGE * self._width, []
+        for sign in (1.0, -1.0):
+            values = self._values.copy()
+            values[self._free] += sign * change
+            try:
+                found.append(self._problem(values)[0])
+            except InputError:  # beside the end of the parameter's range
+                found.append(self.problem)
+                change /= 2.0
+        return found[0], found[1], change
+
+    def run(
+        self, begin: float, times: Array, start: Array, phase: Phase, derivatives: bool = False
+    ) -> tuple[Array, Array]:
+        """States (N, d) at times (N,) after a begin, and the slopes (d, d + 2) of the last.
+
+        Raises
+        ------
+        AnalysisError
+            If the steps become too short.
+        """
+        d = 2 * self.modes
+        states, slopes = np.empty((len(times), d)), np.empty((d if derivatives else 0, d + 2))
+        above, below, change = self._beside if derivatives else (self.problem, self.problem, 1.0)
+        failed = flow(self.problem, above, below, self._workspace, change, self.tick,
+                      np.array([self.rtol]), begin, self.longest, np.ascontiguousarray(times),
+                      np.ascontiguousarray(start), *phase.arrays, self.sizes, self._full,
+                      self._rate, states, slopes)
+        if failed or not np.isfinite(states).all():
+            raise AnalysisError("The motion between two events could not be followed.")
+        return states, slopes
+
+    def observed(
+        self, times: Array, states: Array, phase: Phase, problem: NonsmoothProblem | None = None
+    ) -> tuple[Array, Array]:
+        """Margins (N, 2 k + n) and rates (N, d) at states (N, d), see
+        :func:`fecontact.bifurcation.events.flow.observe`.
+        """
+        margins = np.empty((len(times), 2 * self.clusters + self.nodes))
+        rates = np.empty_like(states)
+        observe(self.problem if problem is None else problem, self._workspace,
+                np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states),
+                *phase.arrays, self._full, self._rate, margins, rates)
+        return margins, rates
+
+    def margin_slopes(self, t: float, state: Array, phase: Phase, event: int) -> Array:
+        """Slopes (d + 2,) of a margin by the states, time and parameter."""
+        d = len(state)
+        times, states = self._around(t, state)
+        found = self.observed(times, states, phase)[0][:, event].reshape(-1, 4)
+        steps = np.append(PART * self.sizes, self.tick)[: len(found)]
+        slopes = np.zeros(d + 2)
+        slopes[: len(found)] = found @ _WEIGHTS / steps
+        above, below, change = self._beside
+        ends = [self.observed(np.array([t]), state[None], phase, problem)[0][0, event]
+                for problem in (above, below)]
+        slopes[-1] = (ends[0] - ends[1]) / (2.0 * change)
+        return slopes
+
+    def _around(self, t: float, state: Array) -> tuple[Array, Array]:
+        """Times and states for differences: four for each state, and four in time."""
+        d = len(state)
+        count = 4 * (d + (self.tick > 0.0))
+        times, states = np.full(count, t), np.tile(state, (count, 1))
+        for i in range(d):
+            states[4 * i : 4 * i + 4, i] += PART * self.sizes[i] * _OFFSETS
+        times[4 * d :] += self.tick * _OFFSETS[: count - 4 * d]
+        return times, states
+
+    def struck(
+        self, t: float, state: Array, phase: Phase, problem: NonsmoothProblem | None = None
+    ) -> Array:
+        """The state after the impact at the end of a phase."""
+        assert phase.strike is not None
+        return self._impact(t, state, phase, phase.strike, problem)[0]
+
+    def strike_slopes(self, t: float, state: Array, phase: Phase) -> Array:
+        """Slopes (d, d + 2) of the state after an impact by the state, time and parameter."""
+        d = len(state)
+        times, states = self._around(t, state)
+        found = np.array([self.struck(time, each, phase)
+                          for time, each in zip(times, states, strict=True)]).reshape(-1, 4, d)
+        steps = np.append(PART * self.sizes, self.tick)[: len(found)]
+        slopes = np.zeros((d, d + 2))
+        slopes[:, : len(found)] = (np.einsum("ikj,k->ij", found, _WEIGHTS) / steps[:, None]).T
+        above, below, change = self._beside
+        slopes[:, -1] = (self.struck(t, state, phase, above)
+                         - self.struck(t, state, phase, below)) / (2.0 * change)
+        return slopes
+
+    def _impact(
+        self, t: float, state: Array, phase: Phase, strike: Strike,
+        problem: NonsmoothProblem | None = None,
+    ) -> tuple[Array, bool]:
+        """The state after an impact of a given kind, and whether its conditions hold."""
+        k, n, m = self.clusters, self.nodes, self.modes
+        held, pushing = np.empty((n + k, m)), np.empty((n + k, m))
+        speeds, coefficients = np.empty(n + k), np.empty(n)
+        chosen = self.problem if problem is None else problem
+        strike_rows(chosen, self._workspace, t, np.ascontiguousarray(state), *phase.arrays,
+                    self._full, self._rate, held, pushing, speeds, coefficients)
+        for j in strike.nodes:
+            sense = strike.modes[chosen.cluster[j]]
+            if sense in (1, -1):
+                pushing[j] += sense * coefficients[j] * pushing[n + chosen.cluster[j]]
+        stopped = [n + c for c, mode in enumerate(strike.modes) if mode == STICK]
+        active = [*strike.nodes, *stopped]
+        matrix = held[active] @ pushing[active].T
+        e, across = float(chosen.restitution), float(chosen.tangential)
+        wanted = np.concatenate([(1.0 + e) * speeds[list(strike.nodes)],
+                                 -(1.0 + across) * speeds[stopped]])
+        try:
+            impulses = np.linalg.solve(matrix, wanted)
+        except np.linalg.LinAlgError:
+            return state, False
+        after = state.copy()
+        after[m:] += pushing[active].T @ impulses
+        normal = dict(zip(strike.nodes, impulses, strict=False))
+        near = _ROUNDING * (np.abs(impulses).max() + 1e-300)
+        fits = min(normal.values()) >= -near
+        moved = held @ (after[m:] - state[m:])
+        for c, mode in enumerate(strike.modes):
+            limit = sum(coefficients[j] * impulse for j, impulse in normal.items()
+                        if chosen.cluster[j] == c)
+            if mode == STICK:
+                fits &= abs(impulses[active.index(n + c)]) <= limit + near
+            elif mode:
+                # The sense is that of s+ + e_T s-.
+                fits &= mode * ((1.0 + across) * speeds[n + c] + moved[n + c]) >= -near
+        return after, bool(fits)
+
+    def strike_at(
+        self, t: float, state: Array, phase: Phase, wanted: Array
+    ) -> Strike:
+        """The impact at the end of a phase that leads to the wanted velocities (m,).
+
+        Raises
+        ------
+        AnalysisError
+            If there is none.
+        """
+        node = phase.event - 2 * self.clusters
+        others = [j for j in range(self.nodes) if phase.closed[j] and j != node]
+        for count in range(len(others), -1, -1):
+            for beside in combinations(others, count):
+                nodes = (node, *beside)
+                rubbed = sorted({int(self.problem.cluster[j]) for j in nodes})
+                choices = [(STICK, 1, -1) if self.rubbing[c] else (0,) for c in rubbed]
+                for modes in product(*choices):
+                    given = [0] * self.clusters
+                    for c, mode in zip(rubbed, modes, strict=True):
+                        given[c] = mode
+                    strike = Strike(nodes, tuple(given))
+                    after, fits = self._impact(t, state, phase, strike)
+                    size = np.abs(np.concatenate([state, wanted])[self.modes :]).max()
+                    if fits and np.abs(after[self.modes :] - wanted).max() <= 1e-6 * size:
+                        return strike
+        raise AnalysisError("An impact of the orbit is of a kind that has no derivative.")

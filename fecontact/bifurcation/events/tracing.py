@@ -1,0 +1,225 @@
+"""The phases of a periodic motion, from a state on it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fecontact.bifurcation.events.flow import decide
+from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase
+from fecontact.core.errors import AnalysisError
+from fecontact.core.types import Array
+from fecontact.integrate.nonsmooth.event_search import Room, room_for
+from fecontact.integrate.nonsmooth.problem import (
+    OPEN,
+    SLIP_SIZE,
+    STICK,
+    Progress,
+    progress_for,
+)
+
+# Samples of a period in which events are looked for, and most events of one.
+_SAMPLES, _MOST = 1000, 60
+# Part of a period below which phases are chatter.
+_SHORTEST = 1e-5
+# Speeds below this part of the largest are none.
+_NEAR = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """Phases of a period: begins (K,) [s], states (K, d) there, durations (K,) [s]."""
+
+    phases: tuple[Phase, ...]
+    begins: Array
+    starts: Array
+    durations: Array
+
+
+def traced(motion: Motion, begin: float, start: Array, period: float, forced: bool) -> Traced:
+    """Phases of the motion from a state, over one period.
+
+    They begin behind the first event, or at a multiple of the period where there is none.
+
+    Raises
+    ------
+    AnalysisError
+        For motions without events that nothing excites, with more than 60 events, chatter, or
+        compliant contacts that open: their runs can be differenced, but not traced.
+    """
+    phases, begins, states = _followed(motion, begin, start, period)
+    if len(phases) == 1:
+        if not forced:
+            raise AnalysisError("The motion has no events.")
+        end = period * np.ceil(begin / period)
+        moved = motion.run(begin, np.array([end - begin]), start, phases[0])[0][-1] if (
+            end > begin) else start
+        return Traced((phases[0].ending(PERIOD),), np.zeros(1), moved[None],
+                      np.array([period]))
+    # What follows the last event leads to the first one again, a period later.
+    if phases[-1].state != phases[0].state:
+        raise AnalysisError("The contact state does not repeat after the period; run the motion "
+                            "longer until it has settled.")
+    last = phases[-1].ending(phases[0].event, phases[0].strike)
+    found = [*phases[1:-1], last]
+    ends = np.append(begins[2:], begins[1] + period)
+    durations = ends - begins[1:]
+    if durations.min() < _SHORTEST * period:
+        raise AnalysisError("The motion has events that follow each other too closely.")
+    ordered = tuple(phase.ending(phase.event, phase.strike, order_of(motion, before, phase))
+                    for before, phase in zip([found[-1], *found[:-1]], found, strict=True))
+    return Traced(ordered, begins[1:], states[1:], durations)
+
+
+def order_of(motion: Motion, before: Phase, phase: Phase) -> int:
+    """How often what ends a phase vanishes at its begin too; see :class:`Phase`."""
+    cluster = before.cluster()
+    if phase.event == PERIOD or phase.cluster() != cluster:
+        return 0
+    if cluster is None:
+        return int(phase.event == before.event and not phase.closed[_stop(motion, phase)])
+    if phase.status[cluster] == STICK or before.status[cluster] == OPEN:
+        return 0
+    if before.status[cluster] != STICK:
+        return 1
+    return 1 if jumps(motion, cluster) else 2
+
+
+def jumps(motion: Motion, cluster: int) -> bool:
+    """Whether a cluster has less friction in slip than its limit in stick."""
+    p = motion.problem
+    given = motion.problem.static[p.cluster == cluster]
+    if (given < 0.0).all():
+        return False
+    own = motion.kinetic[p.cluster == cluster]
+    return bool((given > own * (1.0 + 1e-9)).any())
+
+
+def _stop(motion: Motion, phase: Phase) -> int:
+    return phase.event - 2 * motion.clusters
+
+
+def _followed(
+    motion: Motion, begin: float, start: Array, period: float
+) -> tuple[list[Phase], Array, Array]:
+    """Phases from a state on, the last of which is cut, with begins and states there."""
+    progress = progress_for(motion.problem, motion.rubbing, start, begin, 0.0)
+    room = room_for(motion.problem, len(progress.state))
+    phases: list[Phase] = []
+    begins, states, t = [begin], [start], begin
+    _first_state(motion, progress, room, t)
+    while True:
+        phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
+        _require_known(motion, phase)
+        state = states[-1]
+        left = begin + period - t
+        found = _first_event(motion, phase, t, state, left, period)
+        if found is None:
+            return [*phases, phase], np.array(begins), np.array(states)
+        after, event, end = found
+        ending = phase.ending(event)
+        t += after
+        moved = _decided(motion, progress, room, t, end, ending)
+        if event >= 2 * motion.clusters and not phase.closed[event - 2 * motion.clusters]:
+            struck = motion.strike_at(t, end, ending, moved[motion.modes :])
+            ending = phase.ending(event, struck)
+            moved = motion.struck(t, end, ending)
+        phases.append(ending)
+        if len(phases) > _MOST:
+            raise AnalysisError(f"The motion has more than {_MOST} events.")
+        begins.append(t)
+        states.append(moved)
+
+
+def _require_known(motion: Motion, phase: Phase) -> None:
+    if motion.problem.restitution >= 0.0:
+        return
+    if any(status == OPEN for status in phase.status):
+        raise AnalysisError("A compliant contact opens.")
+
+
+def _first_state(motion: Motion, progress: Progress, room: Room, t: float) -> None:
+    """Decide what sticks and which stops are closed at the start."""
+    phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
+    d = 2 * motion.modes
+    heights = motion.observed(np.array([t]), progress.state[None, :d], phase)[0][0]
+    for flags in (room.released, room.arrived, room.touched, room.parting):
+        flags[:] = False
+    if motion.problem.restitution >= 0.0:
+        scale = np.abs(progress.state[: motion.modes]).max() or 1.0
+        room.touched[:] = heights[2 * motion.clusters :] <= 1e-12 * scale
+    _require_decided(motion, progress, room, t)
+
+
+def _require_decided(motion: Motion, progress: Progress, room: Room, t: float) -> None:
+    fastest = float(motion.sizes[motion.modes :].max())
+    progress.largest[SLIP_SIZE] = fastest
+    if decide(motion.problem, motion._workspace, progress, room, t, _NEAR * fastest,
+              1e-12 * fastest) < 0.0:
+        raise AnalysisError("The contact state is not unique there.")
+
+
+def _decided(
+    motion: Motion, progress: Progress, room: Room, t: float, state: Array, phase: Phase
+) -> Array:
+    """The state after an event, and the new contact state in ``progress``."""
+    d, event, k = 2 * motion.modes, phase.event, motion.clusters
+    progress.state[:d] = state
+    progress.status[:], progress.closed[:] = phase.arrays
+    for flags in (room.released, room.arrived, room.touched, room.parting):
+        flags[:] = False
+    if event < 2 * k:
+        c = event // 2
+        if phase.status[c] == STICK:
+            room.released[c] = True
+            progress.status[c] = released_sense(event)
+        else:
+            room.arrived[c] = True
+    else:
+        flags = room.parting if phase.closed[event - 2 * k] else room.touched
+        flags[event - 2 * k] = True
+    _require_decided(motion, progress, room, t)
+    return progress.state[:d].copy()
+
+
+def released_sense(event: int) -> int:
+    """Sense in which a cluster begins to slip whose margin vanishes in stick."""
+    return 1 if event % 2 == 0 else -1
+
+
+def _first_event(
+    motion: Motion, phase: Phase, t: float, state: Array, left: float, period: float
+) -> tuple[float, int, Array] | None:
+    """Time to the first event within what is left, what vanishes there, and the state."""
+    from scipy.optimize import brentq
+
+    if left <= 0.0:
+        return None
+    times = np.linspace(0.0, left, max(8, int(np.ceil(_SAMPLES * left / period))) + 1)
+    # What a phase has just begun with, such as the height behind an impact, is zero at first.
+    fine = np.concatenate([times[:1], times[1] * np.array([1e-3, 1e-2, 1e-1]), times[1:]])
+    states = np.vstack([state, motion.run(t, fine[1:], state, phase)[0]])
+    margins = motion.observed(t + fine, states, phase)[0]
+    first: tuple[float, int] | None = None
+    for event in range(margins.shape[1]):
+        column = margins[:, event]
+        if not np.isfinite(column).all():
+            continue
+        scale = np.abs(column).max() or 1.0
+        passed = np.flatnonzero((column[1:] < 0.0) & (column[:-1] > 1e-12 * scale))
+        if not len(passed):
+            continue
+        place = int(passed[0])
+
+        def left_of(after: float, event: int = event, place: int = place) -> float:
+            ahead = after - fine[place]
+            reached = motion.run(t + fine[place], np.array([ahead]), states[place], phase)[0]
+            return float(motion.observed(np.array([t + after]), reached, phase)[0][0, event])
+
+        at = float(brentq(left_of, fine[place], fine[place + 1], xtol=1e-15 * period, rtol=1e-14))
+        if first is None or at < first[0]:
+            first = at, event
+    if first is None:
+        return None
+    at, event = first
+    return at, event, motion.run(t, np.array([at]), state, phase)[0][-1]
+
