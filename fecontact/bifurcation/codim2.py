@@ -24,6 +24,7 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium_curve
 from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.fields.vector_field import VectorField, require_field
+from fecontact.bifurcation.homoclinic.starts import homoclinic_curve
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
@@ -44,6 +45,7 @@ def codim2_curve(
     options: ContinuationOptions | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None, scales: ArrayLike | None = None,
     direction: float = 1.0, both: bool = True, keep: Literal["kind", "period"] = "kind",
+    to: str | None = None,
 ) -> Branch:
     """Follow a special point over two parameters, such as the border of flutter or stick-slip.
 
@@ -74,6 +76,8 @@ def codim2_curve(
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
         What the points have in common; 'period' takes any orbit of a system without excitation.
+    to : str, optional
+        Another curve that begins at the point: 'homoclinic' at an orbit of a long period.
 
     Returns
     -------
@@ -96,8 +100,13 @@ def codim2_curve(
         point = fold_at_bautin(field, point, parameter)
     if keep not in ("kind", "period"):
         raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
+    if to not in (None, "homoclinic"):
+        raise InputError(f"codim2_curve: to = {to!r} must be 'homoclinic'.")
+    homoclinic = to == "homoclinic" or point.is_homoclinic
+    if homoclinic and not (point.is_homoclinic or point.is_orbit):
+        raise InputError(f"{point.place} is no orbit that approaches a homoclinic one.")
     crossing = point.kind in _CROSSINGS
-    if keep == "kind" and not crossing and not isinstance(
+    if keep == "kind" and not (crossing or homoclinic) and not isinstance(
             point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
                          f"'period doubling', 'Neimark-Sacker' or 'Bautin', or an orbit with "
@@ -114,7 +123,10 @@ def codim2_curve(
     widths = {name: high - low for name, (low, high) in ranges.items() if np.isfinite(high - low)}
     problem: Problem
     kind = "period" if keep == "period" else str(point.kind)
-    if point.is_orbit:
+    if homoclinic:
+        kind = "homoclinic"
+        problem, u, attributes = homoclinic_curve(field, point, parameter, widths, scales)
+    elif point.is_orbit:
         problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
     else:
         if crossing:
