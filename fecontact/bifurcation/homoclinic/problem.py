@@ -32,6 +32,7 @@ from fecontact.bifurcation.homoclinic.saddle import (
     left_subspaces,
     saddle_of,
 )
+from fecontact.bifurcation.orbits.floquet import resting
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 
@@ -204,6 +205,10 @@ class HomoclinicProblem(Problem):
     ) -> Mapping[str, Any] | None:
         """A point where one parameter turns is no fold but a turning point."""
         return {"kind": "turning point"} if kind == "fold" else {}
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of the first parameter where it does not change but for rounding."""
+        return resting(tangents, float(self.scales[-1]))
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """Where both orbit and rates vanish, at a Bogdanov-Takens point."""

@@ -16,9 +16,16 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
+from fecontact.bifurcation.orbits.floquet import resting
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
-from fecontact.bifurcation.orbits.same_orbit import VANISHED_ON_CURVES, VANISHING, vanishing
+from fecontact.bifurcation.orbits.same_orbit import (
+    HALVING,
+    VANISHED_ON_CURVES,
+    VANISHING,
+    halves_apart,
+    vanishing,
+)
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 
@@ -55,7 +62,8 @@ class OrbitCurve(Problem):
     row: Array
     period: float = 1.0
 
-    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
+    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF,
+                                                  HALVING: BranchStatus.CLOSED}
 
     def linearise(self, u: Array) -> "CurveLinearised":
         """The equations about u."""
@@ -110,10 +118,11 @@ class OrbitCurve(Problem):
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Test functions of points of codimension two, and of orbits that shrink to rest."""
+        """Those of points of codimension two, and of orbits that shrink or become single ones."""
         found = self._codimension_two(u, linearisation)
         if self.orbit.autonomous:
             found[VANISHING] = vanishing(self.orbit, u, VANISHED_ON_CURVES)
+        found[HALVING] = halves_apart(self.orbit, u)
         return found
 
     def _codimension_two(self, u: Array, linearisation: Any) -> dict[str, float]:
@@ -128,6 +137,10 @@ class OrbitCurve(Problem):
         mean = _critical_mean(linearisation.orbit.floquet.others)
         return {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
                 for order in (1, 2, 3, 4)}
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of the first parameter where it does not change but for rounding."""
+        return resting(tangents, self.orbit.scales[-1])
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array

@@ -200,6 +200,11 @@ def unresolved(
     return found
 
 
+def resting(tangents: tuple[Array, Array], width: float) -> set[str]:
+    """'fold' where the parameter, of this width, changes by less than round-off at both ends."""
+    return {"fold"} if all(abs(float(each[-1])) / width < FLAT for each in tangents) else set()
+
+
 def _near_one(stored: Mapping[str, Any]) -> bool:
     """Whether a second multiplier is indistinguishable from one."""
     off = np.sort(np.abs(np.asarray(stored["multipliers"]) - 1.0))

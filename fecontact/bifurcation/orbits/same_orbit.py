@@ -147,6 +147,22 @@ def is_homoclinic(problem: Discretisation, u: Array, linearised: Any, tangent: A
                        linearised.derivatives[0])
 
 
+def halves_apart(problem: Discretisation, u: Array) -> float:
+    """Difference of the halves along that of the orbit before, see :func:`shrunk`; 1 without any.
+
+    Where it vanishes a doubled orbit is a single one; beyond, the same orbits come once more, with
+    their halves exchanged.
+    """
+    times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
+    weights = problem.weights()[: problem.size].reshape(problem.reference.shape)
+    before, now = (nodes - interpolate(problem.mesh, np.ascontiguousarray(nodes), times)
+                   for nodes in (problem.reference, problem.nodes(u)))
+    whole = problem.reference - problem.reference.mean(axis=0)
+    if (weights * before**2).sum() < _HALVES_MEET**4 * (weights * whole**2).sum():
+        return 1.0
+    return shrunk(weights, now, before, VANISHED_ON_CURVES)
+
+
 def near_saddle(
     problem: _Scaled, values: Array, x: Array, shares: Array, tangent: Array,
     rates: Array | None = None,
