@@ -94,9 +94,10 @@ def leading_row(jacobian: Array, eigenvalue: complex) -> Array | None:
 
 def flown(saddle: Saddle, away: Array, times: Array, leaving: bool) -> Array:
     """Linear motion (k, d) along the unstable (leaving) or stable subspace, from ``away`` at 0."""
-    values, vectors = np.linalg.eig(saddle.jacobian)
+    values, vectors = np.linalg.eig(saddle.jacobian.astype(complex))
     parts = np.linalg.lstsq(vectors, away.astype(complex), rcond=None)[0]
-    parts[(values.real > 0.0) != leaving] = 0.0
+    others = (values.real > 0.0) != leaving
+    parts[others], values[others] = 0.0, 0.0
     begin = (vectors @ parts).real
     if np.linalg.norm(begin - away) > _REPRODUCED * np.linalg.norm(away):
         rate = saddle.rates[0] if leaving else -saddle.rates[1]

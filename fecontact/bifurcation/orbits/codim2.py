@@ -16,7 +16,7 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
-from fecontact.bifurcation.orbits.floquet import resting
+from fecontact.bifurcation.orbits.floquet import Floquet, resting
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import (
@@ -126,17 +126,37 @@ class OrbitCurve(Problem):
         return found
 
     def _codimension_two(self, u: Array, linearisation: Any) -> dict[str, float]:
-        if self.kind == "fold":
-            along = self.rest(u)
-            return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along)}
-        if self.kind == "period doubling":
-            expansion = Expansion(self.orbit, u, linearisation.orbit)
-            return {"generalised period doubling": expansion.doubling(_NORMAL_FORM_STEP)}
         if self.kind == "period":
             return {}
-        mean = _critical_mean(linearisation.orbit.floquet.others)
-        return {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
-                for order in (1, 2, 3, 4)}
+        orbit = linearisation.orbit
+        floquet: Floquet = orbit.floquet
+        critical = self._critical(floquet)
+        flip, unit, pair = floquet.rest_products(*critical)
+        if self.kind == "fold":
+            along = self.rest(u)
+            return {"cusp": float(np.sign(self.row @ along)) * linearisation.slope(along),
+                    "resonance 1:1": unit, "fold-flip": flip, "fold-Neimark-Sacker": pair}
+        if self.kind == "period doubling":
+            coefficient = Expansion(self.orbit, u, orbit).doubling(_NORMAL_FORM_STEP)
+            # At a resonance 1:2 the coefficient has a pole.
+            return {"generalised period doubling": coefficient * flip, "resonance 1:2": flip,
+                    "fold-flip": unit, "flip-Neimark-Sacker": pair}
+        mean = float(sum(critical).real) / 2.0
+        found = {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
+                 for order in (1, 2, 3, 4)}
+        if abs(mean) < 1.0:
+            found["Chenciner"] = Expansion(self.orbit, u, orbit).torus(
+                float(np.arccos(mean)), _NORMAL_FORM_STEP)
+        return found | {"fold-Neimark-Sacker": unit, "flip-Neimark-Sacker": flip,
+                        "double Neimark-Sacker": pair}
+
+    def _critical(self, floquet: Floquet) -> tuple[complex, ...]:
+        """The critical multipliers of the curve."""
+        if self.kind == "Neimark-Sacker":
+            mean = _critical_mean(floquet.others)
+            root = np.sqrt(complex(mean * mean - 1.0))
+            return complex(mean) + root, complex(mean) - root
+        return (1.0,) if self.kind == "fold" else (-1.0,)
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """Turns of the first parameter where it does not change but for rounding."""
@@ -147,7 +167,9 @@ class OrbitCurve(Problem):
     ) -> dict[str, Any] | None:
         """Confirm a point of codimension two; a fold is a cusp if both parameters turn."""
         if kind != "fold":
-            return {}
+            floquet = linearisation.orbit.floquet
+            return {} if not kind.endswith("-Sacker") or floquet.turning(
+                *self._critical(floquet)) else None
         both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
         return {"kind": "turning point"} if both.max() > _CUSP_RATE else None
 

@@ -97,6 +97,25 @@ class Floquet:
         multiplier_tests(self.multipliers, -1 if self.trivial is None else self.trivial, out)
         return float(out[0]), float(out[1]), float(out[2])
 
+    def rest_products(self, *critical: complex) -> tuple[float, float, float]:
+        """The :attr:`products` without the multipliers next to the critical ones."""
+        rest, out = self.beside(*critical), np.empty(3)
+        multiplier_tests(np.ascontiguousarray(rest), -1, out)
+        return float(out[0]), float(out[1]), float(out[2])
+
+    def beside(self, *critical: complex) -> NDArray[np.complex128]:
+        """All multipliers but the trivial one and those next to the critical ones."""
+        rest = self.others
+        for one in critical:
+            rest = np.delete(rest, np.argmin(np.abs(rest - one)))
+        return rest
+
+    def turning(self, *critical: complex) -> bool:
+        """Whether a pair beside the critical multipliers lies on the unit circle, and is complex."""
+        rest = self.beside(*critical)
+        pairs = rest[rest.imag > 1e-6]
+        return bool(len(pairs)) and float(np.abs(np.abs(pairs) - 1.0).min()) <= _NEAR
+
     def confirmed(self, kind: str) -> dict[str, Any] | None:
         """Classify a zero of a test function by the multipliers; None if it is no special point.
 
