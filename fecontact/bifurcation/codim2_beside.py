@@ -96,11 +96,11 @@ def _fold(
 
 # Steps along the curve of Hopf points away from a point of codimension two, in widths of the
 # diagram, and the points of it, one after the other, from which orbits are followed.
-_STEPS = ContinuationOptions(step=5e-3, largest_step=0.02, points=8, locate=False)
-_CHOSEN = (2, 4, 6, 1)
-_TORI = replace(_SEARCH, stop_at=("Neimark-Sacker",), largest_step=0.05, points=120)
+_STEPS = ContinuationOptions(step=5e-3, largest_step=0.02, points=6, locate=False)
+_CHOSEN = (2, 5, 1)
+_TORI = replace(_SEARCH, stop_at=("Neimark-Sacker",), largest_step=0.05, points=60)
 _LONG = replace(_SEARCH, stop_at=(), largest_step=0.1, points=200)
-_INTERVALS = 60
+_INTERVALS = 40
 
 
 def torus_beside(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:

@@ -32,6 +32,9 @@ from fecontact.core.types import Array, ArrayLike
 _TEST_STEP = 1e-5  # step of the differences of the test function, in the inner product
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
+# Points at which a pair beside the critical multipliers passes the unit circle, by the curve.
+_PAIRS = {"fold": "fold-Neimark-Sacker", "period doubling": "flip-Neimark-Sacker",
+          "Neimark-Sacker": "double Neimark-Sacker"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +170,9 @@ class OrbitCurve(Problem):
     ) -> dict[str, Any] | None:
         """Confirm a point of codimension two; a fold is a cusp if both parameters turn."""
         if kind != "fold":
-            floquet = linearisation.orbit.floquet
-            return {} if not kind.endswith("-Sacker") or floquet.turning(
-                *self._critical(floquet)) else None
+            floquet, pair = linearisation.orbit.floquet, _PAIRS.get(self.kind)
+            # The product of two real multipliers may be one too.
+            return {} if kind != pair or floquet.turning(*self._critical(floquet)) else None
         both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
         return {"kind": "turning point"} if both.max() > _CUSP_RATE else None
 
