@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.bifurcation.codim2_switch import fold_at_bautin, other_curve, widths_of
+from fecontact.bifurcation.codim2_beside import begun
+from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import (
@@ -25,18 +26,19 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium_curve
 from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.events.curves import border_curve
+from fecontact.bifurcation.homoclinic.starts import homoclinic_curve
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
+from fecontact.core.errors import InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField, require_field
 
-# Smallest component of a tangent of length one that tells the sign of a parameter's change.
-_RESTS = 1e-6
 # Points beyond which a curve is one of neutral saddles, by its kind.
 _ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("resonance 1:1", "resonance 1:2")}
 # Points of curves of equilibria through which another one passes.
 _CROSSINGS = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")
+# Part of the first step at which a curve begins that leaves a point to one side.
+_BESIDE = 1e-3
 # Part of a range within which a start on its end may lie beside it.
 _ON_BOUND = 1e-9
 
@@ -46,6 +48,7 @@ def codim2_curve(
     options: ContinuationOptions | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None, scales: ArrayLike | None = None,
     direction: float = 1.0, both: bool = True, keep: Literal["kind", "period"] = "kind",
+    to: str | None = None,
 ) -> Branch:
     """Follow a special point over two parameters, such as the border of flutter or stick-slip.
 
@@ -58,7 +61,8 @@ def codim2_curve(
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint, NeimarkSackerPoint, DiscontinuityPoint
         A point of a branch over the first parameter; of orbits by collocation, or where set-valued
-        ones meet a border of their contact states. Or a point of a curve: 'Bautin', 'zero-Hopf', 'double Hopf', 'Bogdanov-Takens', for the other curve there.
+        ones meet a border of their contact states. Or a point of codimension two of a curve, such
+        as 'zero-Hopf', for others that pass or begin there.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
@@ -76,6 +80,8 @@ def codim2_curve(
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
         What the points have in common; 'period' takes any orbit of a system without excitation.
+    to : 'fold', 'period doubling', 'Neimark-Sacker' or 'homoclinic', optional
+        Which curve, where several begin at the point; 'homoclinic' also from orbits of long period.
 
     Returns
     -------
@@ -94,12 +100,15 @@ def codim2_curve(
     require_kind("codim2_curve", str, parameter=parameter)
     require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
     require_finite("codim2_curve", direction=direction)
-    if point.kind == "Bautin":
-        point = fold_at_bautin(field, point, parameter)
+    require_kind("codim2_curve", (str, type(None)), to=to)
     if keep not in ("kind", "period"):
         raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
+    given = point
+    if keep == "kind":
+        point = begun(field, point, parameter, to)
+    homoclinic = to == "homoclinic" or point.is_homoclinic
     crossing = point.kind in _CROSSINGS
-    if keep == "kind" and not crossing and not isinstance(
+    if keep == "kind" and not (crossing or homoclinic) and not isinstance(
             point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint
             | DiscontinuityPoint):
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
@@ -115,9 +124,15 @@ def codim2_curve(
     ranges = _ranges(names, bounds)
     chosen = options_of(options, ranges.get(names[0]))
     widths = {name: high - low for name, (low, high) in ranges.items() if np.isfinite(high - low)}
+    if point is not given and not given.is_orbit:
+        widths = {**widths_of(given), **widths}
     problem: Problem
+    grows = None
     kind = "period" if keep == "period" else str(point.kind)
-    if isinstance(point, DiscontinuityPoint):
+    if homoclinic:
+        kind = "homoclinic"
+        problem, u, attributes = homoclinic_curve(field, point, parameter, widths, scales)
+    elif isinstance(point, DiscontinuityPoint):
         problem, u, attributes = border_curve(field, point, parameter, widths)
     elif point.is_orbit:
         problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
@@ -133,10 +148,12 @@ def codim2_curve(
             widths = {names[0]: along or 1.0, **widths}
         kind = "fold" if square is None else "Hopf"
         problem, u, attributes = equilibrium_curve(begin, names, square, widths, scales)
+        # Beyond a Bogdanov-Takens point the curve is one of neutral saddles.
+        grows = field.dimension if square == 0.0 else None
     attributes |= {"parameters": list(names), "kind": kind,
                    "state_names": list(field.state_names)}
     return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
-                     direction, both, attributes)
+                     direction, both, attributes, grows)
 
 
 def _ranges(
@@ -163,8 +180,12 @@ def _ranges(
 def _followed(
     problem: Problem, u: Array, names: tuple[str, str], options: ContinuationOptions,
     second: tuple[float, float], direction: float, both: bool, attributes: dict[str, Any],
+    grows: int | None,
 ) -> Branch:
-    """The curve through u = [..., second parameter, first parameter], within both ranges."""
+    """The curve through u = [..., second parameter, first parameter], within both ranges.
+
+    It goes to the side alone on which the unknown with the index ``grows`` does, if there is one.
+    """
     value, size = float(u[-2]), float(np.ptp(second)) if np.isfinite(second).all() else 1.0
     near = _ON_BOUND * size
     if not second[0] - near <= value <= second[1] + near:
@@ -174,32 +195,9 @@ def _followed(
     stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
     ends = _ENDS.get(attributes["kind"], ())
     chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
-    return continue_branch(problem, u, chosen, name=names[0],
-                           tangent=_tangent(problem, u, direction), both=both,
+    tangent = tangent_at(problem, u, direction)
+    if grows is not None:
+        tangent, both = tangent * np.copysign(1.0, tangent[grows]), False
+        u = u + _BESIDE * options.step * tangent
+    return continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
                            attributes=attributes)
-
-
-def _tangent(problem: Problem, u: Array, direction: float) -> Array:
-    """Tangent (N + 1,) of length one of a curve; its direction as in :func:`codim2_curve`.
-
-    One parameter may rest where the curve starts; the other one then parametrises it.
-    """
-    linearised, weights = problem.linearise(u), problem.weights()
-    found: list[Array] = []
-    for place in (-1, -2):
-        row, rhs = np.zeros(len(u)), np.zeros(len(u))
-        row[place] = rhs[-1] = 1.0
-        try:
-            tangent = linearised.solve(row, rhs)
-        except FecontactError:
-            continue
-        size = float(np.sqrt(weights @ tangent**2))
-        if np.isfinite(size) and size > 0.0:
-            found.append(tangent / size)
-    if not found:
-        raise AnalysisError("The curve has no direction at its start: both parameters turn there. "
-                            "Start from another point of it.")
-    rates = [np.abs(tangent[-2:]) * np.sqrt(weights[-2:]) for tangent in found]
-    tangent = found[int(np.argmax([rate.max() for rate in rates]))]
-    first = abs(tangent[-1]) * np.sqrt(weights[-1]) > _RESTS
-    return tangent * np.copysign(1.0, direction * tangent[-1 if first else -2])

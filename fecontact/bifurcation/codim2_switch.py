@@ -1,28 +1,16 @@
-"""Switching at points of codimension two to the other curves that pass or begin there."""
+"""Switching at points of codimension two to the other curve of equilibria through them."""
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import (
-    BranchPoint,
-    DoubleHopfPoint,
-    FoldPoint,
-    HopfPoint,
-    ZeroHopfPoint,
-)
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.equilibria.branches import equilibrium_branch
-from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, newton
-from fecontact.bifurcation.orbits.branches import orbit_branch
+from fecontact.bifurcation.continuation.points import BranchPoint, DoubleHopfPoint, ZeroHopfPoint
+from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
-# Distances from the Bautin point along the second parameter, in the width of the diagram, at which
-# the fold is looked for, and the range of the first parameter about the Hopf point there.
-_AWAY, _ABOUT = (0.02, 0.05, 0.005), 0.1
-_TOLERANCE = 1e-12
-_SEARCH = ContinuationOptions(step=2e-3, largest_step=0.02, points=150, stop_at=("fold",))
-
+# Smallest component of a tangent of length one that tells the sign of a parameter's change.
+_RESTS = 1e-6
 
 def other_curve(
     field: VectorField, point: BranchPoint, parameter: str
@@ -33,19 +21,17 @@ def other_curve(
     Raises
     ------
     InputError
-        If the curve is not over this second parameter, or does not know those of its field, or
-        the point is Bogdanov and Takens' on a curve of folds.
+        If the curve is not over this second parameter, or does not know those of its field.
     """
     folds = point.branch.attributes["kind"] == "fold"
-    if point.kind == "Bogdanov-Takens" and folds:
-        raise InputError(f"{point.place} on a curve of folds starts no other curve here; start the "
-                         f"curve of Hopf points from a Hopf point beside it.")
-    values = _values(field, point, parameter)
+    values = values_at(field, point, parameter)
     begin = Equilibrium(field, values, np.ascontiguousarray(point.values["state"], dtype=float))
     if isinstance(point, DoubleHopfPoint):
         return begin, (2.0 * np.pi * point.second_frequency_hz) ** 2
     if isinstance(point, ZeroHopfPoint) and folds:
         return begin, (2.0 * np.pi * point.frequency_hz) ** 2
+    if point.kind == "Bogdanov-Takens" and folds:
+        return begin, 0.0
     return begin, None
 
 
@@ -56,7 +42,7 @@ def widths_of(point: BranchPoint) -> dict[str, float]:
     return {second: width[0], first: width[1]}
 
 
-def _values(field: VectorField, point: BranchPoint, parameter: str) -> Array:
+def values_at(field: VectorField, point: BranchPoint, parameter: str) -> Array:
     """Parameter values (k,) at a point of a curve of equilibria."""
     known = point.branch.attributes
     both = tuple(map(str, known["parameters"]))
@@ -75,51 +61,27 @@ def _values(field: VectorField, point: BranchPoint, parameter: str) -> Array:
     return values
 
 
-def fold_at_bautin(field: VectorField, point: BranchPoint, parameter: str) -> FoldPoint:
-    """A fold of orbits beside a Bautin point of a curve of Hopf points.
+def tangent_at(problem: Problem, u: Array, direction: float) -> Array:
+    """Tangent (N + 1,) of length one of a curve; ``direction`` as in :func:`codim2_curve`.
 
-    Near the point the amplitude r of the orbits satisfies b + l1 r^2 + l2 r^4 = 0 with the distance
-    b from the curve: on the side with l1 l2 < 0 they turn at r^2 = -l1 / (2 l2) (Kuznetsov,
-    Elements of Applied Bifurcation Theory, section 8.3). Both sides are tried, at one value of the
-    second parameter, from the Hopf point on.
-
-    Raises
-    ------
-    InputError
-        If the curve is not over this second parameter, or does not know those of its field.
-    AnalysisError
-        If no fold is found on either side.
+    One parameter may rest where the curve starts; the other one then parametrises it.
     """
-    values, index = _values(field, point, parameter), field.index(parameter)
-    width = widths_of(point)
-    for away in _AWAY:
-        for side in (1.0, -1.0):
-            values[index] = point.u[-2] + side * away * width[parameter]
-            try:
-                found = _fold(field, point, values.copy(), width[point.branch.parameter_name])
-            except FecontactError:
-                continue
-            if found is not None:
-                return found
-    raise AnalysisError(f"{point.place}: no fold of orbits was found beside it; follow orbits from "
-                        f"a Hopf point near it to their fold, and start from there.")
-
-
-def _fold(
-    field: VectorField, point: BranchPoint, values: Array, width: float
-) -> FoldPoint | None:
-    """The fold of the orbits at one value of the second parameter, if there is one."""
-    state = np.ascontiguousarray(np.asarray(point.values["state"], dtype=float))
-    rest = newton(field, state, values, _TOLERANCE)
-    if rest is None:
-        return None
-    about = (point.parameter - _ABOUT * width, point.parameter + _ABOUT * width)
-    branch = equilibrium_branch(field, Equilibrium(field, values, rest[0]),
-                                point.branch.parameter_name, bounds=about, both=True, width=width)
-    hopf: list[HopfPoint] = sorted(branch.of_kind("Hopf"), key=lambda at: abs(
-        at.frequency_hz - float(point.values["frequency_hz"])))
-    if not hopf:
-        return None
-    orbits = orbit_branch(field, hopf[0], options=_SEARCH, bounds=about, width=width)
-    end = orbits.points[-1]
-    return end if isinstance(end, FoldPoint) else None
+    linearised, weights = problem.linearise(u), problem.weights()
+    found: list[Array] = []
+    for place in (-1, -2):
+        row, rhs = np.zeros(len(u)), np.zeros(len(u))
+        row[place] = rhs[-1] = 1.0
+        try:
+            tangent = linearised.solve(row, rhs)
+        except FecontactError:
+            continue
+        size = float(np.sqrt(weights @ tangent**2))
+        if np.isfinite(size) and size > 0.0:
+            found.append(tangent / size)
+    if not found:
+        raise AnalysisError("The curve has no direction at its start: both parameters turn there. "
+                            "Start from another point of it.")
+    rates = [np.abs(tangent[-2:]) * np.sqrt(weights[-2:]) for tangent in found]
+    tangent = found[int(np.argmax([rate.max() for rate in rates]))]
+    first = abs(tangent[-1]) * np.sqrt(weights[-1]) > _RESTS
+    return tangent * np.copysign(1.0, direction * tangent[-1 if first else -2])

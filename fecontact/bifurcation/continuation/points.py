@@ -84,6 +84,11 @@ class BranchPoint:
         return "period" in self.values and ("mesh" in self.values or self.by_harmonics)
 
     @property
+    def is_homoclinic(self) -> bool:
+        """Whether the point is an orbit homoclinic to a saddle."""
+        return "saddle" in self.values and "time" in self.values
+
+    @property
     def by_shooting(self) -> bool:
         """Whether the point is an orbit found by shooting."""
         return self.header is not None and "segments" in self.header.attributes
@@ -133,7 +138,7 @@ class BranchPoint:
         return values
 
     def orbit(self, field: VectorField | None = None, samples: int = 1000) -> "PeriodicMotion":
-        """The orbit over one period, both ends included.
+        """The orbit over one period, both ends included; a homoclinic one over its interval.
 
         Parameters
         ----------
@@ -149,9 +154,13 @@ class BranchPoint:
             If the point is no orbit, or was found by shooting and there is no field.
         """
         from fecontact.bifurcation.harmonic.layout import balanced
+        from fecontact.bifurcation.homoclinic.open_mesh import sampled
         from fecontact.bifurcation.orbits.motions import collocated, of_runs
 
         self._require_orbit("orbit: samples", samples)
+        if self.is_homoclinic:
+            return sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
+                           len(self.values["saddle"]), float(self.values["time"]), samples)
         values = None if field is None else self.parameter_values(field)
         period = float(self.values["period"])
         mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
@@ -198,7 +207,7 @@ class BranchPoint:
     def _require_orbit(self, name: str, samples: int) -> None:
         if not (isinstance(samples, int | np.integer) and samples >= 2):
             raise InputError(f"{name} = {samples!r} must be a whole number from 2 on.")
-        if not self.is_orbit:
+        if not (self.is_orbit or self.is_homoclinic):
             raise InputError(f"{self.place} is no periodic orbit.")
 
     def _runs(self, field: VectorField, samples: int) -> "list[Trajectory]":

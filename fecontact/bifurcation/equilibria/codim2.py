@@ -36,7 +36,7 @@ def equilibrium_curve(
     names : (str, str)
         The first and the second parameter.
     square : float or None
-        Square of the pair's angular frequency; None at folds.
+        Square of the pair's angular frequency, 0 at a Bogdanov-Takens point; None at folds.
     scales
         As for :func:`fecontact.bifurcation.codim2_curve`.
     widths : mapping
@@ -61,9 +61,11 @@ def equilibrium_curve(
         fold = FoldCurve(field, begin.values, active, np.concatenate([sizes, width]),
                          np.concatenate([limits, width]), w, v)
         return fold, np.concatenate([begin.state, plane]), known
-    b, c = hopf_borders(scaled(begin.jacobian, sizes), square)
-    hopf = HopfCurve(field, begin.values, active, np.concatenate([sizes, [square], width]),
-                     np.concatenate([limits, [_GROWTH * square], width]), b, c)
+    J = scaled(begin.jacobian, sizes)
+    b, c = hopf_borders(J, square)
+    size = square or float(np.linalg.norm(J)) ** 2
+    hopf = HopfCurve(field, begin.values, active, np.concatenate([sizes, [size], width]),
+                     np.concatenate([limits, [_GROWTH * size], width]), b, c)
     return hopf, np.concatenate([begin.state, [square], plane]), known
 
 

@@ -1,5 +1,6 @@
 """Continuation problem of periodic orbits by harmonic balance."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -7,7 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    Problem,
+)
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
@@ -17,7 +22,13 @@ from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
-from fecontact.bifurcation.orbits.same_orbit import HALVING, same_place
+from fecontact.bifurcation.orbits.same_orbit import (
+    HALVING,
+    VANISHING,
+    near_saddle,
+    same_place,
+    shrunk,
+)
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
@@ -131,6 +142,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     limits: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
+    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
     def linearise(self, u: Array) -> HarmonicLinearisation:
         """Residual and linearisation at u, each computed on demand."""
@@ -196,8 +208,25 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         return found
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Test functions of the multipliers; none without stability."""
-        return {} if self.stability is None else super().tests(u, linearisation, tangent)
+        """Test functions of the multipliers, if known, and of orbits that shrink to rest."""
+        found = {} if self.stability is None else super().tests(u, linearisation, tangent)
+        if self.autonomous and self.reference[1:].any():
+            found[VANISHING] = shrunk(np.ones(1), self.coefficients(u)[1:] / self._sizes,
+                                      self.reference[1:] / self._sizes)
+        return found
+
+    def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
+        """At orbits that are homoclinic to a saddle, as far as numbers tell."""
+        if self.autonomous and near_saddle(
+                self, self.parameters(u), linearisation.states,
+                np.full(self.samples, 1.0 / self.samples), tangent):
+            return BranchStatus.HOMOCLINIC
+        return None
+
+    @property
+    def _sizes(self) -> Array:
+        """Scales of the states that are series."""
+        return self.scales[self.layout.columns]
 
     def strider(self, options: ContinuationOptions) -> Strides | None:
         """Compiled steps, for forced orbits of contact systems."""
@@ -231,7 +260,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def _halves_meet(self, u: Array, tangent: Array) -> bool:
         """Whether an orbit has even harmonics alone, while the branch adds odd ones."""
-        sizes = self.scales[self.layout.columns]
+        sizes = self._sizes
 
         def odd_part(vector: Array) -> float:
             X = self.coefficients(vector)[1:] / sizes

@@ -23,15 +23,25 @@ from fecontact.bifurcation.orbits.curves.criticality import (
     of_fold,
     of_torus,
 )
+from fecontact.bifurcation.orbits.floquet import Floquet, resting
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
-from fecontact.bifurcation.orbits.same_orbit import VANISHED_ON_CURVES, VANISHING, vanishing
+from fecontact.bifurcation.orbits.same_orbit import (
+    HALVING,
+    VANISHED_ON_CURVES,
+    VANISHING,
+    halves_apart,
+    vanishing,
+)
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
+# Points at which a pair beside the critical multipliers passes the unit circle, by the curve.
+_PAIRS = {"fold": "fold-Neimark-Sacker", "period doubling": "flip-Neimark-Sacker",
+          "Neimark-Sacker": "double Neimark-Sacker"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +68,8 @@ class OrbitCurve(Problem):
     kind: str
     period: float = 1.0
 
-    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
+    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF,
+                                                  HALVING: BranchStatus.CLOSED}
 
     def linearise(self, u: Array) -> "CurveLinearised":
         """The equations about u."""
@@ -93,30 +104,58 @@ class OrbitCurve(Problem):
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Test functions of points of codimension two, and of orbits that shrink to rest."""
+        """Those of points of codimension two, and of orbits that shrink or become single ones."""
         found = self._codimension_two(u, linearisation)
         if self.orbit.autonomous:
             found[VANISHING] = vanishing(self.orbit, u, VANISHED_ON_CURVES)
+        found[HALVING] = halves_apart(self.orbit, u)
         return found
 
     def _codimension_two(self, u: Array, linearisation: Any) -> dict[str, float]:
-        if self.kind == "fold":
-            return {"cusp": linearisation.bend}
-        if self.kind == "period doubling":
-            expansion = Expansion(self.orbit, u, linearisation.orbit, linearisation.terms[0])
-            return {"generalised period doubling": expansion.doubling(_NORMAL_FORM_STEP)}
         if self.kind == "period":
             return {}
-        mean = _critical_mean(linearisation.orbit.floquet.others)
-        return {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
-                for order in (1, 2, 3, 4)}
+        orbit = linearisation.orbit
+        floquet: Floquet = orbit.floquet
+        critical = self._critical(floquet)
+        flip, unit, pair = floquet.rest_products(*critical)
+        if self.kind == "fold":
+            return {"cusp": linearisation.bend, "resonance 1:1": unit, "fold-flip": flip,
+                    "fold-Neimark-Sacker": pair}
+        if self.kind == "period doubling":
+            expansion = Expansion(self.orbit, u, orbit, linearisation.terms[0])
+            coefficient = expansion.doubling(_NORMAL_FORM_STEP)
+            # At a resonance 1:2 the coefficient has a pole.
+            return {"generalised period doubling": coefficient * flip, "resonance 1:2": flip,
+                    "fold-flip": unit, "flip-Neimark-Sacker": pair}
+        mean = float(sum(critical).real) / 2.0
+        found = {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
+                 for order in (1, 2, 3, 4)}
+        if abs(mean) < 1.0:
+            found["Chenciner"] = Expansion(self.orbit, u, orbit).torus(
+                float(np.arccos(mean)), _NORMAL_FORM_STEP)
+        return found | {"fold-Neimark-Sacker": unit, "flip-Neimark-Sacker": flip,
+                        "double Neimark-Sacker": pair}
+
+    def _critical(self, floquet: Floquet) -> tuple[complex, ...]:
+        """The critical multipliers of the curve."""
+        if self.kind == "Neimark-Sacker":
+            mean = _critical_mean(floquet.others)
+            root = np.sqrt(complex(mean * mean - 1.0))
+            return complex(mean) + root, complex(mean) - root
+        return (1.0,) if self.kind == "fold" else (-1.0,)
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of the first parameter where it does not change but for rounding."""
+        return resting(tangents, self.orbit.scales[-1])
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
         """Confirm a point of codimension two; a fold is a cusp if both parameters turn."""
         if kind != "fold":
-            return {}
+            floquet, pair = linearisation.orbit.floquet, _PAIRS.get(self.kind)
+            # The product of two real multipliers may be one too.
+            return {} if kind != pair or floquet.turning(*self._critical(floquet)) else None
         both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
         return {"kind": "turning point"} if both.max() > _CUSP_RATE else None
 

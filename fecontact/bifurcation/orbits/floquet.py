@@ -97,6 +97,25 @@ class Floquet:
         multiplier_tests(self.multipliers, -1 if self.trivial is None else self.trivial, out)
         return float(out[0]), float(out[1]), float(out[2])
 
+    def rest_products(self, *critical: complex) -> tuple[float, float, float]:
+        """The :attr:`products` without the multipliers next to the critical ones."""
+        rest, out = self.beside(*critical), np.empty(3)
+        multiplier_tests(np.ascontiguousarray(rest), -1, out)
+        return float(out[0]), float(out[1]), float(out[2])
+
+    def beside(self, *critical: complex) -> NDArray[np.complex128]:
+        """All multipliers but the trivial one and those next to the critical ones."""
+        rest = self.others
+        for one in critical:
+            rest = np.delete(rest, np.argmin(np.abs(rest - one)))
+        return rest
+
+    def turning(self, *critical: complex) -> bool:
+        """Whether a pair beside the critical multipliers lies on the unit circle, and is complex."""
+        rest = self.beside(*critical)
+        pairs = rest[rest.imag > 1e-6]
+        return bool(len(pairs)) and float(np.abs(np.abs(pairs) - 1.0).min()) <= _NEAR
+
     def confirmed(self, kind: str) -> dict[str, Any] | None:
         """Classify a zero of a test function by the multipliers; None if it is no special point.
 
@@ -209,6 +228,11 @@ def unresolved(
     if all(flat) and all(_near_one(stored) for stored in values):
         found.add("branch point")
     return found
+
+
+def resting(tangents: tuple[Array, Array], width: float) -> set[str]:
+    """'fold' where the parameter, of this width, changes by less than round-off at both ends."""
+    return {"fold"} if all(abs(float(each[-1])) / width < FLAT for each in tangents) else set()
 
 
 def _near_one(stored: Mapping[str, Any]) -> bool:

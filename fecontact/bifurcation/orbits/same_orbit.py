@@ -12,6 +12,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.equilibria.equilibrium import newton, sorted_eigenvalues
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import interpolate, node_times
 from fecontact.core.types import Array
@@ -41,6 +42,21 @@ class _Weighted(Protocol):
     @property
     def common(self) -> int:
         """Number of unknowns, last in u, that do not depend on the phase."""
+
+    def weights(self) -> Array:
+        """Weights of the unknowns in their inner product."""
+
+
+class _Scaled(Protocol):
+    """A problem of orbits with the period and the parameter last among its unknowns."""
+
+    @property
+    def field(self) -> VectorField:
+        """The vector field."""
+
+    @property
+    def scales(self) -> Array:
+        """Scales of the states, the period and the parameter."""
 
     def weights(self) -> Array:
         """Weights of the unknowns in their inner product."""
@@ -108,46 +124,77 @@ def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
 
 
 def vanishing(problem: Discretisation, u: Array, least: float = _VANISHED) -> float:
+    """See :func:`shrunk`, of an orbit by collocation."""
+    nodes, before = problem.nodes(u), problem.reference
+    return shrunk(problem.weights()[: problem.size].reshape(before.shape),
+                  nodes - nodes.mean(axis=0), before - before.mean(axis=0), least)
+
+
+def shrunk(weights: Array, moved: Array, before: Array, least: float = _VANISHED) -> float:
     """Amplitude along the shape of the orbit before, in its amplitude, less the least one.
 
     Beyond a Hopf point the same orbits come once more, half a period later: the amplitude has then
-    changed its sign.
+    changed its sign. ``moved`` and ``before`` are the motions about the means of both orbits.
     """
-    nodes, before = problem.nodes(u), problem.reference
-    weights = problem.weights()[: problem.size].reshape(before.shape)
-    shape = weights * (before - before.mean(axis=0))
-    return float((shape * (nodes - nodes.mean(axis=0))).sum()
-                 / (shape * (before - before.mean(axis=0))).sum()) - least
+    return float((weights * before * moved).sum() / (weights * before**2).sum()) - least
 
 
 def is_homoclinic(problem: Discretisation, u: Array, linearised: Any, tangent: Array) -> bool:
+    """Whether an orbit by collocation is homoclinic to a saddle; see :func:`near_saddle`."""
+    x, _ = problem.at_gauss_points(problem.nodes(u))
+    shares = np.repeat(problem.widths / problem.degree, problem.degree)
+    return near_saddle(problem, problem.parameters(u), x, shares, tangent,
+                       linearised.derivatives[0])
+
+
+def halves_apart(problem: Discretisation, u: Array) -> float:
+    """Difference of the halves along that of the orbit before, see :func:`shrunk`; 1 without any.
+
+    Where it vanishes a doubled orbit is a single one; beyond, the same orbits come once more, with
+    their halves exchanged.
+    """
+    times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
+    weights = problem.weights()[: problem.size].reshape(problem.reference.shape)
+    before, now = (nodes - interpolate(problem.mesh, np.ascontiguousarray(nodes), times)
+                   for nodes in (problem.reference, problem.nodes(u)))
+    whole = problem.reference - problem.reference.mean(axis=0)
+    if (weights * before**2).sum() < _HALVES_MEET**4 * (weights * whole**2).sum():
+        return 1.0
+    return shrunk(weights, now, before, VANISHED_ON_CURVES)
+
+
+def near_saddle(
+    problem: _Scaled, values: Array, x: Array, shares: Array, tangent: Array,
+    rates: Array | None = None,
+) -> bool:
     """Whether an orbit stays near a saddle for most of its period, which alone changes.
 
     Its nearest distance from the saddle falls as exp(-l T / 2), the change of the parameter as
     exp(-l T) (Kuznetsov, Elements of Applied Bifurcation Theory, section 6.2); where the former is
-    1e-3 of the amplitude, the branch has no more to tell.
+    1e-3 of the amplitude, the branch has no more to tell. ``x`` (N, d) are states of the orbit,
+    with these rates, ``shares`` (N,) the parts of the period that they stand for.
     """
-    d = problem.field.dimension
-    sizes = problem.scales[:d]
-    speed = np.linalg.norm(linearised.derivatives[0] / sizes, axis=1)
-    if speed.min() > _SLOW * speed.max() or not _period_alone(problem, tangent):
+    if not _period_alone(problem, tangent):
         return False
-    nodes, values = problem.nodes(u), problem.parameters(u)
-    x, _ = problem.at_gauss_points(nodes)
+    sizes = problem.scales[: problem.field.dimension]
+    if rates is None:
+        rates = problem.field.rates(np.zeros(len(x)), x, values)
+    speed = np.linalg.norm(rates / sizes, axis=1)
+    if speed.min() > _SLOW * speed.max():
+        return False
     found = newton(problem.field, x[np.argmin(speed)].copy(), values, _TOLERANCE)
     if found is None:
         return False
-    amplitude = float(np.linalg.norm(np.ptp(nodes, axis=0) / sizes)) / 2.0
+    amplitude = float(np.linalg.norm(np.ptp(x, axis=0) / sizes)) / 2.0
     away = np.linalg.norm((x - found[0]) / sizes, axis=1)
-    times = np.repeat(problem.widths / problem.degree, problem.degree)
-    beside = float(times[away < _BESIDE * amplitude].sum())
+    beside = float(shares[away < _BESIDE * amplitude].sum())
     if away.min() > _NEAREST * amplitude or beside < _MOST_TIME:
         return False
     real = sorted_eigenvalues(found[1]).real
     return bool(real[0] > 0.0 > real[-1])
 
 
-def _period_alone(problem: Discretisation, tangent: Array) -> bool:
+def _period_alone(problem: _Scaled, tangent: Array) -> bool:
     """Whether the period grows and the parameter rests, in the scales of the diagram."""
     period, parameter = (abs(tangent[place]) / problem.scales[place] for place in (-2, -1))
     whole = weighted_norm(problem.weights(), tangent)

@@ -1,6 +1,7 @@
 """Periodic orbits of contact systems by multiple shooting with the compiled integrator."""
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -8,14 +9,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.same_orbit import same_place
+from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensemble import ensemble
@@ -47,9 +48,7 @@ class ShootingProblem(FloquetTests, Problem):
     the period of the forcing.
 
     The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. Stored values
-    and tests for special points are those of
-    :class:`fecontact.bifurcation.orbits.collocation.CollocationProblem`; minimum and maximum are
-    taken from samples.
+    are those of collocation; minimum and maximum are taken from samples.
 
     Attributes
     ----------
@@ -73,8 +72,7 @@ class ShootingProblem(FloquetTests, Problem):
     solver : Rodas5P or SetValued
         What runs the segments.
     precision : float
-        Tolerance of the location of special points, relative to the step. Below it, differences
-        between the steps of the runs dominate, and each trial costs a run with derivatives.
+        Tolerance of the location of special points, relative to the step: that of the runs.
     before, bend
         The previous orbit with its tangent, and the derivative of the tangent along the branch.
     """
@@ -95,6 +93,7 @@ class ShootingProblem(FloquetTests, Problem):
 
     keeps_matrix: ClassVar[bool] = True
     event_precision: ClassVar[float] = 1e-9
+    ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
     @cached_property
     def autonomous(self) -> bool:
@@ -185,6 +184,23 @@ class ShootingProblem(FloquetTests, Problem):
                 "trivial_error": stability.trivial_error, "mesh": self.mesh,
                 "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
 
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Test functions of the multipliers, and of orbits that shrink to an equilibrium."""
+        found = super().tests(u, linearisation, tangent)
+        if self.autonomous and self.before is not None:
+            # About the middle of this orbit, which is nearly that of the one before.
+            middle = linearisation.paths.mean(axis=(0, 1))
+            found[VANISHING] = shrunk(self.scales[: len(middle)] ** -2.0, self.starts(u) - middle,
+                                      self.starts(self.before[0]) - middle)
+        return found
+
+    def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
+        """At orbits that are homoclinic to a saddle, as far as numbers tell."""
+        states = linearisation.paths.reshape(-1, self.field.dimension)
+        shares = np.repeat(np.diff(self.mesh) / _SAMPLES, _SAMPLES)
+        near = self.autonomous and near_saddle(self, self.parameters(u), states, shares, tangent)
+        return BranchStatus.HOMOCLINIC if near else None
+
     def _require_return(self, u: Array) -> None:
         """Raise AnalysisError unless the runs from u meet; a jump looks like a solution."""
         d = self.field.dimension
@@ -238,7 +254,7 @@ class ShootingProblem(FloquetTests, Problem):
 
 
 def require_segments(segments: int) -> None:
-    """Raise :class:`InputError` for an invalid number of segments."""
+    """Raise InputError for an invalid number of segments."""
     if not (isinstance(segments, int | np.integer) and segments >= 1):
         raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
 
@@ -374,8 +390,7 @@ class ShootingLinearisation:
     @cached_property
     def residual(self) -> Array:
         """Defects (K d,) between the segments, and the phase condition if the period is unknown."""
-        problem = self.problem
-        starts = problem.starts(self.u)
+        problem, starts = self.problem, self.problem.starts(self.u)
         gaps = (self._ends - np.roll(starts, -1, axis=0)).reshape(-1)
         if not problem.autonomous:
             return gaps

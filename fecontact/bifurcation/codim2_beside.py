@@ -1,0 +1,324 @@
+"""Curves of orbits that begin at points of codimension two: a point of each is looked for beside them.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.codim2_switch import (
+    other_curve,
+    tangent_at,
+    values_at,
+    widths_of,
+)
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.points import (
+    BranchHeader,
+    BranchPoint,
+    FoldPoint,
+    HopfPoint,
+    special_point,
+)
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    Problem,
+)
+from fecontact.bifurcation.equilibria.branches import equilibrium_branch
+from fecontact.bifurcation.equilibria.codim2 import equilibrium_curve
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales, newton
+from fecontact.bifurcation.equilibria.normal_forms import hopf
+from fecontact.system.fields.vector_field import VectorField
+from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
+from fecontact.core.types import Array
+
+# Distances from the Bautin point along the second parameter, in the width of the diagram, at which
+# the fold is looked for, and the range of the first parameter about the Hopf point there.
+_AWAY, _ABOUT = (0.02, 0.05, 0.005), 0.1
+_TOLERANCE = 1e-12
+_SEARCH = ContinuationOptions(step=2e-3, largest_step=0.02, points=150, stop_at=("fold",))
+
+
+def fold_at_bautin(field: VectorField, point: BranchPoint, parameter: str) -> FoldPoint:
+    """A fold of orbits beside a Bautin point of a curve of Hopf points.
+
+    Near the point the amplitude r of the orbits satisfies b + l1 r^2 + l2 r^4 = 0 with the distance
+    b from the curve: on the side with l1 l2 < 0 they turn at r^2 = -l1 / (2 l2) (Kuznetsov,
+    Elements of Applied Bifurcation Theory, section 8.3). Both sides are tried, at one value of the
+    second parameter, from the Hopf point on.
+
+    Raises
+    ------
+    InputError
+        If the curve is not over this second parameter, or does not know those of its field.
+    AnalysisError
+        If no fold is found on either side.
+    """
+    values, index = values_at(field, point, parameter), field.index(parameter)
+    width = widths_of(point)
+    for away in _AWAY:
+        for side in (1.0, -1.0):
+            values[index] = point.u[-2] + side * away * width[parameter]
+            try:
+                found = _fold(field, point, values.copy(), width[point.branch.parameter_name])
+            except FecontactError:
+                continue
+            if found is not None:
+                return found
+    raise AnalysisError(f"{point.place}: no fold of orbits was found beside it; follow orbits from "
+                        f"a Hopf point near it to their fold, and start from there.")
+
+
+def _fold(
+    field: VectorField, point: BranchPoint, values: Array, width: float
+) -> FoldPoint | None:
+    """The fold of the orbits at one value of the second parameter, if there is one."""
+    state = np.ascontiguousarray(np.asarray(point.values["state"], dtype=float))
+    rest = newton(field, state, values, _TOLERANCE)
+    if rest is None:
+        return None
+    about = (point.parameter - _ABOUT * width, point.parameter + _ABOUT * width)
+    branch = equilibrium_branch(field, Equilibrium(field, values, rest[0]),
+                                point.branch.parameter_name, bounds=about, both=True, width=width)
+    hopf: list[HopfPoint] = sorted(branch.of_kind("Hopf"), key=lambda at: abs(
+        at.frequency_hz - float(point.values["frequency_hz"])))
+    if not hopf:
+        return None
+    orbits = orbit_branch(field, hopf[0], options=_SEARCH, bounds=about, width=width)
+    end = orbits.points[-1]
+    return end if isinstance(end, FoldPoint) else None
+
+
+# Steps along the curve of Hopf points away from a point of codimension two, in widths of the
+# diagram, and the points of it, one after the other, from which orbits are followed.
+_STEPS = ContinuationOptions(step=5e-3, largest_step=0.02, points=6, locate=False)
+_CHOSEN = (2, 5, 1)
+_TORI = replace(_SEARCH, stop_at=("Neimark-Sacker",), largest_step=0.05, points=60)
+_LONG = replace(_SEARCH, stop_at=(), largest_step=0.1, points=200)
+_INTERVALS = 40
+
+
+def torus_beside(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
+    """A Neimark-Sacker point of the orbits with the frequency of a zero-Hopf or double Hopf point.
+
+    Near a double Hopf point, with r1' = r1 (m1 + p11 r1^2 + p12 r2^2) and likewise r2, the orbits
+    r1^2 = -m1 / p11 lose stability to a torus at m2 = p21 m1 / p11 (Kuznetsov, Elements of Applied
+    Bifurcation Theory, section 8.6). They are followed from Hopf points on both sides.
+
+    Raises
+    ------
+    InputError
+        As :func:`fecontact.bifurcation.codim2_switch.other_curve`.
+    AnalysisError
+        If none is found on either side.
+    """
+    frequency = float(point.values["frequency_hz"] if "frequency_hz" in point.values
+                      else point._detail("frequency_hz"))
+    square = (2.0 * np.pi * frequency) ** 2
+    found = _first(field, point, parameter, square, _TORI,
+                   lambda branch: branch.points[-1].kind == "Neimark-Sacker")
+    if found is None:
+        raise AnalysisError(f"{point.place}: no torus was found beside it; follow orbits from a "
+                            f"Hopf point near it, and start from their Neimark-Sacker point.")
+    return found
+
+
+def homoclinic_beside(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
+    """An orbit next to a homoclinic one, beside a Bogdanov-Takens point.
+
+    Raises
+    ------
+    InputError
+        As :func:`torus_beside`.
+    AnalysisError
+        If none is found.
+    """
+    found = _first(field, point, parameter, 0.0, _LONG,
+                   lambda branch: branch.status is BranchStatus.HOMOCLINIC)
+    if found is None:
+        raise AnalysisError(f"{point.place}: no homoclinic orbit was found beside it; follow "
+                            f"orbits from a Hopf point near it, and start from their end.")
+    return found
+
+
+def _first(
+    field: VectorField, point: BranchPoint, parameter: str, square: float,
+    options: ContinuationOptions, wanted: Callable[[Branch], bool],
+) -> BranchPoint | None:
+    """The end of the first branch of orbits that is wanted, from Hopf points beside a point."""
+    begin = other_curve(field, point, parameter)[0]
+    width, first = widths_of(point), point.branch.parameter_name
+    problem, u, _ = equilibrium_curve(begin, (first, parameter), square, width, None)
+    tangent = tangent_at(problem, u, 1.0)
+    if square == 0.0:
+        tangent = tangent * np.sign(tangent[field.dimension])
+    beside = list(_along(problem, u, tangent, first, both=square != 0.0))
+    # Tori of some zero-Hopf points lie across the other parameter alone.
+    across = _across(tangent, first, parameter, width)
+    tried = [(over, at) for over in sorted(width, key=lambda name: name != across)
+             for at in beside]
+    for over, at in tried:
+        hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
+        reach = _ABOUT * width[over]
+        try:
+            branch = orbit_branch(
+                field, hopf_point, method=Collocation(_INTERVALS), options=options,
+                bounds=(hopf_point.parameter - reach, hopf_point.parameter + reach),
+                width=width[over])
+        except FecontactError:
+            continue
+        if wanted(branch):
+            return _over(field, branch.points[-1], first, width[first])
+    return None
+
+
+def _across(tangent: Array, first: str, second: str, width: Mapping[str, float]) -> str:
+    """The parameter over which a curve with this tangent is crossed."""
+    steep = abs(tangent[-1]) / width[first] <= abs(tangent[-2]) / width[second]
+    return first if steep else second
+
+
+def _along(
+    problem: Problem, u: Array, tangent: Array, name: str, *, both: bool = True,
+    attributes: dict[str, Any] | None = None,
+) -> Iterator[BranchPoint]:
+    """Points of a curve beside its start, on both sides or ahead."""
+    sides = [continue_branch(problem, u, _STEPS, name=name, tangent=side * tangent,
+                             attributes=attributes).points for side in (1.0, -1.0)[: 1 + both]]
+    for place in _CHOSEN:
+        yield from (points[place] for points in sides if place < len(points))
+
+
+def _over(field: VectorField, point: BranchPoint, name: str, width: float) -> BranchPoint:
+    """A point of a branch of orbits as one of a branch over another parameter."""
+    if point.branch.parameter_name == name:
+        return point
+    values = point.parameter_values(field)
+    scales = np.array(point.branch.attributes["scales"], dtype=float)
+    scales[-1] = width
+    header = BranchHeader(name, {**point.branch.attributes, "parameter_values": values,
+                                 "scales": scales})
+    u = np.append(point.u[:-1], values[field.index(name)])
+    return special_point(u, np.zeros_like(u), point.values, point.kind, {}, header)
+
+
+def _hopf_at(
+    field: VectorField, begin: Equilibrium, at: BranchPoint, names: tuple[str, str], over: str
+) -> HopfPoint:
+    """A point of a curve of Hopf points as one of a branch over one of both parameters."""
+    values = begin.values.copy()
+    for name, value in zip(names, at.u[[-1, -2]].tolist(), strict=True):
+        values[field.index(name)] = value
+    state = np.ascontiguousarray(at.u[: field.dimension])
+    there = Equilibrium(field, values, state)
+    w = float(np.sqrt(at.u[field.dimension]))
+    found = hopf(field, state, values, default_scales(there), 1j * w)
+    header = BranchHeader(over, {
+        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
+        "parameter_values": values})
+    u = np.append(state, values[field.index(over)])
+    made = special_point(u, np.zeros_like(u), {"state": state}, "Hopf", {
+        "angular_frequency": found.angular_frequency, "eigenvector": found.eigenvector,
+        "frequency_hz": found.angular_frequency / (2.0 * np.pi),
+        "period": 2.0 * np.pi / found.angular_frequency, "criticality": found.criticality}, header)
+    assert isinstance(made, HopfPoint)
+    return made
+
+
+def over_first(point: BranchPoint, kind: str) -> BranchPoint:
+    """A point of a curve of orbits as one of some kind on a branch over the first parameter."""
+    known = point.branch.attributes
+    second = str(known["parameters"][1])
+    values = np.array(known["parameter_values"], dtype=float)
+    values[list(map(str, known["parameter_names"])).index(second)] = point.u[-2]
+    kept = {name: value for name, value in known.items()
+            if name not in ("parameters", "kind", "limits")}
+    scales = np.delete(np.asarray(known["scales"], dtype=float), -2)
+    header = BranchHeader(point.branch.parameter_name,
+                          {**kept, "parameter_values": values, "scales": scales})
+    return special_point(np.delete(point.u, -2), np.delete(point.tangent, -2), point.values, kind,
+                         {}, header)
+
+
+def of_doubled(
+    field: VectorField, point: BranchPoint, parameter: str, kind: str
+) -> BranchPoint:
+    """A fold or a Neimark-Sacker point of the doubled orbits beside a point of codimension two.
+
+    At a generalised period doubling, where the multiplier -1 obeys b a + c a^3 + e a^5 on the
+    orbits beyond, these turn at a^2 = -c / (2 e); at a resonance 1:2 a torus may begin on them
+    (Kuznetsov, Elements of Applied Bifurcation Theory, sections 9.4 and 9.5).
+
+    Raises
+    ------
+    AnalysisError
+        If none is found on either side.
+    """
+    single = over_first(point, "period doubling")
+    first, second = point.branch.parameter_name, str(point.branch.attributes["parameters"][1])
+    width = dict(zip((second, first),
+                     np.asarray(point.branch.attributes["scales"])[-2:].tolist(), strict=True))
+    problem, u, attributes = orbit_curve(field, single, second, width, None, "period doubling")
+    attributes |= {"parameters": [first, second]}
+    tangent = tangent_at(problem, u, 1.0)
+    over = _across(tangent, first, second, width)
+    reach = _ABOUT * width[over]
+    for at in _along(problem, u, tangent, first, attributes=attributes):
+        begin = _over(field, over_first(at, "period doubling"), over, width[over])
+        try:
+            branch = orbit_branch(field, begin, options=replace(_TORI, stop_at=(kind,)),
+                                  bounds=(begin.parameter - reach, begin.parameter + reach))
+        except FecontactError:
+            continue
+        if branch.points[-1].kind == kind:
+            return _over(field, branch.points[-1], first, width[first])
+    raise AnalysisError(f"{point.place}: no {kind} of doubled orbits was found beside it; follow "
+                        f"these from a period doubling near it.")
+
+
+_Found = Callable[[VectorField, BranchPoint, str], BranchPoint]
+# Curves of orbits that begin at points of curves, by the kind of the point and of the curve; the
+# first of a point is that which is followed without being named, where no curve of equilibria is.
+BEGIN: Mapping[str, Mapping[str, _Found]] = {
+    "Bautin": {"fold": fold_at_bautin},
+    "zero-Hopf": {"Neimark-Sacker": torus_beside},
+    "double Hopf": {"Neimark-Sacker": torus_beside},
+    "Bogdanov-Takens": {"homoclinic": homoclinic_beside},
+    "generalised period doubling": {
+        "fold": lambda field, point, parameter: of_doubled(field, point, parameter, "fold")},
+    "resonance 1:1": {
+        "fold": lambda field, point, parameter: over_first(point, "fold"),
+        "Neimark-Sacker": lambda field, point, parameter: over_first(point, "Neimark-Sacker")},
+    "resonance 1:2": {
+        "period doubling": lambda field, point, parameter: over_first(point, "period doubling"),
+        "Neimark-Sacker": lambda field, point, parameter: of_doubled(
+            field, point, parameter, "Neimark-Sacker")},
+}
+# Points of which a curve of equilibria is followed without a curve being named.
+_OF_EQUILIBRIA = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")
+
+
+def begun(field: VectorField, point: BranchPoint, parameter: str, to: str | None) -> BranchPoint:
+    """The point from which a curve is followed: itself, or one of the orbits that begin there.
+
+    Raises
+    ------
+    InputError
+        If no such curve begins at the point.
+    AnalysisError
+        If none is found.
+    """
+    known = BEGIN.get(str(point.kind), {})
+    if to is None and (not known or point.kind in _OF_EQUILIBRIA):
+        return point
+    if to is not None and to not in known:
+        if to == "homoclinic" and point.is_orbit:
+            return point
+        others = choices(known) if known else "none that is named"
+        raise InputError(f"{point.place}: no curve to = {to!r} begins there; known are: {others}.")
+    return known[to or next(iter(known))](field, point, parameter)

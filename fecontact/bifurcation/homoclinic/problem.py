@@ -1,0 +1,285 @@
+"""Continuation problem of orbits homoclinic to a saddle, over two parameters.
+
+On an interval of length T about the excursion, x' = f(x, p) is solved by collocation with
+
+    f(s, p) = 0                    the saddle s
+    L_s (x(0) - s) = 0             the orbit leaves along the unstable subspace
+    L_u (x(T) - s) = 0             and comes back along the stable one
+    int <x, y'> dt = int <y, y'> dt   phase, y is the orbit before
+
+where the rows of L_s and L_u span the left invariant subspaces of df/dx(s, p). The error of the
+truncation falls as that of the tangents to the manifolds, in the square of the distances of both
+ends from the saddle and faster (Beyn, IMA J. Numer. Anal. 10, 1990). T follows these distances.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues
+from fecontact.system.fields.vector_field import VectorField
+from fecontact.bifurcation.homoclinic import open_mesh
+from fecontact.bifurcation.homoclinic.linearisation import HomoclinicLinearised
+from fecontact.bifurcation.homoclinic.saddle import (
+    Saddle,
+    discriminant,
+    flown,
+    leading_row,
+    left_subspaces,
+    saddle_of,
+)
+from fecontact.bifurcation.orbits.floquet import resting
+from fecontact.core.errors import FecontactError
+from fecontact.core.types import Array
+
+# Distance of both ends from the saddle, in that of the farthest point, and the factor by which it
+# may differ before the interval is lengthened or shortened.
+DISTANCE, _WITHIN = 3e-4, 3.0
+# Longest new interval, and longest step on a piece of linear flow, in the time of its rate.
+_LONGEST, _STEP = 10.0, 0.4
+# Lengthening of the interval for the error of the truncation, as a factor of the distances.
+_LONGER = 10.0
+# Amplitude and rates of the saddle, in the largest ones of the curve, at which it ends.
+_LEAST, _SLOWEST = 1e-2, 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class HomoclinicProblem(Problem):
+    """Homoclinic orbits; u = [nodes ((N m + 1) d), saddle (d), second, first parameter].
+
+    Attributes
+    ----------
+    field, values : VectorField, (k,) array
+        Both free parameters are taken from u.
+    active : (int, int)
+        Indices of the second and the first parameter.
+    mesh : (N + 1,) array
+        Ends of the intervals, from 0 to 1.
+    degree : int
+        m.
+    time : float
+        Length T of the interval [s].
+    reference : (N m + 1, d) array
+        Nodes of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        Scales of the states and of both parameters.
+    rows : pair of arrays
+        Left subspaces of the saddle of the orbit before, stable and unstable.
+    leading : pair of (d,) arrays or None
+        Left eigenvectors of its leading eigenvalues, unstable and stable, where these are real.
+    intervals : int
+        Number of intervals after each step.
+    distance : float
+        Distance of both ends from the saddle to which T is fitted, in the farthest one.
+    largest : (float, float)
+        Largest amplitude and largest rate of the saddle up to here.
+    """
+
+    field: VectorField
+    values: Array
+    active: tuple[int, int]
+    mesh: Array
+    degree: int
+    time: float
+    reference: Array
+    scales: Array
+    rows: tuple[Array, Array]
+    leading: tuple[Array | None, Array | None]
+    intervals: int
+    distance: float = DISTANCE
+    largest: tuple[float, float] = (0.0, 0.0)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Scales (d,) of the states."""
+        return self.scales[:-2]
+
+    @property
+    def size(self) -> int:
+        """Number of nodal unknowns, those of the last node included."""
+        return self.reference.size
+
+    def nodes(self, u: Array) -> Array:
+        """Nodes (N m + 1, d)."""
+        return u[: self.size].reshape(self.reference.shape)
+
+    def rest(self, u: Array) -> Array:
+        """The saddle (d,)."""
+        return np.ascontiguousarray(u[self.size : -2])
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[list(self.active)] = u[-2:]
+        return values
+
+    def linearise(self, u: Array) -> HomoclinicLinearised:
+        """The equations about u."""
+        return HomoclinicLinearised(self, u)
+
+    @cached_property
+    def _weights(self) -> Array:
+        shares = np.repeat(np.diff(self.mesh) / self.degree, self.degree)
+        shares = np.append(shares, shares[-1])
+        return np.concatenate([(shares[:, None] / self.sizes**2).reshape(-1), self.scales[:-2]**-2,
+                               self.scales[-2:]**-2])
+
+    def weights(self) -> Array:
+        """Mean over the interval of the scaled states, the saddle, both parameters."""
+        return self._weights
+
+    def saddle(self, u: Array) -> Saddle:
+        """The saddle in units of the scales.
+
+        Raises
+        ------
+        AnalysisError
+            If the equilibrium is no saddle.
+        """
+        _, J, _ = self.field.derivatives(np.zeros(1), self.rest(u)[None], self.parameters(u))
+        return saddle_of(J[0] * self.sizes / self.sizes[:, None])
+
+    def away(self, u: Array) -> Array:
+        """Differences (N m + 1, d) of the orbit from the saddle, in units of the scales."""
+        return np.asarray((self.nodes(u) - self.rest(u)) / self.sizes)
+
+    def amplitude(self, u: Array) -> float:
+        """Largest distance from the saddle, in units of the scales."""
+        return float(np.linalg.norm(self.away(u), axis=1).max())
+
+    def distances(self, u: Array) -> tuple[float, float]:
+        """Distances of both ends from the saddle, in the largest one."""
+        whole = np.linalg.norm(self.away(u), axis=1)
+        return float(whole[0] / whole.max()), float(whole[-1] / whole.max())
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Both parameters, the saddle, the interval, extremes, and the error of the truncation."""
+        names = list(self.field.parameters)
+        nodes = self.nodes(u)
+        return {**{names[index]: float(value)
+                   for index, value in zip(self.active, u[-2:], strict=True)},
+                "saddle": self.rest(u).copy(),
+                "eigenvalues": sorted_eigenvalues(linearisation.jacobian), "time": self.time,
+                "mesh": self.mesh, "minimum": nodes.min(axis=0), "maximum": nodes.max(axis=0),
+                "end_distance": max(self.distances(u)),
+                "truncation_error": self.truncation_error(u, tangent)}
+
+    def truncation_error(self, u: Array, tangent: Array) -> float:
+        """Change of the parameters, in widths of the diagram, by a Newton step on more time."""
+        try:
+            rates = self.saddle(u).rates
+            more = [float(np.log(_LONGER)) / rate for rate in rates]
+            problem, longer, turned = self.stretched(u, tangent, more[0], more[1])
+            linearised = problem.linearise(longer)
+            change = linearised.solve(problem.weights() * turned,
+                                      -np.append(linearised.residual, 0.0))
+        except FecontactError:
+            return float("nan")
+        return float(np.abs(change[-2:] / self.scales[-2:]).max())
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
+        """Test functions of neutral saddles, double leading eigenvalues and orbit flips."""
+        saddle = self.saddle(u)
+        out, back = saddle.rates
+        found = {"neutral saddle": (out - back) / (out + back)}
+        away = self.away(u)
+        for name, leading, end, rate, known in (
+                ("unstable", saddle.unstable, away[0], out, self.leading[0]),
+                ("stable", saddle.stable, away[-1], back, self.leading[1])):
+            value = discriminant(leading)
+            if value is not None:
+                found[f"{name} double eigenvalue"] = value
+            row = leading_row(saddle.jacobian, leading[0])
+            if value is not None and known is not None and row is not None:
+                # In units of the leading part at the middle, which does not depend on T.
+                part = float(row @ end) * np.exp(min(0.5 * rate * self.time, 500.0))
+                found[f"{name} orbit flip"] = part * float(np.sign(row @ known))
+        return found
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> Mapping[str, Any] | None:
+        """A point where one parameter turns is no fold but a turning point."""
+        return {"kind": "turning point"} if kind == "fold" else {}
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of the first parameter where it does not change but for rounding."""
+        return resting(tangents, float(self.scales[-1]))
+
+    def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
+        """Where both orbit and rates vanish, at a Bogdanov-Takens point."""
+        amplitude, rate = self.amplitude(u), max(self.saddle(u).rates)
+        if amplitude < _LEAST * self.largest[0] and rate < _SLOWEST * self.largest[1]:
+            return BranchStatus.HOPF
+        return None
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[HomoclinicProblem, Array, Array]":
+        """The problem for the next step: interval, mesh, phase and subspaces for this orbit."""
+        problem = self
+        rates = self.saddle(u).rates
+        wanted = [float(np.log(end / self.distance)) for end in self.distances(u)]
+        if max(map(abs, wanted)) > np.log(_WITHIN):
+            times = [min(part / rate, _LONGEST * self.time) for part, rate in
+                     zip(wanted, rates, strict=True)]
+            problem, u, tangent = self.stretched(u, tangent, times[0], times[1])
+        mesh = open_mesh.equidistributed(problem.mesh, problem.nodes(u), self.degree,
+                                         self.intervals)
+        return problem._renewed(mesh, u, tangent)
+
+    def _renewed(
+        self, mesh: Array, u: Array, tangent: Array
+    ) -> "tuple[HomoclinicProblem, Array, Array]":
+        """Problem, u and tangent on another mesh, with all that follows the orbit."""
+        places = open_mesh.node_times(mesh, self.degree)
+        moved, turned = (np.concatenate([open_mesh.interpolate(
+            self.mesh, self.nodes(each), self.degree, places).reshape(-1), each[self.size :]])
+            for each in (u, tangent))
+        saddle = self.saddle(u)
+        rows = [leading_row(saddle.jacobian, leading[0])
+                for leading in (saddle.unstable, saddle.stable)]
+        leading = [row if row is None or known is None or row @ known >= 0.0 else -row
+                   for row, known in zip(rows, self.leading, strict=True)]
+        largest = (max(self.largest[0], self.amplitude(u)), max(self.largest[1], *saddle.rates))
+        return replace(self, mesh=mesh, reference=moved[: len(places) * len(self.sizes)].reshape(
+            len(places), -1).copy(), rows=left_subspaces(saddle.jacobian),
+            leading=(leading[0], leading[1]), largest=largest), moved, turned
+
+    def stretched(
+        self, u: Array, tangent: Array, before: float, after: float
+    ) -> "tuple[HomoclinicProblem, Array, Array]":
+        """Problem, u and tangent with more time before and after, on linear flow, or with less.
+
+        Negative times cut whole intervals off. The others keep their nodes.
+        """
+        saddle, m = self.saddle(u), self.degree
+        steps = np.diff(self.mesh) * self.time
+        parts = [self.away(u), (self.nodes(tangent) - self.rest(tangent)) / self.sizes]
+        for side, more in enumerate((before, after)):
+            ahead = side == 1
+            if more < 0.0:
+                cut = int(np.searchsorted(np.cumsum(steps[::-1] if ahead else steps), -more))
+                keep = slice(0, len(steps) - cut) if ahead else slice(cut, None)
+                steps = steps[keep]
+                parts = [part[: len(part) - cut * m] if ahead else part[cut * m :]
+                         for part in parts]
+            elif more > 0.0:
+                count = max(2, int(np.ceil(more * saddle.rates[side] / _STEP)))
+                times = np.linspace(0.0, more, count * m + 1)[1:]
+                fresh = [flown(saddle, part[-1 if ahead else 0], times if ahead else -times,
+                               not ahead) for part in parts]
+                added = np.full(count, more / count)
+                steps = np.concatenate([steps, added] if ahead else [added, steps])
+                parts = [np.concatenate([part, new] if ahead else [new[::-1], part])
+                         for part, new in zip(parts, fresh, strict=True)]
+        time = float(steps.sum())
+        mesh = np.append(0.0, np.cumsum(steps) / time)
+        mesh[-1] = 1.0
+        found = [np.concatenate([(part * self.sizes + self.rest(each)).reshape(-1),
+                                 each[self.size :]])
+                 for part, each in zip(parts, (u, tangent), strict=True)]
+        reference = found[0][: len(parts[0]) * len(self.sizes)].reshape(len(parts[0]), -1).copy()
+        return replace(self, mesh=mesh, time=time, reference=reference), found[0], found[1]

@@ -1,0 +1,158 @@
+"""Starts of curves of homoclinic orbits: from orbits of long periods, and from points of curves."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.problem import sizes_of
+from fecontact.bifurcation.equilibria.equilibrium import newton
+from fecontact.system.fields.vector_field import VectorField
+from fecontact.bifurcation.homoclinic import open_mesh
+from fecontact.bifurcation.homoclinic.problem import HomoclinicProblem
+from fecontact.bifurcation.homoclinic.saddle import left_subspaces, saddle_of
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array, ArrayLike
+
+# Mesh for orbits that were not found by collocation.
+_INTERVALS, _DEGREE = 80, 4
+# Distance from the saddle, in the farthest one, within which an orbit has to pass it.
+_NEAR = 0.3
+# Samples of an orbit from which a start is taken.
+_SAMPLES = 4001
+_TOLERANCE = 1e-10
+_CORRECTIONS, _LENGTHENINGS = 25, 4
+
+
+def homoclinic_curve(
+    field: VectorField, point: BranchPoint, second: str, widths: Mapping[str, float],
+    scales: ArrayLike | None,
+) -> tuple[HomoclinicProblem, Array, dict[str, Any]]:
+    """Problem, unknowns and attributes of the curve of homoclinic orbits near an orbit.
+
+    Arguments are those of :func:`fecontact.bifurcation.orbits.codim2.orbit_curve`; the point is an
+    orbit by any method, or a point of such a curve.
+
+    Raises
+    ------
+    InputError
+        If the orbit passes no saddle, or the field is excited.
+    AnalysisError
+        If no homoclinic orbit is found beside it.
+    """
+    known = point.branch.attributes
+    names = (second, point.branch.parameter_name)
+    active = (field.index(second), field.index(names[1]))
+    if point.is_homoclinic:
+        values = restored_values(field, point)
+        motion, degree = None, int(known["degree"])
+    else:
+        values = point.parameter_values(field)
+        motion, degree = point.orbit(field, _SAMPLES), int(known.get("degree", _DEGREE))
+    if field.forcing_period(values) is not None:
+        raise InputError(f"{point.place} is one of an excited system, whose orbits approach no "
+                         f"saddle at rest.")
+    d = field.dimension
+    sizes = np.asarray(known["scales"], dtype=float)[:d]
+    sizes = sizes_of(scales, sizes)[0] if scales is not None else sizes
+    width = [widths.get(name, abs(float(values[index])) or 1.0)
+             for name, index in zip(names, active, strict=True)]
+    if motion is None:
+        mesh = np.asarray(point.values["mesh"], dtype=float)
+        nodes, rest = open_mesh.nodes_of(point.u, d), np.asarray(point.values["saddle"], dtype=float)
+        time = float(point.values["time"])
+    else:
+        given = (len(point.values["mesh"]) - 1 if "degree" in known else _INTERVALS)
+        nodes, rest, mesh, time = _cut_open(field, values, motion, point, given, degree, sizes)
+    _, J, _ = field.derivatives(np.zeros(1), rest[None], values)
+    jacobian = J[0] * sizes / sizes[:, None]
+    saddle_of(jacobian)
+    problem = HomoclinicProblem(field, values, active, mesh, degree, time, nodes,
+                                np.concatenate([sizes, width]), left_subspaces(jacobian),
+                                (None, None), len(mesh) - 1)
+    u = np.concatenate([nodes.reshape(-1), rest, values[list(active)]])
+    problem, u = _corrected(problem, u, point)
+    attributes = {"parameter_names": list(field.parameters), "parameter_values": values,
+                  "scales": problem.scales, "degree": degree}
+    return problem, u, attributes
+
+
+def restored_values(field: VectorField, point: BranchPoint) -> Array:
+    """Parameter values (k,) at a point of a curve of homoclinic orbits."""
+    known, values = point.branch.attributes, field.values
+    for name, value in zip(known["parameter_names"], np.asarray(known["parameter_values"]),
+                           strict=True):
+        values[field.index(str(name))] = value
+    for name, value in zip(known["parameters"], point.u[[-1, -2]].tolist(), strict=True):
+        values[field.index(str(name))] = value
+    return values
+
+
+def _cut_open(
+    field: VectorField, values: Array, motion: PeriodicMotion, point: BranchPoint, intervals: int,
+    degree: int, sizes: Array,
+) -> tuple[Array, Array, Array, float]:
+    """Nodes, saddle, mesh and time of an orbit that begins and ends where it is next to a saddle."""
+    times, states = motion.times - motion.times[0], np.ascontiguousarray(motion.states)
+    speed = np.linalg.norm(field.rates(np.zeros(len(times)), states, values) / sizes, axis=1)
+    found = newton(field, states[int(np.argmin(speed))].copy(), values, _TOLERANCE)
+    away = (np.full(len(times), np.inf) if found is None else
+            np.linalg.norm((states - found[0]) / sizes, axis=1))
+    if found is None or away.min() > _NEAR * away.max():
+        raise InputError(f"{point.place} passes no equilibrium, as orbits beside a homoclinic one "
+                         f"do; follow the branch to a longer period first.")
+    if not found[1].size or not (np.linalg.eigvals(found[1]).real > 0.0).any():
+        raise InputError(f"{point.place} is slowest beside an equilibrium that is no saddle; "
+                         f"follow the branch to a longer period first.")
+    time, begin = float(times[-1]), float(times[int(np.argmin(away))])
+
+    def sampled(phases: Array) -> Array:
+        places = np.mod(begin + phases * time, time)
+        return np.stack([np.interp(places, times, column) for column in states.T], axis=1)
+
+    fine = np.linspace(0.0, 1.0, 4 * intervals + 1)
+    mesh = open_mesh.equidistributed(fine, sampled(open_mesh.node_times(fine, degree)), degree,
+                                     intervals)
+    return sampled(open_mesh.node_times(mesh, degree)), np.asarray(found[0]), mesh, time
+
+
+def _corrected(
+    problem: HomoclinicProblem, u: Array, point: BranchPoint
+) -> tuple[HomoclinicProblem, Array]:
+    """The homoclinic orbit at the same second parameter, on an interval and a mesh made for it.
+
+    Raises
+    ------
+    AnalysisError
+        If Newton's method does not converge.
+    """
+    turned = np.zeros_like(u)
+    for _ in range(_LENGTHENINGS):
+        u = _newton(problem, u, point)
+        before = problem.time
+        problem, u, turned = problem.adapted(u, turned)
+        if problem.time == before:
+            break
+    return problem, _newton(problem, u, point)
+
+
+def _newton(problem: HomoclinicProblem, u: Array, point: BranchPoint) -> Array:
+    row = np.zeros_like(u)
+    row[-2] = 1.0
+    weights, amplitude = problem.weights(), problem.amplitude(u)
+    for _ in range(_CORRECTIONS):
+        linearised = problem.linearise(u)
+        change = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        size = float(np.sqrt(weights @ change**2))
+        if not np.isfinite(size) or size > 1e6:
+            break
+        # Far from the orbit a full step may lead to the saddle itself.
+        u = u + min(1.0, 0.5 * amplitude / size if size > 0.0 else 1.0) * change
+        if size <= 1e-9 * (1.0 + float(np.sqrt(weights @ u**2))):
+            if problem.amplitude(u) < 0.1 * amplitude:
+                break
+            return u
+    raise AnalysisError(f"{point.place}: no homoclinic orbit was found beside it; follow the "
+                        f"branch to a longer period, or take more intervals.")
