@@ -49,7 +49,7 @@ class CompiledBalance:
         """None where the period is unknown, or changes with the parameter in an unknown way."""
         found = problem.field
         if (not isinstance(found, ContactField) or problem.autonomous
-                or not (problem.turn is not None or found.constant_period)):
+                or (problem.turn is None and problem.fixed is None)):
             return None
         return cls(found)
 

@@ -252,7 +252,8 @@ def _beside(u, central, e, followed):
 def _add_memory(T, e):
     """Add what internal variables contribute to ``condensed`` (n, n + 1) and ``column``.
 
-    ``followed`` holds its last column, ``J_marched`` holds the derivatives at the states in which they were marched.
+    ``followed`` holds its last column, ``J_marched`` the derivatives at the states in which they
+    were marched.
     """
     room = e.room
     m, L, N, c = e.springs.shape[1], e.values.shape[1], len(e.tau), len(e.offsets)

@@ -63,7 +63,7 @@ FULL, EVENT, FAILED, COUPLED = range(4)
 def _corrected(u, guess, row, weights, e):
     """Newton's method from u = guess at right angles to a row.
 
-    Returns how often factors were made; zero where it fails, -1 where the modes cannot be separated.
+    Returns how often factors were made; zero where it fails, -1 where modes cannot be separated.
     """
     room = e.room
     n = len(room.residual)
