@@ -55,8 +55,8 @@ class Room(NamedTuple):
 class Equations(NamedTuple):
     """Equations of orbits over one parameter p, and how a branch is followed.
 
-    Arrays of ``system`` that depend on p lie in ``flat`` = ``base`` + p ``slope``. Where the loads
-    are affine in p at the samples, ``contact`` is the system of the contact forces alone; stiffness
+    Arrays of ``contact`` that depend on p are parts of ``flat`` = ``base`` + p ``slope``. Where the
+    loads are affine in p at the samples, it is the system of the contact forces alone; stiffness
     and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N,
     m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
     whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
@@ -66,7 +66,6 @@ class Equations(NamedTuple):
     scales of the displacements; ``nodes`` have internal variables.
     """
 
-    system: SystemArrays
     contact: SystemArrays
     flat: Array
     base: Array
@@ -96,7 +95,7 @@ ROOM = types.NamedTuple(
      block, block, _blocks, vector, vector, integers, integers, integers, matrix, block,
      block, *[vector] * 4, matrix], Room)
 EQUATIONS = types.NamedTuple(
-    [SYSTEM, SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, *[vector] * 3, i8, ROOM],
+    [SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, *[vector] * 3, i8, ROOM],
     Equations)
 
 

@@ -284,12 +284,22 @@ def _add_memory(T, e):
                     for column in range(n + 1):
                         room.forces[k, j, column] += by_memory * followed[k, i, column]
     for q in range(L):
-        for k in range(N):
-            part = e.projection[q, k]
-            for j in range(m):
+        for j in range(m):
+            row = square[q * m + j]
+            # Four samples at a time: the row is read a quarter as often.
+            for k in range(0, N - N % 4, 4):
+                p0, p1, p2, p3 = (e.projection[q, k], e.projection[q, k + 1],
+                                  e.projection[q, k + 2], e.projection[q, k + 3])
+                f0, f1, f2, f3 = (room.forces[k, j], room.forces[k + 1, j], room.forces[k + 2, j],
+                                  room.forces[k + 3, j])
                 for column in range(n):
-                    square[q * m + j, column] -= part * room.forces[k, j, column]
-                room.column[q * m + j] -= part * room.forces[k, j, n]
+                    row[column] -= (p0 * f0[column] + p1 * f1[column] + p2 * f2[column]
+                                    + p3 * f3[column])
+                room.column[q * m + j] -= p0 * f0[n] + p1 * f1[n] + p2 * f2[n] + p3 * f3[n]
+            for k in range(N - N % 4, N):
+                for column in range(n):
+                    row[column] -= e.projection[q, k] * room.forces[k, j, column]
+                room.column[q * m + j] -= e.projection[q, k] * room.forces[k, j, n]
 
 
 @routine
