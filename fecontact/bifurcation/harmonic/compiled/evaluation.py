@@ -12,7 +12,7 @@ from numba import types
 from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, PERIOD, STEADY, TURN
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
-from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, routine, vector
+from fecontact.core.compiled import block, f8, helper, kernel, matrix, routine, vector
 from fecontact.core.references import borrowed
 from fecontact.system.jacobian import batch_derivatives, batch_rates
 
@@ -357,24 +357,6 @@ def take_mean(e, mean):
         for j in range(m):
             mean[i, j] -= room.linear[0, i, j]
             mean[i, m + j] -= room.linear[1, i, j]
-
-
-@kernel(i8(vector, i8, EQUATIONS, matrix, matrix))
-def evaluate(u, derivatives, e, forces, mean):
-    """Fill forces (N, m) and leave ``residual`` and ``z`` at u (n + 1,) in the room of e.
-
-    With derivatives also ``condensed``, and the mean derivatives (m, 2 m) of the forces to q and
-    q'. Returns 0 where internal variables do not come to repeat, else 1.
-    """
-    u, e, forces, mean = borrowed(u), borrowed(e), borrowed(forces), borrowed(mean)
-    T = evaluate_at(u, derivatives != 0, e)
-    if not T > 0.0:
-        return 0
-    take_forces(u[len(u) - 1], e, forces)
-    if derivatives != 0:
-        take_mean(e, mean)
-        condense(u, T, True, e)
-    return 1
 
 
 @helper
