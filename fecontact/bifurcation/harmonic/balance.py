@@ -5,44 +5,22 @@ from functools import cached_property
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField, made_values
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
-from fecontact.core.errors import AnalysisError, FecontactError
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
 # Relative step of differences in a parameter that changes the period.
 _DIFFERENCE = 1e-5
-# Further values of a parameter, as factors, at which the period of the forcing is compared.
-_BESIDE = (0.97, 1.01, 1.043)
 UNREPEATED = ("The internal variables of friction do not come to repeat; take more samples a "
               "period.")
 _NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0))
-
-
-def turn_of(field: VectorField, values: Array, free: int) -> float | None:
-    """Product of the period of the forcing and a parameter, where it is the same for all values.
-
-    Then the parameter is a frequency, and the period need not be asked for, which takes long with
-    contact systems. Checked at values beside the given one.
-    """
-    found = []
-    for factor in (1.0, 0.97, 1.01, 1.043):
-        beside = values.copy()
-        beside[free] *= factor
-        try:
-            period = field.forcing_period(beside)
-        except FecontactError:
-            return None
-        if period is None or beside[free] == 0.0:
-            return None
-        found.append(period * float(beside[free]))
-    return found[0] if np.ptp(found) <= 1e-13 * abs(found[0]) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +54,10 @@ class Balance:
     periods : int
         Number of forcing periods in one period of the orbit.
     turn : float, optional
-        Product of the period of the forcing and the parameter, where this is a frequency; see
-        :func:`turn_of`.
+        Product of the period of the forcing and the parameter, where this is a frequency.
+    fixed : float, optional
+        Period of the forcing [s] where the parameter does not change it; see
+        :func:`fecontact.bifurcation.harmonic.timing.timing_of`.
     kept : Kept
         Deflections of elements that never slide.
     compiled : CompiledBalance, optional
@@ -94,6 +74,7 @@ class Balance:
     layout: Layout
     periods: int = 1
     turn: float | None = None
+    fixed: float | None = None
     kept: Kept = _NOTHING_KEPT
     compiled: CompiledBalance | None = None
 
@@ -104,7 +85,8 @@ class Balance:
     @cached_property
     def autonomous(self) -> bool:
         """Whether the period is an unknown."""
-        return self.turn is None and self.field.forcing_period(self.values) is None
+        return (self.turn is None and self.fixed is None
+                and self.field.forcing_period(self.values) is None)
 
     @cached_property
     def series(self) -> Series:
@@ -131,6 +113,8 @@ class Balance:
             return float(u[-2])
         if self.turn is not None:
             return self.periods * self.turn / float(u[-1])
+        if self.fixed is not None:
+            return self.periods * self.fixed
         given = self.field.forcing_period(self.parameters(u))
         assert given is not None
         return self.periods * given

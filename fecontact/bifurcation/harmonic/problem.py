@@ -17,7 +17,12 @@ from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import MOST_UNKNOWNS
-from fecontact.bifurcation.harmonic.compiled.evaluation import evaluate
+from fecontact.bifurcation.harmonic.compiled.linear_systems import (
+    DERIVATIVES,
+    RESIDUAL,
+    SOLUTION,
+    evaluate,
+)
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
@@ -37,6 +42,7 @@ _MOST_BENT = 0.2
 # Largest relative size of the odd harmonics of a doubled orbit that is a single one, and smallest
 # part of the tangent that leads back to doubled ones.
 _HALVES_MEET, _HALVES_PART = 0.02, 0.9
+_NONE = np.empty(0)
 
 
 class HarmonicLinearisation(Linearised):
@@ -82,8 +88,8 @@ class CompiledLinearisation(HarmonicLinearisation):
         room, m = self._equations.room, self.problem.layout.displacements
         forces, mean = np.empty((self.problem.samples, m)), np.empty((m, 2 * m))
         # The parameter may lie beside the range of the equations, where they hold too.
-        if not evaluate(np.ascontiguousarray(self.u), int(derivatives), self._equations, forces,
-                        mean):
+        if not evaluate(np.ascontiguousarray(self.u), DERIVATIVES if derivatives else RESIDUAL,
+                        self._equations, forces, mean, _NONE, _NONE, _NONE):
             raise AnalysisError(UNREPEATED)
         found = room.residual.copy(), room.z.copy(), forces
         n = len(room.residual)
@@ -116,6 +122,25 @@ class CompiledLinearisation(HarmonicLinearisation):
 
     def _samples(self) -> tuple[Array, Array]:
         return self._whole[2], self._whole[4]
+
+
+class BodyLinearisation(HarmonicLinearisation):
+    """The same of forced bodies of many modes, of which compiled code solves few together."""
+
+    def __init__(self, problem: "HarmonicProblem", u: Array, e: Equations) -> None:
+        super().__init__(problem, u)
+        self._equations: Equations | None = e
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """See :meth:`Linearised.solve`."""
+        if self._equations is not None:
+            m, found = self.problem.layout.displacements, np.array(rhs, dtype=float)
+            forces, mean = np.empty((self.problem.samples, m)), np.empty((m, 2 * m))
+            if evaluate(np.ascontiguousarray(self.u), SOLUTION, self._equations, forces, mean,
+                        np.ascontiguousarray(row), self.problem.weights(), found):
+                return found
+            self._equations = None
+        return super().solve(row, rhs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +180,12 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     def _about(self, u: Array, derivatives: bool) -> HarmonicLinearisation:
         if self.autonomous and not u[-2] > 0.0:
             raise AnalysisError("The period became negative.")
-        e = self.equations(float(u[-1])) if self.size <= MOST_UNKNOWNS else None
-        return (HarmonicLinearisation(self, u) if e is None
-                else CompiledLinearisation(self, u, e, derivatives))
+        e = self.equations(float(u[-1]))
+        if e is None:
+            return HarmonicLinearisation(self, u)
+        if self.size > MOST_UNKNOWNS:
+            return BodyLinearisation(self, u, e)
+        return CompiledLinearisation(self, u, e, derivatives)
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Predictor along the tangent, with the curvature of the last step."""

@@ -12,13 +12,13 @@ import numpy as np
 from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
-from fecontact.bifurcation.harmonic.balance import turn_of
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.layout import element_rows, layout_of
 from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import with_harmonics
+from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.bifurcation.orbits import starts as orbit_starts
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
@@ -45,7 +45,7 @@ def problem_for(
     found = HarmonicProblem(
         field, values.copy(), free, method.harmonics, method.count,
         np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout, periods,
-        turn_of(field, values, free), kept, stability=method.stability)
+        *timing_of(field, values, free), kept, stability=method.stability)
     return replace(found, compiled=CompiledBalance.of(found))
 
 

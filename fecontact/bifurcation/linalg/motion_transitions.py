@@ -21,7 +21,6 @@ from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 
-
 @cache
 def integrals(points: tuple[float, ...]) -> tuple[Array, Array]:
     """A (s, s) and weights b (s,) of the collocation points c in (0, 1].

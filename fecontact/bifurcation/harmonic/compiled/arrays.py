@@ -55,18 +55,17 @@ class Room(NamedTuple):
 class Equations(NamedTuple):
     """Equations of orbits over one parameter p, and how a branch is followed.
 
-    Arrays of ``system`` that depend on p lie in ``flat`` = ``base`` + p ``slope``. Where the loads
-    are affine in p at the samples, ``contact`` is the system of the contact forces alone; stiffness
-    and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N, m)
-    at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the whole
-    system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to which
-    internal variables return. Numbers are the period times p or 0, the period, least and largest p
-    for which this holds, whether contact forces do not depend on p and t, bounds of the branch,
-    tolerance, largest step, largest turn, Newton's rounding. ``limits`` (m,) bound the scales of the
-    displacements; ``nodes`` have internal variables.
+    Arrays of ``contact`` that depend on p are parts of ``flat`` = ``base`` + p ``slope``. Where the
+    loads are affine in p at the samples, it is the system of the contact forces alone; stiffness
+    and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N,
+    m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
+    whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
+    which internal variables return. Numbers are the period times p or 0, the period, least and
+    largest p for which this holds, whether contact forces do not depend on p and t, bounds of the
+    branch, tolerance, largest step, largest turn, Newton's rounding. ``limits`` (m,) bound the
+    scales of the displacements; ``nodes`` have internal variables.
     """
 
-    system: SystemArrays
     contact: SystemArrays
     flat: Array
     base: Array
@@ -96,7 +95,7 @@ ROOM = types.NamedTuple(
      block, block, _blocks, vector, vector, integers, integers, integers, matrix, block,
      block, *[vector] * 4, matrix], Room)
 EQUATIONS = types.NamedTuple(
-    [SYSTEM, SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, *[vector] * 3, i8, ROOM],
+    [SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, *[vector] * 3, i8, ROOM],
     Equations)
 
 
@@ -136,5 +135,5 @@ def room_for(
         np.empty(k * k), np.empty((N if c else 0, c, n + 1)),
         np.empty((N if c else 0, m, n + 1)), np.empty((N, nodes, s, s)), np.empty(k * (k + 1)),
         np.empty((k + 1) ** 2), np.empty(k + 1, dtype=np.int64), np.arange(m),
-        np.array([coupled]), np.empty((2, m)), np.empty((3, m, 2 * m)), np.empty((2, m, m)), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n + 1), np.empty((10, n + 1)))
+        np.array([coupled]), np.empty((2, m)), np.empty((3, m, 2 * m)), np.empty((2, m, m)),
+        np.empty(n), np.empty(n), np.empty(n), np.empty(n + 1), np.empty((10, n + 1)))

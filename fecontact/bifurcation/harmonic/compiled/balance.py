@@ -49,7 +49,7 @@ class CompiledBalance:
         """None where the period is unknown, or changes with the parameter in an unknown way."""
         found = problem.field
         if (not isinstance(found, ContactField) or problem.autonomous
-                or not (problem.turn is not None or found.constant_period)):
+                or (problem.turn is None and problem.fixed is None)):
             return None
         return cls(found)
 
@@ -77,7 +77,7 @@ class CompiledBalance:
         if key not in self.known:
             self.known[key] = self._made(problem, near, value)
         found = self.known[key]
-        if not small and found.contact is found.system:
+        if not small and found.contact is near.arrays:
             return None
         if found.offsets is not problem.kept.offsets:
             found = self.known[key] = found._replace(offsets=problem.kept.offsets)
@@ -97,15 +97,15 @@ class CompiledBalance:
         most = m if problem.size <= MOST_UNKNOWNS else max(1, MOST_UNKNOWNS // L)
         room = arrays.room_for(problem.harmonics, problem.samples, m, layout.memory, layout.nodes,
                                most)
-        system, contact = near.arrays, near.arrays
+        contact = near.arrays
         body, given = np.zeros((4, m, m)), np.zeros((2, problem.samples, m))
         found = self._without_contact(problem, near)
         if found is not None:
-            contact = _contact_alone(system)
+            contact = _contact_alone(contact)
             body, given = found
             numbers[arrays.STEADY] = self._steady(near)
         return arrays.Equations(
-            system, contact, near.flat, near.base, near.slope, series.times, series.values,
+            contact, near.flat, near.base, near.slope, series.times, series.values,
             series.projection, series.cosines, series.sines, body, given,
             series.projection @ given, problem.kept.rows, problem.kept.offsets, np.full(m, np.inf),
             numbers, layout.nodes, room)

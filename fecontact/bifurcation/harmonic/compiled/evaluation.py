@@ -12,7 +12,7 @@ from numba import types
 from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, PERIOD, STEADY, TURN
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
-from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, routine, vector
+from fecontact.core.compiled import block, f8, helper, kernel, matrix, routine, vector
 from fecontact.core.references import borrowed
 from fecontact.system.jacobian import batch_derivatives, batch_rates
 
@@ -252,7 +252,8 @@ def _beside(u, central, e, followed):
 def _add_memory(T, e):
     """Add what internal variables contribute to ``condensed`` (n, n + 1) and ``column``.
 
-    ``followed`` holds its last column, ``J_marched`` holds the derivatives at the states in which they were marched.
+    ``followed`` holds its last column, ``J_marched`` the derivatives at the states in which they
+    were marched.
     """
     room = e.room
     m, L, N, c = e.springs.shape[1], e.values.shape[1], len(e.tau), len(e.offsets)
@@ -283,12 +284,22 @@ def _add_memory(T, e):
                     for column in range(n + 1):
                         room.forces[k, j, column] += by_memory * followed[k, i, column]
     for q in range(L):
-        for k in range(N):
-            part = e.projection[q, k]
-            for j in range(m):
+        for j in range(m):
+            row = square[q * m + j]
+            # Four samples at a time: the row is read a quarter as often.
+            for k in range(0, N - N % 4, 4):
+                p0, p1, p2, p3 = (e.projection[q, k], e.projection[q, k + 1],
+                                  e.projection[q, k + 2], e.projection[q, k + 3])
+                f0, f1, f2, f3 = (room.forces[k, j], room.forces[k + 1, j], room.forces[k + 2, j],
+                                  room.forces[k + 3, j])
                 for column in range(n):
-                    square[q * m + j, column] -= part * room.forces[k, j, column]
-                room.column[q * m + j] -= part * room.forces[k, j, n]
+                    row[column] -= (p0 * f0[column] + p1 * f1[column] + p2 * f2[column]
+                                    + p3 * f3[column])
+                room.column[q * m + j] -= p0 * f0[n] + p1 * f1[n] + p2 * f2[n] + p3 * f3[n]
+            for k in range(N - N % 4, N):
+                for column in range(n):
+                    row[column] -= e.projection[q, k] * room.forces[k, j, column]
+                room.column[q * m + j] -= e.projection[q, k] * room.forces[k, j, n]
 
 
 @routine
@@ -346,24 +357,6 @@ def take_mean(e, mean):
         for j in range(m):
             mean[i, j] -= room.linear[0, i, j]
             mean[i, m + j] -= room.linear[1, i, j]
-
-
-@kernel(i8(vector, i8, EQUATIONS, matrix, matrix))
-def evaluate(u, derivatives, e, forces, mean):
-    """Fill forces (N, m) and leave ``residual`` and ``z`` at u (n + 1,) in the room of e.
-
-    With derivatives also ``condensed``, and the mean derivatives (m, 2 m) of the forces to q and
-    q'. Returns 0 where internal variables do not come to repeat, else 1.
-    """
-    u, e, forces, mean = borrowed(u), borrowed(e), borrowed(forces), borrowed(mean)
-    T = evaluate_at(u, derivatives != 0, e)
-    if not T > 0.0:
-        return 0
-    take_forces(u[len(u) - 1], e, forces)
-    if derivatives != 0:
-        take_mean(e, mean)
-        condense(u, T, True, e)
-    return 1
 
 
 @helper

@@ -52,7 +52,7 @@ _OVERSHOOT = 1.2
 _GROWN = 1.5
 
 # Relative errors of tangents and of Newton steps where they are found by iteration.
-_TANGENT, _INEXACT = 1e-9, 1e-4
+_TANGENT, _INEXACT = 1e-7, 1e-3
 
 # Why a call ended: as many points as were asked for, something to look at in the next step, a step
 # that fails, modes that cannot be separated.
@@ -63,7 +63,7 @@ FULL, EVENT, FAILED, COUPLED = range(4)
 def _corrected(u, guess, row, weights, e):
     """Newton's method from u = guess at right angles to a row.
 
-    Returns how often factors were made; zero where it fails, -1 where the modes cannot be separated.
+    Returns how often factors were made; zero where it fails, -1 where modes cannot be separated.
     """
     room = e.room
     n = len(room.residual)

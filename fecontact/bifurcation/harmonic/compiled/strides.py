@@ -20,8 +20,9 @@ from fecontact.bifurcation.orbits.floquet import Floquet
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
-# Points in the first and in later calls, and numbers that a call may return.
-_FIRST, _LATER, _NUMBERS = 8, 64, 4_000_000
+# Points in the first and in later calls, numbers that a call may return, and entries of derivatives
+# at the samples that it may make (a second or so, in which it cannot be interrupted).
+_FIRST, _LATER, _NUMBERS, _ENTRIES = 8, 64, 4_000_000, 8_000_000
 # Without stability folds alone end a call, and compiled code sees these itself.
 _WITHOUT_STABILITY = 256
 # Steps that are made one by one where modes cannot be separated, before compiled code is tried.
@@ -76,7 +77,8 @@ class Strides:
             e.limits[:] = problem.scales[: len(e.limits)]
         n, m, N = len(here.u), problem.layout.displacements, problem.samples
         c = problem.layout.memory
-        count = max(1, min(most, self.count, _NUMBERS // (N * (m + c) + 2 * n)))
+        count = max(1, min(most, self.count, _NUMBERS // (N * (m + c) + 2 * n),
+                           max(_FIRST, _ENTRIES // (N * (m + c) ** 2))))
         out = arrays.Reached(
             np.empty((count, n)), np.empty((count, n)), np.empty((count, N, c)),
             np.empty((count, N, m)), np.empty((count, m, 2 * m)), np.empty((count, m + 1)),

@@ -1,0 +1,176 @@
+"""Compiled steps of bodies with more modes than are solved for together; loads and parameters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from meshes_for_tests import rectangle
+
+import fecontact as fc
+from fecontact.bifurcation import (
+    ContinuationOptions,
+    HarmonicBalance,
+    contact_field,
+    frequency_response,
+)
+from fecontact.bifurcation.continuation.pseudo_arclength import start_of
+from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
+from fecontact.bifurcation.harmonic.compiled.strides import Strides
+from fecontact.bifurcation.harmonic.problem import CompiledLinearisation
+from fecontact.bifurcation.harmonic.starts import problem_for, restored
+from fecontact.laws import (
+    ConstantFriction,
+    JenkinsFriction,
+    PrescribedForce,
+    RoughSurface,
+)
+
+BOUNDS = (500.0, 1500.0)
+
+
+def block(stiffness=1e6, damping=0.02):
+    """A steel block of 12 modes on eight nodes of rough ground; 228 unknowns with 9 harmonics."""
+    body = fc.ElasticBody(rectangle(0.2, 0.02, 16, 2), fc.Material(), 0.01)
+    basis = fc.modal_basis(body, 12, contact="bottom", contact_nodes=8, reduction="vibration",
+                           B=(0.0, 0.01), C=(0.1, 0.02), damping=damping)
+    return fc.ContactSystem(
+        basis, normal=RoughSurface(stiffness, 1e-4, 300.0),
+        friction=ConstantFriction(0.3, smoothing_slope=50.0), load=fc.Load(100.0),
+        drive=fc.Drive(stiffness_x=1e5, damping_x=30.0, amplitude_x=2e-4, angular_frequency=500.0))
+
+
+@pytest.fixture
+def strides(monkeypatch):
+    """Numbers of steps that compiled code has made, one for each call."""
+    made, plain = [], Strides.stride
+
+    def counted(self, *given):
+        found = plain(self, *given)
+        made.append(0 if found is None else len(found.points))
+        return found
+
+    monkeypatch.setattr(Strides, "stride", counted)
+    return made
+
+
+def test_steps_of_a_body_are_those_of_plain_code(strides, monkeypatch):
+    """The same response, although four modes alone are solved for together."""
+    options = ContinuationOptions(points=25, largest_step=0.05)
+    fast = frequency_response(block(), BOUNDS, options=options).branches[0]
+    assert sum(strides) >= 20
+    monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
+    slow = frequency_response(block(), BOUNDS, options=options).branches[0]
+    field = contact_field(block(), ["drive.angular_frequency"])
+    end = min(fast.parameter[-1], slow.parameter[-1])
+    for part in (0.3, 0.9):
+        value = BOUNDS[0] + part * (end - BOUNDS[0])
+        mine, theirs = fast.at(field, value), slow.at(field, value)
+        size = np.abs(theirs.u[:-1]).max()
+        assert mine.u[:-1] == pytest.approx(theirs.u[:-1], abs=1e-8 * size)
+    for point in fast.points[3::7]:
+        problem, u, tangent = restored(field, point)
+        here = problem.linearise(u)
+        # The residual is small beside the forces of the highest modes.
+        stiffness = field.system().arrays.stiffness.diagonal().max()
+        assert np.abs(here.residual).max() < 1e-9 * stiffness * np.abs(u[:-1]).max()
+        scaled = np.abs(here.condensed * tangent).sum(axis=1)
+        # Tangents are those at the prediction of the step.
+        assert np.abs(here.condensed @ tangent).max() < 1e-3 * scaled.max()
+        stored = problem.point(u, here, tangent)
+        for name in ("minimum", "maximum"):
+            assert point.values[name] == pytest.approx(stored[name], rel=1e-6, abs=1e-9)
+        for name in ("truncation_error", "residual"):
+            assert point.values[name] == pytest.approx(stored[name], rel=0.02)
+        assert np.abs(point.values["multipliers"]) == pytest.approx(
+            np.abs(stored["multipliers"]), abs=1e-7)
+
+
+def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(strides):
+    """Modes are solved for apart; iteration makes good what that neglects."""
+    field = contact_field(block(), ["drive.angular_frequency"])
+    options = ContinuationOptions(bounds=BOUNDS, step=0.01, largest_step=0.01)
+    response = frequency_response(block(), BOUNDS, options=ContinuationOptions(points=1),
+                                  method=HarmonicBalance(9, stability=None))
+    problem, u, _ = restored(field, response.branches[0].points[0])
+    start = start_of(problem, u, options, None, 1.0)
+    far = replace(start, u=np.append(start.u[:-1], 1400.0))
+    found = problem.strider(options).stride(problem, start, 0.01, 6, far)
+    assert strides[0] >= 3
+    room = problem.equations(500.0).room
+    assert 1 <= room.coupled[0] < 12
+    for at in found.points:
+        unit = np.zeros(len(u))
+        unit[-1] = 1.0
+        weights = problem.weights()
+        exact = np.linalg.solve(np.vstack([problem.linearise(at.u).condensed,
+                                           weights * at.tangent]), unit)
+        exact /= np.sqrt(weights @ exact**2)
+        # Tangents are those at the prediction of the step.
+        assert np.sqrt(weights @ (exact - at.tangent) ** 2) < 1e-3
+    last = found.points[-1].tangent
+    assert np.sqrt(weights @ (exact - last) ** 2) < 1e-8
+
+
+def test_contact_as_stiff_as_the_modes_is_left_to_plain_code(strides):
+    """Then modes cannot be solved for apart."""
+    options = ContinuationOptions(points=4, largest_step=0.05)
+    method = HarmonicBalance(9, stability=None)
+    found = frequency_response(block(1e11), (2e4, 3e4), method=method, options=options)
+    assert len(found.branches[0]) == 4
+    assert sum(strides) == 0
+
+
+def masses(friction):
+    """Three masses in a row, two of them on the ground, with a force in two harmonics."""
+    rows = np.zeros((2, 3, 3))
+    rows[0, 0, 0], rows[1, 0, 2] = 1.0, 1.0
+    B = np.zeros((3, 3))
+    B[0, 1] = 1.0
+    K = np.array([[3.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    basis = fc.basis_from_matrices(np.eye(3), K, {"contact": rows, "B": B, "C": B},
+                                   damping=0.04 * K)
+    return fc.ContactSystem(
+        basis, normal=PrescribedForce((1.0, 0.4)), friction=friction,
+        drive=fc.Drive(stiffness_x=1.0, damping_x=0.2, amplitude_x=0.8, angular_frequency=0.9,
+                       dashpots="relative"))
+
+
+@pytest.mark.parametrize("name", ["drive.angular_frequency", "drive.amplitude_x",
+                                  "drive.stiffness_x", "friction.friction_coefficient"])
+@pytest.mark.parametrize("friction", [JenkinsFriction((0.5, 0.3), 0.5, 1e-2),
+                                      ConstantFriction(0.3, smoothing_slope=3.0)])
+def test_derivatives_are_those_of_the_residual(name, friction):
+    """Loads, stiffness and damping are linear in the parameter; laws are differenced."""
+    field = contact_field(masses(friction), [name])
+    problem = problem_for(field, field.values, 0, HarmonicBalance(3, 48),
+                          np.ones(field.dimension + 2))
+    u = np.append(np.random.default_rng(2).normal(size=problem.size), field.values[0])
+    here = problem.linearise(u)
+    assert isinstance(here, CompiledLinearisation)
+    steady = problem.equations(float(u[-1])).numbers[4]
+    assert steady == (name.startswith("drive"))
+    differences = np.empty(here.condensed.shape)
+    for k in range(len(u)):
+        h = 1e-6 * np.eye(len(u))[k]
+        differences[:, k] = (problem.evaluate(u + h).residual
+                             - problem.evaluate(u - h).residual) / 2e-6
+    assert here.condensed == pytest.approx(differences, abs=1e-6 * np.abs(differences).max())
+
+
+@pytest.mark.parametrize("friction", [JenkinsFriction((0.5, 0.3), 0.5, 1e-2),
+                                      ConstantFriction(0.3, smoothing_slope=3.0)])
+def test_residual_and_forces_are_those_of_plain_code(friction, monkeypatch):
+    """With a dashpot between the driven point and its moving end, whose pull grows with p."""
+    field = contact_field(masses(friction), ["drive.angular_frequency"])
+    method, scales = HarmonicBalance(4, 64), np.ones(field.dimension + 2)
+    fast = problem_for(field, field.values, 0, method, scales)
+    u = np.append(np.random.default_rng(3).normal(size=fast.size), 0.7)
+    one = fast.linearise(u)
+    monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
+    other = problem_for(field, field.values, 0, method, scales).linearise(u)
+    assert isinstance(one, CompiledLinearisation)
+    assert one.residual == pytest.approx(other.residual, abs=1e-12)
+    assert one.memory == pytest.approx(other.memory, abs=1e-12)
+    assert one.condensed == pytest.approx(other.condensed, abs=1e-7)
+    for mine, theirs in zip(one._samples(), other._samples(), strict=True):
+        assert mine == pytest.approx(theirs, abs=1e-12)
