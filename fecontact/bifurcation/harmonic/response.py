@@ -23,6 +23,7 @@ from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_of_orbits, observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
@@ -239,8 +240,9 @@ def branch_of_response(
                 told = error
                 continue
             direction = 1.0 if begin < options.bounds[1] else -1.0
-            return branches.follow(problem, u, None, method, options, direction=direction,
-                                   both=both)
+            branch = branches.follow(problem, u, None, method, options, direction=direction,
+                                     both=both)
+            return replace(branch, message=stall_reason(field, branch))
     raise told
 
 

@@ -85,6 +85,8 @@ def modes(
         "amplitude."))] = None,
     amplitudes: Annotated[tuple[float, float] | None, Parameter(help=(
         "Smallest and largest amplitude of a nonlinear mode [m]."))] = None,
+    resume: Annotated[bool, Parameter(negative=(), help=(
+        "Go on with an interrupted nonlinear mode."))] = False,
 ) -> int:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
@@ -92,7 +94,8 @@ def modes(
     resolve; --complex, --movie and --nonlinear are for all bodies together, with modes that are
     counted through. With --nonlinear, frequency and damping over the amplitude are written
     (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page whose points play the motion (.html);
-    harmonics and the observed displacement are those of [response].
+    harmonics, the observed displacement and preload are those of [response]. It is stored as it
+    grows; Ctrl-C stops it, --resume goes on where it was.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import interfaces_of, read_study
@@ -146,13 +149,14 @@ def modes(
             plot_convergence(result, path=picture)
             echo_written(picture)
         if nonlinear is None:
-            if amplitudes is not None:
-                raise InputError("--amplitudes is for a nonlinear mode; add --nonlinear with its "
-                                 "number.")
+            if amplitudes is not None or resume:
+                option = "--amplitudes" if amplitudes is not None else "--resume"
+                raise InputError(f"{option} is for a nonlinear mode; add --nonlinear with its "
+                                 f"number.")
             return 0
         from fecontact.cli.mode_results import follow_mode
 
-        return follow_mode(described, nonlinear, amplitudes, folder)
+        return follow_mode(described, nonlinear, amplitudes, folder, resume)
 
 
 def preload(
