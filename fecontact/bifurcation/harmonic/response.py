@@ -155,7 +155,7 @@ def frequency_response(
     """
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
     require_kind("frequency_response", (HarmonicBalance, type(None)), method=method)
-    held = None if preload is None else _preloaded(system, preload)
+    held = preloaded(system, preload)
     chosen = options_of(
         options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
     level_name, values = levels_of(levels)
@@ -188,10 +188,12 @@ def frequency_response(
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
 
 
-def _preloaded(
-    system: ContactSystem | VectorField, preload: LoadHistory | RestState | Array
-) -> Array:
-    """State (d,) of a preload."""
+def preloaded(
+    system: ContactSystem | VectorField, preload: LoadHistory | RestState | Array | None
+) -> Array | None:
+    """State (d,) of a preload; None without one."""
+    if preload is None:
+        return None
     if not isinstance(system, ContactSystem):
         raise InputError("preload is for contact systems; a vector field has no springs and "
                          "sliders that keep a deflection.")

@@ -14,11 +14,13 @@ def init(
     file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
-    shape: Annotated[Literal["beam", "pendulum", "block", "pad", "solid", "mesh", "sweep"],
+    shape: Annotated[Literal["beam", "pendulum", "block", "pad", "solid", "mesh", "sweep",
+                              "response"],
                      Parameter(
         help="Beam on wavy ground, pendulum on a stop, block on a moving belt, a pad on a block, "
         "which are two bodies, a solid pad on a belt in space, a part from a mesh file of your "
-        "own, or a sweep over the speed of a belt.")] = "beam",
+        "own, a sweep over the speed of a belt, or frequency responses of a block held by "
+        "friction.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
@@ -33,7 +35,8 @@ def init(
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
     following = {"mesh": "put your mesh beside it as part.msh, or change its name there; then: "
-                         "fecontact mesh", "sweep": "next: fecontact sweep"}
+                         "fecontact mesh", "sweep": "next: fecontact sweep",
+                 "response": "next: fecontact response"}
     echo(f"{file} is written; {following.get(shape, 'next: fecontact run')} {file}")
 
 
