@@ -2,7 +2,6 @@
 
 import csv
 import io
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,40 +15,58 @@ if TYPE_CHECKING:
 _COLUMNS = ("kind", "amplitude", "frequency_hz", "damping_ratio", "loss", "energy", "stable",
             "truncation_error")
 _SHOWN = 8  # rows of the table
+# Keys of [response] that a mode does not read.
+_OF_RESPONSES = ("parameter", "bounds", "bounds_hz", "start", "levels", "most_harmonics",
+                 "stability", "step", "largest_step", "points")
+_SAME = 1e-3  # relative difference of amplitudes that mean the same
 
 
 def follow_mode(
-    study: "Study", number: int, amplitudes: tuple[float, float] | None, folder: Path
+    study: "Study", number: int, amplitudes: tuple[float, float] | None, folder: Path,
+    resume: bool = False,
 ) -> int:
     """Follow a nonlinear mode of a study and write its files; returns the exit code.
 
     Raises
     ------
     InputError
-        Without amplitudes, or for a mode or point that does not exist.
+        Without amplitudes, for a mode or point that does not exist, or with nothing to resume.
     """
     if amplitudes is None:
         raise InputError("--nonlinear needs the smallest and largest amplitude of the mode in m; "
                          "give --amplitudes LOW HIGH.")
-    from fecontact.bifurcation.continuation.problem import ContinuationOptions
-    from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import nonlinear_mode
+    from fecontact.bifurcation.modes_of_study import follow_mode as followed
+    from fecontact.bifurcation.modes_of_study import unfinished
     from fecontact.bifurcation.responses import observed_point
+    from fecontact.core.files.locks import locked
     from fecontact.core.progress import progress_bar
     from fecontact.core.tables import located
+    from fecontact.output.files.branches import write_mode
 
     wanted, system = study.response, study.system()
     with located(f"{study.title}: [response]:"):
         observe = observed_point(system, wanted)
-    options = ContinuationOptions(points=wanted.points, step=0.02, largest_step=0.1)
-    with (progress_bar(f"Mode {number}", wanted.points) as tell,
-          located("--nonlinear:", "nonlinear_mode")):
-        mode = nonlinear_mode(system, amplitudes, number, observe=observe, method=wanted.method(),
-                              options=replace(options, progress=tell))
-    with waiting("Writing"):
-        files = write_mode_results(study, mode, observe, folder)
+    file = folder / f"{study.name}-mode-{number}.h5"
+
+    def keep(mode: "NonlinearMode") -> None:
+        write_mode(file, mode, system=system, study=study.to_toml(), root=study.folder)
+
+    with locked(folder / f".{file.stem}.lock",
+                f"Another command is writing {file}; wait for it, or choose another folder with "
+                f"-o."):
+        earlier = _earlier(study, file, amplitudes) if resume else None
+        mode = earlier
+        if earlier is None or unfinished(earlier, wanted.points):
+            preload = study.load_history() if wanted.preload else None
+            with (progress_bar(f"Mode {number}", wanted.points) as tell,
+                  located("--nonlinear:", "nonlinear_mode")):
+                mode = followed(system, wanted, amplitudes, number, tell, earlier, keep, preload)
+        assert mode is not None
+        with waiting("Writing"):
+            files = write_mode_results(study, mode, observe, folder)
     echo(f"\nnonlinear mode {number}: {mode.branch.status.value}")
     if mode.branch.message:
-        echo(f"The last step failed: {mode.branch.message}")
+        echo(f"note: {mode.branch.message}")
     show(mode_table(mode))
     echo_written(*files)
     if mode.branch.status.name == "INTERRUPTED":
@@ -57,6 +74,29 @@ def follow_mode(
     if mode.branch.status.name == "STALLED":
         return fail("the steps became too small to go on; what was computed is written.", 1)
     return 0
+
+
+def _earlier(study: "Study", file: Path, amplitudes: tuple[float, float]) -> "NonlinearMode":
+    """The interrupted mode of a study.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is one of other values.
+    """
+    from fecontact.cli.run_files import require_same_study
+    from fecontact.output.files.branches import read_mode
+
+    if not file.is_file():
+        raise InputError(f"There is no interrupted mode to go on with: {file} does not exist; "
+                         f"leave out --resume.")
+    require_same_study(study, file, *_OF_RESPONSES)
+    mode = read_mode(file)
+    begins = float(mode.amplitude[0])
+    if abs(begins - amplitudes[0]) > _SAME * amplitudes[0]:
+        raise InputError(f"{file} begins at the amplitude {begins:.6g}, not at "
+                         f"{amplitudes[0]:g}; give the same --amplitudes, or leave out --resume.")
+    return mode
 
 
 def write_mode_results(

@@ -41,6 +41,25 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
     return study.with_(**values) if values else study
 
 
+def require_same_study(study: "Study", file: Path, *free: str) -> None:
+    """Raise InputError if a file of results was computed with other values.
+
+    Sections that say nothing of its numbers may differ, and the keys ``free`` of [response].
+    """
+    from fecontact.laws.registry import law_files
+    from fecontact.output.files.stored_system import read_model
+    from fecontact.study.study import Study
+
+    stored = Study.from_toml(read_model(file, law_files(study.tables())).study or "", study.path)
+    kept = ("output", "render", "sweep", "branch", "simulation", "wear")
+    same = replace(stored, **{name: getattr(study, name) for name in kept},
+                   response=replace(stored.response, **{name: getattr(study.response, name)
+                                                        for name in free}))
+    if same != study:
+        raise InputError(f"{file} was computed with other values than {study.title} has now; "
+                         f"leave out --resume.")
+
+
 def write_run(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
     """Write a run and its plots into a folder; returns the files."""
     from fecontact.output.files.case import write_case

@@ -18,7 +18,10 @@ from fecontact.bifurcation import (
     nonlinear_mode,
     orbit_branch,
 )
-from fecontact.bifurcation.nonlinear_modes.linear_start import unforced
+from fecontact.bifurcation.nonlinear_modes.linear_start import (
+    unforced,
+    with_mass_damping,
+)
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import FourParameterIwanFriction, Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.reduction import CubicSpring, point_masses
@@ -188,6 +191,38 @@ def test_static_loads_stay_and_loads_in_time_go():
     # The mean moves with the amplitude, and even harmonics appear.
     assert abs(mode.coordinates(0)[-1].real - x) > 0.05
     assert np.abs(mode.harmonic(2)[-1]) > 0.02
+
+
+def pushed_jenkins(force):
+    """A constant force on the mass of ``jenkins_system``, without other damping."""
+    return jenkins_system().with_(
+        **{"drive.damping_x": 0.0, "drive.amplitude_x": 0.0},
+        load=fc.Load(forces=(fc.PointLoad("B", "x", signal=fc.laws.Constant(force)),)))
+
+
+@pytest.mark.parametrize(("force", "preload", "mean"), [
+    (0.8, None, 0.8), (0.8, (0.8 / 1.5, 0.0, 0.8 / 1.5), 0.8 / 1.5), (2.0, (1.0, 0.0, 2.0), 1.0)])
+def test_mode_about_the_static_deflection(force, preload, mean):
+    """Without preload the spring alone carries the force, with it the element as much as it may."""
+    system = pushed_jenkins(force)
+    mode = nonlinear_mode(system, (1e-3, 5.0), method=HarmonicBalance(9, 512),
+                          preload=None if preload is None else np.array(preload))
+    middle = mode.coordinates(0).real[:, 0]
+    assert middle[0] == pytest.approx(mean, abs=6e-4)
+    # An element at its limit gives back half the range of the motion: k_d X / (k + k_d).
+    if force == 2.0:
+        small = mode.amplitude < 0.5
+        assert middle[small] == pytest.approx(1.0 + 0.5 * mode.amplitude[small], abs=1e-5)
+    assert mode.angular_frequency[0] == pytest.approx(np.sqrt(1.5), rel=1e-7)
+    # Sliding to both sides leaves nothing of the preload.
+    assert middle[-1] == pytest.approx(force, abs=1e-4)
+    for amplitude in (0.7, 2.5):
+        index = int(np.argmin(np.abs(mode.amplitude - amplitude)))
+        orbit = mode.orbit(index)
+        run = fc.simulate(with_mass_damping(unforced(system), float(mode.xi[index])),
+                          1.0 / mode.frequency[index], initial=orbit.states[0], rtol=1e-9,
+                          outputs=len(orbit.times))
+        assert np.abs(run.states - orbit.states)[:, 0].max() < 2e-3 * mode.amplitude[index]
 
 
 def test_free_bodies_vibrate_about_where_they_are():

@@ -17,6 +17,7 @@ from fecontact.bifurcation import (
     nonlinear_mode,
     resonance_curve,
 )
+from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.response import rest_state
 from fecontact.bifurcation.harmonic.starts import problem_for
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
@@ -132,8 +133,9 @@ def test_two_resonances_of_a_damper_that_slides_on():
     assert "resonances" in repr(found)
 
 
-@pytest.mark.parametrize("condition", ["amplitude", "phase"])
-def test_derivatives_of_the_resonance_are_those_of_its_residual(condition):
+@pytest.mark.parametrize(("condition", "window"), [
+    ("amplitude", 0.0), ("phase", 0.0), ("amplitude", 0.05)])
+def test_derivatives_of_the_resonance_are_those_of_its_residual(condition, window):
     system = hardening()
     name = "load.forces.0.signal.amplitude"
     field = contact_field(system, [FREQUENCY, name])
@@ -142,7 +144,14 @@ def test_derivatives_of_the_resonance_are_those_of_its_residual(condition):
     rng = np.random.default_rng(2)
     u = np.concatenate([rng.normal(size=orbit.size), [1.3, 0.5]])
     problem = PeakProblem(orbit, 1, 1.0, field.displacement_row("a.p", "y"), condition,
-                          rng.normal(size=orbit.size + 1), rest_state(field, field.values))
+                          rng.normal(size=orbit.size + 1), rest_state(field, field.values),
+                          window=window)
+    if window:
+        # Both sides lie on the response, near which the orbit must be.
+        y = starts.corrected(orbit, np.append(np.zeros(orbit.size), 1.3))[1]
+        u[:-1], weights = y, orbit.weights()
+        along = orbit.linearise(y).solve(np.eye(len(y))[-1], np.eye(len(y))[-1])
+        problem = replace(problem, border=weights * along / np.sqrt(weights @ along**2))
     differences = np.empty((orbit.size + 1, len(u)))
     for k in range(len(u)):
         h = 1e-6 * np.eye(len(u))[k]
@@ -207,6 +216,49 @@ def test_optimal_load_of_a_friction_damper(damper):
         assert amplitude == pytest.approx(response.amplitude(level).max(), rel=1e-4)
 
 
+@pytest.mark.parametrize("samples", [128, 512])
+def test_peak_with_memory_is_that_of_responses(damper, samples):
+    """The closed form of the best load, and the largest amplitude of responses on its way."""
+    system, _ = damper
+    method = HarmonicBalance(1, samples)
+    found = resonance_curve(system, (1.2, 3.0), "normal.force", (0.7, 1.5), method=method,
+                            options=ContinuationOptions(points=60))
+    assert found.condition == "amplitude"
+    assert found.parameter[-1] == pytest.approx(3.0, rel=1e-12)
+    S, X = found.parameter, np.abs(found.harmonic())
+    assert pytest.approx(S**2 / (0.5 * (S - np.pi / 4.0)), rel=10.0 / samples**1.5) == X
+    assert found.optimum().parameter == pytest.approx(np.pi / 2.0, rel=3e-3)
+    some = slice(None, None, 8)
+    response = frequency_response(system, (1.05, 1.2), levels={"normal.force": S[some]},
+                                  method=method, options=ContinuationOptions(
+                                      points=3000, largest_step=0.01, locate=False))
+    for level, (amplitude, w) in enumerate(zip(
+            found.amplitude[some], found.angular_frequency[some], strict=True)):
+        assert amplitude == pytest.approx(response.amplitude(level).max(), rel=2e-4)
+        assert w == pytest.approx(response.peak(level).parameter, rel=6e-4)
+
+
+def test_peak_with_memory_is_that_of_runs():
+    """Runs at the frequency of the peak and beside it, of a damper with dashpot."""
+    system = jenkins_system().with_(**{"drive.damping_x": 0.1})
+    found = resonance_curve(system, (1.2, 1.4), "normal.force", (0.7, 1.5),
+                            method=HarmonicBalance(7, 512),
+                            options=ContinuationOptions(points=60))
+    amplitude, w = found.amplitude[-1], found.angular_frequency[-1]
+    sizes = []
+    for factor in (0.985, 1.0, 1.015):
+        driven = system.with_(**{"normal.force": 1.4, "drive.angular_frequency": factor * w})
+        T = 2.0 * np.pi / (factor * w)
+        run = fc.simulate(driven, 61.0 * T, rtol=1e-8, outputs=61 * 500 + 1)
+        sizes.append(0.5 * np.ptp(run.displacement("B")[-501:, 0]))
+    assert sizes[1] == pytest.approx(amplitude, rel=3e-4)
+    # The peak of a parabola through the three runs.
+    below, peak, above = sizes
+    place = 0.5 * (below - above) / (below - 2.0 * peak + above)
+    assert abs(place) * 0.015 < 2e-3
+    assert max(below, above) < 0.9995 * peak
+
+
 def test_backbone_of_phase_resonance_is_the_mode(damper):
     """Over the force, resonances of one harmonic have amplitude and frequency of the mode."""
     system = jenkins_system()
@@ -253,12 +305,9 @@ def test_bad_arguments(changes, told):
         resonance_curve(duffing(), **given)
 
 
-def test_what_has_no_peak_is_told(damper):
+def test_what_has_no_peak_is_told():
     with pytest.raises(AnalysisError, match="no peak between"):
         resonance_curve(duffing(), (0.02, 0.1), "P", (0.3, 0.6), frequency="W")
-    system, _ = damper
-    with pytest.raises(InputError, match="condition = 'phase'"):
-        resonance_curve(system, (1.2, 3.0), "normal.force", (0.7, 1.5))
     mode = nonlinear_mode(hardening(), (1e-2, 1.0), observe=("a.p", "y"))
     with pytest.raises(InputError, match="1 modal coordinates, but the system 2"):
         mode_response(mode, fc.ContactSystem(

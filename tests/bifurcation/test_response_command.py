@@ -50,6 +50,27 @@ def test_response_of_a_block_held_by_friction(cli, file):
     assert read_system(results / "block-response.h5").drive.stiffness_x == 5610.0
 
 
+def test_template_of_responses(cli, file):
+    """The smallest level sticks throughout; larger ones slide, at lower frequencies."""
+    code, said, _ = cli("init", "held.toml", "--shape", "response")
+    assert code == 0
+    assert "next: fecontact response held.toml" in said
+    described = Study.read(file.parent / "held.toml")
+    assert described.response.levels["drive.amplitude_x"] == (5e-5, 2e-4, 4e-4, 8e-4)
+    code, said, _ = cli("response", "held.toml", "--levels", "drive.amplitude_x=5e-5,4e-4")
+    assert code == 0
+    found = read_response(file.parent / "results" / "held-response.h5")
+    w = found.branches[0].parameter
+    assert w[[0, -1]] / (2.0 * np.pi) == pytest.approx([4.0, 13.0])
+    assert found.amplitude(0) == pytest.approx(linear_amplitude(w, 5e-5, described), rel=2e-4)
+    assert found.amplitude(1).max() < 0.4 * linear_amplitude(w, 4e-4, described).max()
+    assert found.peak(1).parameter < 0.95 * found.peak(0).parameter
+    assert all(branch.status is BranchStatus.BOUND for branch in found.branches)
+    code, said, _ = cli("modes", "held.toml", "--nonlinear", 1, "--amplitudes", 1e-4, 5e-4)
+    assert code == 0
+    assert "10.7133" in said
+
+
 def test_command_line_overrides_the_section(cli, file):
     code, _, _ = cli("response", file, "--hz", 9, 10, "--levels", "load.normal=10,20",
                      "--harmonics", 1, "--samples", 64, "-o", "there")

@@ -123,7 +123,8 @@ def test_resolved_study_has_every_key_that_has_a_value(tiny):
 
 def test_templates_have_no_key_at_a_wrong_place_and_can_be_started():
     shapes = {"beam": Beam, "pendulum": Pendulum, "block": Block}
-    assert set(TEMPLATES) == {*shapes, "pad", "solid", "mesh", "sweep"}  # whose tests are elsewhere
+    assert set(TEMPLATES) == {*shapes, "pad", "solid", "mesh", "sweep", "response"}
+    # The tests of the others are elsewhere.
     for shape, kind in shapes.items():
         study = Study.from_toml(template(shape))
         assert isinstance(study.geometry, kind)

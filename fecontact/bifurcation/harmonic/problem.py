@@ -45,6 +45,12 @@ _HALVES_MEET, _HALVES_PART = 0.02, 0.9
 _NONE = np.empty(0)
 
 
+def orientation(matrix: Array, weights: Array, tangent: Array) -> float:
+    """Sign of det [[matrix], [w tangent]], computed with scaled unknowns and rows."""
+    square = np.vstack([matrix, weights * tangent]) * weights**-0.5
+    return float(np.linalg.slogdet(square / np.abs(square).max(axis=1)[:, None])[0])
+
+
 class HarmonicLinearisation(Linearised):
     """As :class:`Linearised`, with stability."""
 
@@ -197,9 +203,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def orientation(self, linearisation: Any, tangent: Array) -> float:
         """Sign of the determinant of the equations, in their scales, with the tangent below."""
-        weights = self.weights()
-        square = np.vstack([linearisation.condensed, weights * tangent]) * weights**-0.5
-        return float(np.linalg.slogdet(square / np.abs(square).max(axis=1)[:, None])[0])
+        return orientation(linearisation.condensed, self.weights(), tangent)
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[HarmonicProblem, Array, Array]":
         """The problem for the next step, with the phase condition at u."""

@@ -27,6 +27,7 @@ from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_of_orbits, observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
@@ -159,7 +160,7 @@ def frequency_response(
     """
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
     require_kind("frequency_response", (HarmonicBalance, type(None)), method=method)
-    held = None if preload is None else _preloaded(system, preload)
+    held = preloaded(system, preload)
     chosen = options_of(
         options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
     level_name, values = levels_of(levels)
@@ -192,10 +193,12 @@ def frequency_response(
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
 
 
-def _preloaded(
-    system: ContactSystem | VectorField, preload: LoadHistory | RestState | Array
-) -> Array:
-    """State (d,) of a preload."""
+def preloaded(
+    system: ContactSystem | VectorField, preload: LoadHistory | RestState | Array | None
+) -> Array | None:
+    """State (d,) of a preload; None without one."""
+    if preload is None:
+        return None
     if not isinstance(system, ContactSystem):
         raise InputError("preload is for contact systems; a vector field has no springs and "
                          "sliders that keep a deflection.")
@@ -244,8 +247,9 @@ def branch_of_response(
                 told = error
                 continue
             direction = 1.0 if begin < options.bounds[1] else -1.0
-            return branches.follow(problem, u, None, method, options, direction=direction,
-                                   both=both)
+            branch = branches.follow(problem, u, None, method, options, direction=direction,
+                                     both=both)
+            return replace(branch, message=stall_reason(field, branch))
     raise told
 
 

@@ -20,6 +20,7 @@ from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.nonlinear_modes.linear_start import (
     XI,
     LinearStart,
@@ -244,6 +245,7 @@ def nonlinear_mode(
                             f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
                             f"{low:g}; begin at a smaller one, where the motion is linear "
                             f"({error})") from None
+    branch = replace(branch, message=stall_reason(start.field, branch))
     return NonlinearMode(_ended(branch, {
         "observed": observed, "mode_number": int(mode), "conservative": problem.conservative,
         "rigid_motions": problem.loose, "rest": problem.home}), mode, observed)
@@ -268,9 +270,9 @@ def continued_mode(
     left = max(2, options.points - len(points) + 1)
     rest = branches.follow(problem, u, tangent, starts.method_of(known),
                            _between(replace(options, points=left), low, high))
-    ended = _ended(rest, {})
+    ended = _ended(replace(rest, message=stall_reason(field, rest)), {})
     return replace(mode, branch=replace(
-        mode.branch, points=(*points[:-1], *ended.points), status=ended.status,
+        mode.branch, points=(*points, *ended.points[1:]), status=ended.status,
         message=ended.message))
 
 

@@ -7,6 +7,11 @@ Amplitude: along the response, whose direction v is ``[[G_y], [border]] v = [0, 
 amplitude a does not change, g = a_y v = 0. With ``[[G_y], [border]]^T z = [a_y]`` its derivative is
 ``dg = da_y v - z dG_y v``, by differences along v alone.
 
+With memory, elements begin and end to slide from sample to sample, and g jumps a little each time.
+The orbits y+ and y- a window away on both sides along the response then have the same amplitude,
+a(y+) = a(y-): G(y+) = G(y-) = 0, [border] (y+ - y) = [border] (y - y-) = window. The peak lies
+between them but for the square of the window, and its amplitude but for the fourth power.
+
 Phase: the given force does no work in phase with the displacements, Re(P^H X_1) = 0.
 """
 
@@ -16,18 +21,25 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm
+from fecontact.bifurcation.continuation.newton import corrected, weighted_norm
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.observed import observed_values
-from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
+from fecontact.bifurcation.harmonic.problem import (
+    HarmonicLinearisation,
+    HarmonicProblem,
+    orientation,
+)
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, uniform_basis
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
 # Steps of differences: relative in a parameter, and along the response in its inner product.
 _PARAMETER_STEP, _ALONG_STEP = 1e-5, 1e-4
 _SAMPLES, _REFINED = 512, 4
+# Of orbits beside the resonance: relative size of the last Newton step, and Newton steps.
+_TOLERANCE, _ITERATIONS = 1e-9, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +64,8 @@ class PeakProblem(Problem):
         State at which the given force is evaluated.
     size : float
         Scale of the condition: an amplitude, or that times a force.
+    window : float
+        Distance of the orbits that are compared, in the inner product of the orbit; 0 for none.
     """
 
     orbit: HarmonicProblem
@@ -62,6 +76,7 @@ class PeakProblem(Problem):
     border: Array
     rest: Array
     size: float = 1.0
+    window: float = 0.0
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -82,6 +97,10 @@ class PeakProblem(Problem):
     def weights(self) -> Array:
         """Those of the orbit, and of the parameter."""
         return np.append(self.orbit.weights(), self.width**-2.0)
+
+    def orientation(self, linearisation: Any, tangent: Array) -> float:
+        """Sign of the determinant of the equations with the tangent below."""
+        return orientation(linearisation.matrix, self.weights(), tangent)
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[PeakProblem, Array, Array]":
         """The problem for the next step: border along the response at u, scales of its orbit."""
@@ -170,7 +189,42 @@ class PeakLinearised:
     def _condition(self) -> float:
         if self.problem.condition == "phase":
             return float(self.force_row @ self.u[:-2]) / self.problem.size
+        if self.problem.window:
+            below, above = (self._amplitude(y) for y in self._sides)
+            return (above - below) / (2.0 * self.problem.window * self.problem.size)
         return float(self.gradient @ self.along) / self.problem.size
+
+    def _amplitude(self, y: Array) -> float:
+        orbit = self.orbit
+        found = observed_values(orbit.layout, orbit.coefficients(y), orbit.period(y),
+                                self.problem.row)
+        return float(found["observed_amplitude"])
+
+    @cached_property
+    def _sides(self) -> list[Array]:
+        """The orbits a window below and above along the response."""
+        found = []
+        for way in (-self.problem.window, self.problem.window):
+            side = corrected(self.orbit, self.u[:-1] + way * self.along, self.problem.border,
+                             _TOLERANCE, _ITERATIONS)
+            if side is None:
+                raise AnalysisError("The response beside the resonance was not found; take smaller "
+                                    "steps or more samples.")
+            found.append(side[0])
+        return found
+
+    def _compared(self) -> Array:
+        """Derivative (n + 2,) of the condition by both sides, whose orbits follow the border."""
+        slopes = []
+        for y in self._sides:
+            gradient = self._gradient(y)
+            right = np.zeros((len(y), 2))
+            right[-1, 0], right[:-1, 1] = 1.0, -self._by_parameter(y)
+            moved = np.linalg.solve(
+                np.vstack([self.orbit.linearise(y).condensed, self.problem.border]), right)
+            slopes.append(gradient @ moved)
+        along, by_parameter = (slopes[1] - slopes[0]) / (2.0 * self.problem.window)
+        return np.append(along * self.problem.border, by_parameter) / self.problem.size
 
     @cached_property
     def _step(self) -> float:
@@ -196,6 +250,8 @@ class PeakLinearised:
                             - self._force_rows(frequency, parameter - self._step)) @ X
             return np.concatenate([self.force_row, [
                 by_frequency, by_parameter / (2.0 * self._step)]]) / self.problem.size
+        if self.problem.window:
+            return self._compared()
         y, v = self.u[:-1], self.along
         z = np.linalg.solve(self._bordered.T, self.gradient)[:-1]
         h = _ALONG_STEP / weighted_norm(self.orbit.weights(), v)

@@ -16,7 +16,12 @@ from fecontact.bifurcation.harmonic.branches import attributes_of
 from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_row
-from fecontact.bifurcation.harmonic.response import branch_of_response, rest_state, with_observed
+from fecontact.bifurcation.harmonic.response import (
+    branch_of_response,
+    preloaded,
+    rest_state,
+    with_observed,
+)
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice
@@ -24,9 +29,14 @@ from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import RestState
 
 # Points at most and largest step, unless options say so; largest step on the first response.
 _POINTS, _LARGEST, _RESPONSE = 400, 0.05, 0.03
+# Distance along the response of the orbits whose amplitudes are compared, with memory, and least
+# number of samples by which they differ in phase.
+_WINDOW, _SAMPLES = 0.05, 4
 _CONDITIONS = ("amplitude", "phase")
 
 
@@ -105,7 +115,7 @@ def resonance_curve(
     observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
     condition: Literal["amplitude", "phase"] = "amplitude",
     method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
-    start: float | None = None,
+    start: float | None = None, preload: LoadHistory | RestState | Array | None = None,
 ) -> ResonanceCurve:
     """The peak of the frequency response over a parameter, by harmonic balance.
 
@@ -128,9 +138,10 @@ def resonance_curve(
     observe : (point, component) or (d,) sequence
         As for :func:`fecontact.bifurcation.frequency_response`.
     condition : 'amplitude' or 'phase'
-        The peak of the observed amplitude, for smooth laws; or phase resonance of a contact system,
-        where the force does no work in phase with the displacements: also with kinks.
-    method, options
+        The peak of the observed amplitude, with memory midway between two orbits of the same; or
+        phase resonance of a contact system, where the force does no work in phase with the
+        displacements.
+    method, options, preload
         As for :func:`fecontact.bifurcation.frequency_response`; by default up to 400 points,
         largest_step 0.05.
     start : float, optional
@@ -156,15 +167,12 @@ def resonance_curve(
     if condition == "phase" and not isinstance(field, ContactField):
         raise InputError("resonance_curve: condition = 'phase' needs a contact system, whose given "
                          "forces are known; take 'amplitude'.")
-    if condition == "amplitude" and layout_of(field).memory:
-        raise InputError("resonance_curve: friction with memory has kinks, at which the condition "
-                         "of the largest amplitude is not smooth; take condition = 'phase'.")
     row, observed = observed_row(field, observe)
     low, high = chosen.bounds
     values = field.values
     values[second] = inside(low if start is None else float(start), chosen)
     problem, u = _first(field, values, free, second, frequencies, row, condition,
-                        method or HarmonicBalance(), chosen)
+                        method or HarmonicBalance(), chosen, preloaded(system, preload))
     branch = continue_branch(
         problem, u, chosen, name=parameter, direction=1.0 if u[-1] < high else -1.0,
         both=low < u[-1] < high, attributes={
@@ -190,13 +198,14 @@ def resonances_of(branch: Branch) -> ResonanceCurve:
 def _first(
     field: VectorField, values: Array, free: int, second: int, frequencies: tuple[float, float],
     row: Array, condition: str, method: HarmonicBalance, options: ContinuationOptions,
+    held: Array | None,
 ) -> tuple[PeakProblem, Array]:
     """The problem, and the peak of a response."""
     # Kinks jump the stability, which does not matter here.
     given = options_of(ContinuationOptions(points=2000, largest_step=_RESPONSE, locate=False),
                        frequencies)
     branch = branch_of_response(field, values, free, None, given.bounds[0],
-                                replace(method, tolerance=None), given, None, both=False)
+                                replace(method, tolerance=None), given, held, both=False)
     sizes = with_observed(branch, row, "", None, np.nan).column("observed_amplitude")
     place = int(np.argmax(sizes))
     if place in (0, len(sizes) - 1):
@@ -210,6 +219,9 @@ def _first(
     problem = PeakProblem(orbit, second, width, row, condition, orbit.weights() * tangent, rest,
                           float(sizes[place]))
     start = np.append(u, values[second])
+    if condition == "amplitude" and layout_of(field).memory:
+        # In the scales of the orbit a distance is about a change of phase.
+        problem = replace(problem, window=max(_WINDOW, _SAMPLES * 2.0 * np.pi / orbit.samples))
     if condition == "phase":
         problem = replace(problem, size=_work(problem, start))
     return problem, start

@@ -89,7 +89,7 @@ def response(
         show(response_table(found.response))
         for branch in found.response.branches:
             if branch.message:
-                echo(f"note: the last step failed: {branch.message}")
+                echo(f"note: {branch.message}")
         for note in found.notes:
             echo(f"note: {note}")
         echo_written(*files)
@@ -147,20 +147,11 @@ def _earlier(study: "Study", file: Path) -> "FrequencyResponse":
     InputError
         If there is none, or it is one of other values.
     """
-    from fecontact.laws.registry import law_files
+    from fecontact.cli.run_files import require_same_study
     from fecontact.output.files.branches import read_response
-    from fecontact.output.files.stored_system import read_model
-    from fecontact.study.study import Study
 
     if not file.is_file():
         raise InputError(f"There is no interrupted response to go on with: {file} does not exist; "
                          f"leave out --resume.")
-    text = read_model(file, law_files(study.tables())).study
-    stored = Study.from_toml(text or "", study.path)
-    kept = ("output", "render", "sweep", "branch", "simulation", "wear")
-    same = replace(stored, **{name: getattr(study, name) for name in kept},
-                   response=replace(stored.response, levels=study.response.levels))
-    if same != study:
-        raise InputError(f"{file} was computed with other values than {study.title} has now; "
-                         f"leave out --resume.")
+    require_same_study(study, file, "levels")
     return read_response(file)

@@ -14,11 +14,13 @@ def init(
     file: Annotated[Path, Parameter(help="Study file to write.")] = Path("study.toml"),
     /,
     *,
-    shape: Annotated[Literal["beam", "pendulum", "block", "pad", "solid", "mesh", "sweep"],
+    shape: Annotated[Literal["beam", "pendulum", "block", "pad", "solid", "mesh", "sweep",
+                              "response"],
                      Parameter(
         help="Beam on wavy ground, pendulum on a stop, block on a moving belt, a pad on a block, "
         "which are two bodies, a solid pad on a belt in space, a part from a mesh file of your "
-        "own, or a sweep over the speed of a belt.")] = "beam",
+        "own, a sweep over the speed of a belt, or frequency responses of a block held by "
+        "friction.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
@@ -33,7 +35,8 @@ def init(
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
     following = {"mesh": "put your mesh beside it as part.msh, or change its name there; then: "
-                         "fecontact mesh", "sweep": "next: fecontact sweep"}
+                         "fecontact mesh", "sweep": "next: fecontact sweep",
+                 "response": "next: fecontact response"}
     echo(f"{file} is written; {following.get(shape, 'next: fecontact run')} {file}")
 
 
@@ -85,6 +88,8 @@ def modes(
         "amplitude."))] = None,
     amplitudes: Annotated[tuple[float, float] | None, Parameter(help=(
         "Smallest and largest amplitude of a nonlinear mode [m]."))] = None,
+    resume: Annotated[bool, Parameter(negative=(), help=(
+        "Go on with an interrupted nonlinear mode."))] = False,
 ) -> int:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
@@ -92,7 +97,8 @@ def modes(
     resolve; --complex, --movie and --nonlinear are for all bodies together, with modes that are
     counted through. With --nonlinear, frequency and damping over the amplitude are written
     (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page whose points play the motion (.html);
-    harmonics and the observed displacement are those of [response].
+    harmonics, the observed displacement and preload are those of [response]. It is stored as it
+    grows; Ctrl-C stops it, --resume goes on where it was.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import interfaces_of, read_study
@@ -146,13 +152,14 @@ def modes(
             plot_convergence(result, path=picture)
             echo_written(picture)
         if nonlinear is None:
-            if amplitudes is not None:
-                raise InputError("--amplitudes is for a nonlinear mode; add --nonlinear with its "
-                                 "number.")
+            if amplitudes is not None or resume:
+                option = "--amplitudes" if amplitudes is not None else "--resume"
+                raise InputError(f"{option} is for a nonlinear mode; add --nonlinear with its "
+                                 f"number.")
             return 0
         from fecontact.cli.mode_results import follow_mode
 
-        return follow_mode(described, nonlinear, amplitudes, folder)
+        return follow_mode(described, nonlinear, amplitudes, folder, resume)
 
 
 def preload(

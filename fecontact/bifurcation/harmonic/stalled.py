@@ -1,0 +1,42 @@
+"""Why a branch by harmonic balance could not be followed on, and what helps."""
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.problem import BranchStatus
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.system.fields.vector_field import VectorField
+from fecontact.system.kernels import NORMAL_FORCE
+
+# Samples that a contact phase should have, and truncation error above which harmonics lack.
+_ENOUGH, _LARGE = 16, 1e-2
+
+
+def stall_reason(field: VectorField, branch: Branch) -> str:
+    """Message of a branch; of one that stalled with contacts that open and close, with the reason.
+
+    A contact phase of few samples makes corners of the branch that are not those of the system, and
+    harmonics that are neglected shift what contact excites.
+    """
+    if branch.status is not BranchStatus.STALLED or not isinstance(field, ContactField):
+        return branch.message
+    last, N = branch.points[-1], int(branch.attributes["samples"])
+    motion = last.orbit(samples=N + 1)
+    force = field.system(last.parameter_values(field)).contact_history(
+        motion.times[:-1], motion.states[:-1])[:, :, NORMAL_FORCE]
+    closed = np.count_nonzero(force > 0.0, axis=0)
+    opens = (closed > 0) & (closed < N)
+    error = float(last.values["truncation_error"])
+    told = [branch.message] if branch.message else []
+    if opens.any():
+        fewest = int(np.minimum(closed, N - closed)[opens].min())
+        told.append(
+            f"Contact opens and closes at {np.count_nonzero(opens)} of {len(closed)} nodes, for "
+            f"{fewest} of {N} samples at the least.")
+        if fewest < _ENOUGH:
+            needed = 2 ** int(np.ceil(np.log2(_ENOUGH * N / fewest)))
+            told.append(f"Take samples = {needed}, or a softer contact.")
+    if error > _LARGE:
+        told.append(f"The truncation error is {error:.2g} with {branch.attributes['harmonics']} "
+                    f"harmonics: take more, or damp the modes that they excite.")
+    return " ".join(told)

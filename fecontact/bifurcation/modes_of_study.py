@@ -1,0 +1,95 @@
+"""Nonlinear modes of a study, part by part, so that an interrupted one goes on where it was."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import (
+    NonlinearMode,
+    continued_mode,
+    nonlinear_mode,
+)
+from fecontact.bifurcation.responses import observed_point
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.response_options import ResponseSettings
+    from fecontact.system.contact_system import ContactSystem
+    from fecontact.system.quasistatic.history import LoadHistory
+
+# First and largest step, and points after which a mode is stored.
+_STEP, _LARGEST, _PART = 0.02, 0.1, 50
+
+
+def mode_options(points: int) -> ContinuationOptions:
+    """How modes of studies are followed."""
+    return ContinuationOptions(points=points, step=_STEP, largest_step=_LARGEST)
+
+
+def unfinished(mode: NonlinearMode, points: int) -> bool:
+    """Whether a mode was interrupted, or has fewer points than are asked for now."""
+    status = mode.branch.status
+    return status is BranchStatus.INTERRUPTED or (
+        status is BranchStatus.POINTS and _regular(mode) < points)
+
+
+def follow_mode(
+    system: "ContactSystem", wanted: "ResponseSettings", amplitudes: tuple[float, float],
+    number: int, progress: Callable[[int], None] | None = None,
+    earlier: NonlinearMode | None = None,
+    keep: Callable[[NonlinearMode], object] | None = None,
+    preload: "LoadHistory | None" = None,
+) -> NonlinearMode:
+    """Follow a nonlinear mode with harmonics and observed point of ``[response]``.
+
+    Parameters
+    ----------
+    system : ContactSystem
+        What vibrates.
+    wanted : ResponseSettings
+        Method, points, what is observed.
+    amplitudes : (float, float)
+        At which it begins and ends.
+    number : int
+        Of the linear mode, from 1.
+    progress : callable, optional
+        Told the number of points.
+    earlier : NonlinearMode, optional
+        What an interrupted computation of the same has left: it goes on at its last point. With a
+        tolerance the mode is followed anew, since the number of harmonics may still change.
+    keep : callable, optional
+        Given what there is after each part, as interrupted.
+    preload : LoadHistory, optional
+        Whose end elements that never slide keep.
+    """
+    observe, method = observed_point(system, wanted), wanted.method()
+    parts = method.tolerance is None and keep is not None
+    mode = earlier if earlier is not None and method.tolerance is None else None
+    while True:
+        done = 0 if mode is None else _regular(mode)
+        most = min(wanted.points, done + _PART) if parts else wanted.points
+        options = replace(mode_options(most), progress=_counted(progress, done))
+        try:
+            mode = (nonlinear_mode(system, amplitudes, number, observe=observe, method=method,
+                                   options=options, preload=preload) if mode is None
+                    else continued_mode(system, mode, amplitudes, observe, options))
+        except KeyboardInterrupt:
+            if mode is None:
+                raise
+            return _interrupted(mode)
+        if mode.branch.status is not BranchStatus.POINTS or _regular(mode) >= wanted.points:
+            return mode
+        if keep is not None:
+            keep(_interrupted(mode))
+
+
+def _regular(mode: NonlinearMode) -> int:
+    return sum(point.kind is None for point in mode.branch.points)
+
+
+def _interrupted(mode: NonlinearMode) -> NonlinearMode:
+    return replace(mode, branch=replace(mode.branch, status=BranchStatus.INTERRUPTED))
+
+
+def _counted(progress: Callable[[int], None] | None, done: int) -> Callable[[int], None] | None:
+    return None if progress is None else lambda points: progress(done + points)
