@@ -64,18 +64,15 @@ def start_of_curve(case):
     return problem, u
 
 
-def multiplier_test(problem, u):
-    """A function of the multipliers that is zero on the curve."""
+def other_test(problem, u, direction):
+    """A function of the multipliers, or of the tangent, that is zero on the curve."""
     orbit = problem.orbit.linearise(u)
     if problem.kind != "fold":
         minus, _, pairs = orbit.floquet.products
         return minus if problem.kind == "period doubling" else pairs
     # The parameter's component in the tangent at a fixed second parameter.
-    row, side = problem.orbit.weights() * problem.direction, np.zeros(len(u))
-    side[-2] = 1.0
-    second = np.zeros(len(u))
-    second[-2] = 1.0
-    return orbit.with_rows([row, second]).solve(side)[-1]
+    side = np.eye(len(u))[-2]
+    return orbit.with_rows([problem.weights() * direction, side]).solve(side)[-1]
 
 
 @pytest.mark.parametrize("case", ["doubling", "torus", "driven", "cusp"])
@@ -83,26 +80,26 @@ def test_derivatives_are_those_of_another_function_with_the_same_zeros(case):
     """At the zero their derivatives are proportional along all directions."""
     problem, u = start_of_curve(case)
     at = problem.linearise(u)
-    if problem.kind == "fold":
-        v = at._critical.v
-        object.__setattr__(problem, "direction", v / (problem.weights() @ v**2))
+    v = at._critical.v
+    direction = None if v is None else v / (problem.weights() @ v**2)
     assert abs(at.residual[-1]) < 1e-6
     rng, d = np.random.default_rng(3), problem.orbit.field.dimension
+    times = np.linspace(0.0, 2.0 * np.pi, problem.orbit.size // d, endpoint=False)
     directions = []
     for place in range(5):
         along = np.zeros(len(u))
-        # Smooth over the orbit, so that it stays away from the rounding of single nodes.
-        times = np.arange(problem.orbit.size // d) * 2.0 * np.pi / (problem.orbit.size // d)
         shape = np.cos((1 + place) * times[:, None] + rng.random(d)) * rng.standard_normal(d)
         along[: problem.orbit.size] = 0.1 * shape.ravel()
         directions.append(along)
     directions += [*np.eye(problem.orbit.common, len(u), problem.orbit.size)]
     mine = np.array([at.gradient @ along for along in directions])
     h = 1e-4
-    other = np.array([(8.0 * (multiplier_test(problem, u + h * along)
-                              - multiplier_test(problem, u - h * along))
-                       - multiplier_test(problem, u + 2.0 * h * along)
-                       + multiplier_test(problem, u - 2.0 * h * along)) / (12.0 * h)
+
+    def beside(along, h):
+        return other_test(problem, u + h * along, direction)
+
+    other = np.array([(8.0 * (beside(along, h) - beside(along, -h))
+                       - beside(along, 2.0 * h) + beside(along, -2.0 * h)) / (12.0 * h)
                       for along in directions])
     scale = (mine @ other) / (mine @ mine)
     assert np.abs(mine).max() > 0.0
@@ -123,17 +120,23 @@ def test_derivative_for_two_real_multipliers():
 
 
 def test_folds_of_a_driven_oscillator_over_frequency_and_force():
-    """The ends of the jump meet in a cusp, as in the balance of one harmonic and its third."""
+    """They meet in a cusp, close to that of one harmonic.
+
+    Its amplitude a satisfies a^2 ((3 a^2 / 4 - s)^2 + d^2) = F^2 with s = w^2 - 1, d = w / 10: a
+    triple root in a^2 at s = sqrt(3) d, F^2 = 32 sqrt(3) d^3 / 27.
+    """
     field, branch = driven()
     first, second = branch.of_kind("fold")
     curve = codim2_curve(field, first, "F", bounds={"w": (0.7, 2.2), "F": (0.02, 0.5)},
                          options=ContinuationOptions(largest_step=0.03))
     found, = curve.of_kind("cusp")
+    w = (np.sqrt(3.0) / 10.0 + np.sqrt(4.03)) / 2.0
+    assert found.parameter == pytest.approx(w, rel=2e-3)
+    assert found.values["F"] == pytest.approx(np.sqrt(32.0 * np.sqrt(3.0) / 27.0 * (w / 10.0) ** 3),
+                                              rel=6e-3)
     # Both folds of the branch lie on the curve.
-    at = np.argmin(np.abs(curve.parameter - second.parameter)
-                   + np.abs(curve.column("F") - 0.3))
-    assert abs(curve.parameter[at] - second.parameter) < 0.02
-    # The cusp of one harmonic: a^2 = 8 c W / (3 sqrt(3)) with the damping c = 0.1.
-    w = found.parameter
-    assert found.values["F"] == pytest.approx(np.sqrt(32.0 * (0.1 * w) ** 3 / (9.0 * np.sqrt(3.0))
-                                                     / 0.75), rel=0.03)
+    F, k = curve.column("F"), curve.points.index(found)
+    for part in (slice(k), slice(k + 1, None)):
+        order = np.argsort(F[part])
+        beside = np.interp(0.3, F[part][order], curve.parameter[part][order])
+        assert min(abs(beside - first.parameter), abs(beside - second.parameter)) < 2e-3
