@@ -64,6 +64,7 @@ class OrbitCurve(Problem):
     orientation: Orientation = field(default_factory=Orientation)
 
     keeps_matrix: ClassVar[bool] = True
+    polishes: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
     def linearise(self, u: Array) -> "CurveLinearised":
