@@ -3,8 +3,10 @@
     python benchmarks/continuation.py [repetitions] [--quick]
 
 The branch from the first Hopf point to B = 12, multipliers at each point, special points located,
-in intervals of 4 collocation points. Shown is the CPU time, the median of the repetitions; where
-AUTO-07p is installed, also its own for the same branch, one thread, in the same run.
+in intervals of 4 collocation points, and from these the curves of folds and of period doublings
+over the speed of the belt, also in the time of an orbit. Shown is the CPU time, the median of the
+repetitions; where AUTO-07p is installed, also its own for the same branch and curves, one thread,
+in the same run.
 """
 
 import statistics
@@ -14,7 +16,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from continuation_peer import auto
+from continuation_peer import Auto, auto
 
 from fecontact import ContactSystem, Ground, basis_from_matrices
 from fecontact.bifurcation import (
@@ -22,6 +24,7 @@ from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
     VectorField,
+    codim2_curve,
     contact_field,
     equilibrium_branch,
     orbit_branch,
@@ -29,10 +32,12 @@ from fecontact.bifurcation import (
 from fecontact.laws import PrescribedForce, ProductFriction
 
 FOLD, DOUBLING = 0.890686833041, 8.0921923844629
+# Speed at which a curve ends, and the force there, from 400 intervals.
+ENDS = {"fold": (2.0, 2.46586686513), "period doubling": (1.2, 11.28428136088)}
 
 
 def two_masses() -> VectorField:
-    """The oscillator, its parameter B the normal forces."""
+    """The oscillator, its parameters B, the normal forces, and the speed of the belt."""
     rows = np.zeros((2, 3, 2))
     rows[:, 0] = np.eye(2)
     basis = basis_from_matrices(
@@ -41,7 +46,7 @@ def two_masses() -> VectorField:
     system = ContactSystem(basis, normal=PrescribedForce((1.0, 1.0)), friction=ProductFriction(),
                            ground=Ground(speed=1.0))
     return contact_field(system, {"B": (1.0, lambda system, B: system.with_(
-        **{"normal.force": (B, B)}))})
+        **{"normal.force": (B, B)})), "ground.speed": None})
 
 
 def chain(masses: int) -> VectorField:
@@ -67,6 +72,29 @@ def timed(task: Callable[[], Branch], repetitions: int) -> tuple[float, Branch]:
     return statistics.median(times), branch
 
 
+def curves(
+    field: VectorField, branch: Branch, orbit: float, repetitions: int,
+    settings: ContinuationOptions, peer: Auto | None,
+) -> None:
+    """Print the lines of the curves from a branch whose orbits take so many seconds each."""
+    intervals = int(branch.attributes["intervals"])
+    for kind, (speed, force) in ENDS.items():
+        point = branch.of_kind(kind)[0]
+        seconds, curve = timed(partial(
+            codim2_curve, field, point, "ground.speed", both=False, options=settings,
+            bounds={"B": (0.3, 12.0), "ground.speed": (0.9, speed)}), repetitions)
+        error = curve.parameter[-1] / force - 1.0
+        each = seconds / len(curve)
+        print(f"{intervals:4} curve of {kind}s: {len(curve)} points, {1e3 * each:.2f} ms per "
+              f"point, {each / orbit:.2f} of an orbit, error at its end {error:.1e}")
+        if peer is not None:
+            other = peer.curve(kind, intervals, speed, repetitions)
+            theirs = other.seconds / other.points
+            print(f"{intervals:4} the same by AUTO-07p: {other.points} points, {1e3 * theirs:.2f} "
+                  f"ms per point, error {other.force / force - 1.0:.1e}; {each / theirs:.2f} of "
+                  f"its time")
+
+
 def row(name: str, seconds: float, points: int, fold: float, doubling: float) -> str:
     """A line of the table."""
     return (f"{name:14} {points:7}  {seconds:6.3f} s  {1e3 * seconds / points:6.2f} ms"
@@ -80,13 +108,13 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
     field = two_masses()
     sliding = equilibrium_branch(field, parameter="B", bounds=(0.3, 12.0))
     hopf = sliding.of_kind("Hopf")[0]
+    settings = ContinuationOptions(step=0.002, largest_step=0.065, points=1000)
     with auto() as peer:
         print("intervals, by   points  CPU time  per point   error of fold, doubling   of its time")
         for intervals in (50,) if quick else (50, 70, 100, 200):
             task = partial(
                 orbit_branch, field, hopf, method=Collocation(intervals=intervals),
-                options=ContinuationOptions(step=0.002, largest_step=0.065, points=1000),
-                bounds=(0.3, 12.0), scales=np.ones(4))
+                options=settings, bounds=(0.3, 12.0), scales=np.ones(4))
             if not quick:
                 task()
             seconds, branch = timed(task, repetitions)
@@ -96,6 +124,7 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
             if peer is not None:
                 other = peer.branch(intervals, repetitions)
                 print(row(f"{intervals:4} AUTO-07p", *other) + f"   {seconds / other.seconds:6.2f}")
+            curves(field, branch, seconds / len(branch), repetitions, settings, peer)
     large = chain(20)
     sliding = equilibrium_branch(large, parameter="B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]

@@ -7,7 +7,8 @@ from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import details_of
-from fecontact.bifurcation.continuation.pseudo_arclength import Problem, continuation
+from fecontact.bifurcation.continuation.pseudo_arclength import Problem, continuation, start_of
+from fecontact.bifurcation.continuation.step import Step
 from fecontact.io import read_branch, write_branch
 
 
@@ -260,3 +261,24 @@ def test_files(tmp_path):
     path.write_bytes(b"nothing")
     with pytest.raises(InputError, match="not an HDF5 file"):
         read_branch(path)
+
+
+def test_a_jump_at_the_start_of_a_step_is_no_zero():
+    """As of a test function that a new mesh changes; a zero right beside the start is one."""
+    options = ContinuationOptions()
+    ends = [start_of(CIRCLE, np.array([np.cos(w), np.sin(w)]), options, None, 1.0)
+            for w in (0.3, 0.35)]
+    step = Step(CIRCLE, *ends, options, CIRCLE.weights() * ends[0].tangent)
+    for shift, offset in ((0.0, 1e-4), (0.0, 0.4), (0.0, 0.999), (0.5, 0.4)):
+        found, _ = step.zero(
+            lambda at, shift=shift, offset=offset: step.along(at.u) / step.length - offset
+            + shift * (at is ends[1]), 1e-12)
+        assert step.along(found.u) == pytest.approx(offset * step.length, rel=1e-8)
+    calls = []
+
+    def jumps(at):
+        calls.append(at)
+        return -0.3 if at is ends[0] else 0.5 + step.along(at.u) / step.length
+
+    assert step.zero(jumps, 1e-12) is None
+    assert sum(at not in ends for at in calls) < 12

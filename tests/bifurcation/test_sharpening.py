@@ -1,13 +1,16 @@
 """Special points and events on branches of orbits: their places, coefficients, and their errors."""
 
 import csv
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from collocation_fields import settled, two_masses_field
 from test_orbit_bifurcations import moebius, torus
+from test_orbit_curves import ring
 
+from fecontact import InputError
 from fecontact.bifurcation import (
     Branch,
     BranchStatus,
@@ -24,12 +27,12 @@ from fecontact.cli.branch_results import branches_csv, special_table
 from fecontact.io import read_branch, write_branch
 
 
-def circle_branch(function, c, intervals):
+def circle_branch(function, c, intervals, **accuracy):
     field = vector_field(function, {"lam": -0.2, "c": c}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
     return orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
-                        method=Collocation(intervals=intervals), bounds=(-0.3, 0.3),
+                        method=Collocation(intervals=intervals, **accuracy), bounds=(-0.3, 0.3),
                         scales=np.ones(3))
 
 
@@ -185,3 +188,75 @@ def test_events_on_orbits_are_as_sharp_as_on_equilibria():
     # The exponent is -2 r.
     exact = place("multiplier of 0.1")
     assert exact == pytest.approx(np.log(10.0) * (1.0 + exact) / (4.0 * np.pi), abs=1e-10)
+
+
+@pytest.mark.parametrize(("function", "kind"), [(moebius, "period doubling"),
+                                                (torus, "Neimark-Sacker")])
+def test_errors_of_special_points_in_closed_form(function, kind):
+    """On coarse meshes the error stated is the error, to a few per cent; the points lie at zero."""
+    shares = []
+    for intervals in (4, 5, 6, 8):
+        point, = circle_branch(function, 0.4, intervals, tolerance=1.0).special
+        assert point.kind == kind
+        assert len(point.values["mesh"]) == intervals + 1
+        shares.append(abs(point.parameter) / point.parameter_error)
+    assert shares == pytest.approx(np.ones(4), rel=0.05)
+
+
+def test_special_points_get_as_many_intervals_as_their_tolerance_needs():
+    meshes = []
+    for tolerance in (1e-6, 1e-9, 1e-11):
+        point, = circle_branch(moebius, 0.4, 4, tolerance=tolerance).special
+        # The diagram is 0.6 wide.
+        assert abs(point.parameter) <= 1.1 * point.parameter_error <= 1.1 * 0.6 * tolerance
+        meshes.append(len(point.values["mesh"]) - 1)
+    assert meshes == [4, 8, 16]
+    point, = circle_branch(moebius, 0.4, 4, tolerance=1e-12, most_intervals=16).special
+    assert len(point.values["mesh"]) - 1 == 8
+    assert point.parameter_error > 0.6e-12
+
+
+def test_errors_of_folds_in_closed_form():
+    """s' = p^2 + q^2 - 1/4 + s^2 + p s / 10 turns at 0.9975 p^2 + q^2 = 1/4."""
+    field = vector_field(ring, {"p": 0.0, "q": 0.1}, 2)
+    t = np.linspace(0.0, 2.0 * np.pi / np.sqrt(4.0 - 0.09 * 0.24), 600)
+    circle = (1.0 - np.sqrt(0.24)) * np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
+    exact = np.sqrt(0.24 / 0.9975)
+    for tolerance, intervals in ((1.0, 4), (1e-7, 6)):
+        branch = orbit_branch(
+            field, PeriodicMotion(t, circle, period=float(t[-1])), "p", bounds=(-1.0, 1.0),
+            method=Collocation(intervals=intervals, tolerance=tolerance), scales=np.ones(2))
+        folds = branch.of_kind("fold")
+        assert len(folds) == 2
+        for fold in folds:
+            error = abs(abs(fold.parameter) - exact)
+            assert error == pytest.approx(fold.parameter_error, rel=0.05)
+            assert error <= 2.0 * tolerance
+
+
+def test_default_settings_locate_a_doubling_to_a_tenmillionth_of_the_diagram(tmp_path):
+    """With steps of a fifth of the amplitude too; files keep points of several meshes."""
+    field = two_masses_field(B=0.3)
+    sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.3, 12.0))
+    branch = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=(0.3, 12.0))
+    fold, = branch.of_kind("fold")
+    doubling, = branch.of_kind("period doubling")
+    for point, exact in ((fold, 0.890686833041), (doubling, 8.0921923844629)):
+        assert abs(point.parameter - exact) <= 1.2 * point.parameter_error + 1e-12
+        assert point.parameter_error <= 1e-7 * 11.7
+    assert len(doubling.values["mesh"]) > len(branch.points[0].values["mesh"])
+    said = dict(branch.summary())["special"]
+    assert said == (f"fold at 0.890686833041 +- {fold.parameter_error:.1g}, period doubling at "
+                    f"{doubling.parameter_text()}")
+    assert re.fullmatch(r"8\.09219\d+ \+- \de-0\d", doubling.parameter_text())
+    loaded = read_branch(write_branch(tmp_path / "branch.h5", branch))
+    for mine, theirs in zip(branch, loaded, strict=True):
+        assert theirs.u.tolist() == mine.u.tolist()
+        assert theirs.tangent.tolist() == mine.tangent.tolist()
+        assert theirs.values["mesh"].tolist() == mine.values["mesh"].tolist()
+    with pytest.raises(InputError, match="'mesh' differs in length from point to point"):
+        branch.column("mesh")
+    # Orbits beyond have twice the intervals of the branch, not of the point.
+    doubled = orbit_branch(field, loaded.of_kind("period doubling")[0], bounds=(0.3, 12.0),
+                           options=ContinuationOptions(points=3))
+    assert len(doubled.points[-1].values["mesh"]) == 101

@@ -130,13 +130,26 @@ def _iterated(
         # With a matrix that is kept the error falls by about the same factor each time.
         falls = size / before if count > 1 else _SERVES
         if kept is not None and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
-            return u, problem.linearise(u), max(1, count - 2 - more)
+            return *_polished(problem, u, guess, row, exact), max(1, count - 2 - more)
         if problem.keeps_matrix:
             keeps = kept is None or falls <= _SERVES
             kept = (kept or linearisation) if keeps else None
             count_kept = count_kept + 1 if keeps else 0
         before = size
     return None
+
+
+def _polished(
+    problem: Problem, u: Array, guess: Array, row: Array, exact: bool
+) -> tuple[Array, Linearisation]:
+    """The solution that a kept matrix has led to, and the equations there or just beside it."""
+    linearisation = problem.linearise(u)
+    if not problem.polishes:
+        return u, linearisation
+    rhs = np.empty(len(u))
+    right_side(linearisation.residual, row, u, guess, rhs)
+    u = u + linearisation.solve(row, rhs)
+    return u, problem.linearise(u) if exact else linearisation
 
 
 def finished(

@@ -236,10 +236,12 @@ class BranchPoint:
         return float(self._details.get("parameter_error", np.nan))
 
     def parameter_text(self, digits: int = 7) -> str:
-        """The parameter with its error, where that is estimated: '8.092192 +- 3e-09'."""
-        error = self.parameter_error
-        known = "" if np.isnan(error) else f" +- {error:.1g}"
-        return f"{self.parameter:.{digits}g}{known}"
+        """The parameter; with its error where that is estimated, and the digits that it leaves."""
+        error, value = self.parameter_error, self.parameter
+        if not error > 0.0:
+            return f"{value:.{digits}g}"
+        known = int(np.ceil(np.log10(max(abs(value), error) / error))) + 1
+        return f"{value:.{min(max(known, 3), 12)}g} +- {error:.1g}"
 
     @property
     def criticality(self) -> str | None:

@@ -82,6 +82,8 @@ class Problem(Protocol):
     keeps_matrix : bool
         Whether the corrector reuses its factorised matrix (chord method with Broyden updates); for
         problems whose factorisation costs far more than a residual and a solve.
+    polishes : bool
+        Whether a solution found with such a matrix gets one more step with its own one.
     precision : float
         Part of a step to which special points are located.
     event_precision : float
@@ -94,6 +96,7 @@ class Problem(Protocol):
     """
 
     keeps_matrix: ClassVar[bool] = False
+    polishes: ClassVar[bool] = False
     precision: float = 1e-12
     event_precision: ClassVar[float] = 1e-12
     confirms: ClassVar[frozenset[str]] = frozenset()

@@ -26,6 +26,9 @@ _SMOOTH, _FALLS = 1e-6, 0.1
 _SAME = 0.98
 # Neighbours from whose tangents Newton's method starts if it fails from the cubic.
 _NEIGHBOURS = 3
+# Part of a step next to its start, and part of the value at the end of the step that such a value
+# must have to tell of a jump at the start.
+_BESIDE_START, _JUMP = 0.02, 0.1
 # Brent's method takes at most so many steps.
 _STEPS = 60
 
@@ -124,7 +127,7 @@ class Step:
         before, after = test(self.here), test(self.there)
         if after == 0.0:
             return self.there, 0.0
-        length, search = self.length, _Search(self, test, precision)
+        length, search = self.length, _Search(self, test, precision, remeshed)
         try:
             converged = brentq(search, 0.0, length, xtol=precision * length, rtol=1e-14,
                                maxiter=_STEPS, full_output=True, disp=False)[1].converged
@@ -156,16 +159,17 @@ class Step:
 
 
 class _LostError(Exception):
-    """Newton's method fails from every guess."""
+    """Newton's method fails from every guess, or there is no zero but a jump."""
 
 
 class _Search:
     """A test function over the length along a step, and the solutions at which it was taken."""
 
     def __init__(
-        self, step: Step, test: Callable[[Solution], float], precision: float
+        self, step: Step, test: Callable[[Solution], float], precision: float, remeshed: bool
     ) -> None:
         self.step, self.test, self.precision = step, test, precision
+        self.remeshed = remeshed
         self.known: list[tuple[float, float, Solution]] = []
 
     def __call__(self, along: float) -> float:
@@ -176,6 +180,8 @@ class _Search:
         at = self._solution(along)
         value = self.test(at)
         self.known.append((along, value, at))
+        if not self.remeshed and self._jumps():
+            raise _LostError
         # Report a zero at once where the secant shows that the remaining error is small enough.
         return 0.0 if self._settled() else value
 
@@ -205,6 +211,17 @@ class _Search:
         for at in solutions[:_NEIGHBOURS]:
             ahead = along - step.along(at.u)
             yield at.u + ahead / float(step.row @ at.tangent) * at.tangent, at
+
+    def _jumps(self) -> bool:
+        """Whether the values next to the start do not lead to the one there, of another mesh."""
+        if len(self.known) < 2:
+            return False
+        (x, a, _), (y, b, _) = sorted(self.known, key=lambda each: each[0])[:2]
+        if x > _BESIDE_START * self.step.length:
+            return False
+        start = a - x * (b - a) / (y - x)
+        sizes = self.test(self.step.here), self.test(self.step.there)
+        return start * sizes[0] < 0.0 and abs(start) > _JUMP * abs(sizes[1])
 
     def _settled(self) -> bool:
         """Whether the last two values fall quickly towards a zero of their secant nearby."""

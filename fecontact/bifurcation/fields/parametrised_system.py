@@ -255,7 +255,8 @@ class _Corners:
         self.low, self.high = low, high
         first = corners[0]
         self._plain = first
-        self._slopes: tuple[tuple[int, bytes], SystemArrays] | None = None
+        # Of each parameter, with the values at which they hold.
+        self._slopes: dict[int, tuple[bytes, SystemArrays]] = {}
         stacked: dict[str, Array] = {}
         for name in first._fields:
             values = [np.asarray(getattr(arrays, name)) for arrays in corners]
@@ -314,8 +315,8 @@ class _Corners:
         """Derivatives of the arrays to one value."""
         place = values.copy()
         place[index] = 0.0
-        key = index, place.tobytes()
-        if self._slopes is None or self._slopes[0] != key:
+        key = place.tobytes()
+        if index not in self._slopes or self._slopes[index][0] != key:
             weights = [1.0]
             for each, ((low, high), value) in enumerate(zip(self._limits, values.tolist(),
                                                             strict=True)):
@@ -324,8 +325,8 @@ class _Corners:
                 weights = [w * below for w in weights] + [w * above for w in weights]
             still = [np.zeros_like(array) if isinstance(array, np.ndarray)
                      and array.dtype.kind == "f" else array for array in self._plain]
-            self._slopes = key, self._with(np.array(weights) @ self._flat, still)
-        return self._slopes[1]
+            self._slopes[index] = key, self._with(np.array(weights) @ self._flat, still)
+        return self._slopes[index][1]
 
     def agrees(self, arrays: SystemArrays, values: Array) -> bool:
         mine = self.at(values)

@@ -15,6 +15,14 @@ class Border:
         self.small = np.empty(factors.end.shape[1])
         bordered_kernels.reduce_border(factors, row, self.weights, self.small)
 
+    @classmethod
+    def of_unknown(cls, factors: CondensedFactors, place: int) -> "Border":
+        """The row of one common unknown, counted from the last one as -1."""
+        made = cls.__new__(cls)
+        made.weights, made.small = np.zeros(pivot_rows(factors)), np.zeros(factors.end.shape[1])
+        made.small[place] = 1.0
+        return made
+
 
 def original_rows(factors: CondensedFactors, end: Array, reduced: Array | None = None) -> Array:
     """Multiples (N m d,) of the collocation rows for those (d,) of the rows of ``factors.end``.

@@ -76,11 +76,6 @@ class Collocation:
             raise InputError(f"Collocation: most_intervals = {self.most_intervals!r} must be a "
                              f"whole number of at least 2.")
 
-    @property
-    def accuracy(self) -> Accuracy:
-        """How well special points are to be located."""
-        return Accuracy(self.tolerance, int(self.most_intervals))
-
 
 @dataclass(frozen=True)
 class Shooting:
@@ -395,10 +390,11 @@ def _followed(
     if branch.points[-1].kind == HALVING and HALVING not in stops:
         branch = replace(branch, status=BranchStatus.CLOSED)
     points = list(branch.points)
+    accuracy = Accuracy(method.tolerance, int(method.most_intervals))
     try:
         for index, point in enumerate(branch.points):
             if point.kind in SHARPENED:
-                points[index] = _sharpened(field, branch, index, method.accuracy)
+                points[index] = _sharpened(field, branch, index, accuracy)
     except KeyboardInterrupt:
         branch = replace(branch, status=BranchStatus.INTERRUPTED)
     return replace(branch, points=tuple(points))

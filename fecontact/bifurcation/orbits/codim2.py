@@ -4,7 +4,7 @@ An orbit by collocation with two free parameters, and a test function at zero.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -16,6 +16,7 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.criticality import (
     Criticality,
+    Orientation,
     Term,
     along_parameter,
     gradient,
@@ -23,6 +24,7 @@ from fecontact.bifurcation.orbits.curves.criticality import (
     of_fold,
     of_torus,
 )
+from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.floquet import Floquet, resting
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 from fecontact.bifurcation.orbits.restored import rescaled, restored
@@ -62,18 +64,27 @@ class OrbitCurve(Problem):
         'fold', 'period doubling', 'Neimark-Sacker' or 'period'.
     period : float
         The period [s] of all orbits, for the kind 'period'.
+    orientation : Orientation
+        Sign of the test function, continued along the curve.
     """
 
     orbit: CollocationProblem
     kind: str
     period: float = 1.0
+    orientation: Orientation = field(default_factory=Orientation)
 
+    keeps_matrix: ClassVar[bool] = True
+    polishes: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF,
                                                   HALVING: BranchStatus.CLOSED}
 
     def linearise(self, u: Array) -> "CurveLinearised":
         """The equations about u."""
         return CurveLinearised(self, u)
+
+    def evaluate(self, u: Array) -> "CurveLinearised":
+        """As :meth:`linearise`, for the residual alone."""
+        return CurveLinearised(self, u, whole=False)
 
     def weights(self) -> Array:
         """Weights of the inner product, those of the orbit."""
@@ -160,12 +171,18 @@ class OrbitCurve(Problem):
         return {"kind": "turning point"} if both.max() > _CUSP_RATE else None
 
 
+class PeriodCurve(OrbitCurve):
+    """Orbits of one period, for whose test function Newton's method is as fast."""
+
+    keeps_matrix: ClassVar[bool] = False
+
+
 class CurveLinearised:
     """Residual of the curve's equations, and solutions of systems with their derivative."""
 
-    def __init__(self, problem: OrbitCurve, u: Array) -> None:
+    def __init__(self, problem: OrbitCurve, u: Array, whole: bool = True) -> None:
         self.problem, self.u = problem, u
-        self.orbit = problem.orbit.linearise(u)
+        self.orbit = CollocationLinearisation(problem.orbit, u, "all" if whole else "states")
 
     @cached_property
     def residual(self) -> Array:
@@ -173,18 +190,15 @@ class CurveLinearised:
         return np.append(self.orbit.residual, self._critical.value)
 
     @cached_property
-    def _fold(self) -> tuple[Criticality, Array]:
-        return of_fold(self.orbit)
-
-    @cached_property
     def _critical(self) -> Criticality:
         """The test function."""
         kind = self.problem.kind
-        if kind == "fold":
-            return self._fold[0]
         if kind == "period":
             return Criticality(self.orbit.period / self.problem.period - 1.0, ())
-        return of_doubling(self.orbit) if kind == "period doubling" else of_torus(self.orbit)
+        if kind == "Neimark-Sacker":
+            return of_torus(self.orbit)
+        found = of_fold(self.orbit) if kind == "fold" else of_doubling(self.orbit)
+        return self.problem.orientation.aligned(found, self.problem.orbit.widths)
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -194,8 +208,9 @@ class CurveLinearised:
     @property
     def bend(self) -> float:
         """Curvature -w G_uu v v / w G_p of the first parameter over the orbits, at folds."""
-        criticality, v = self._fold
-        slope = along_parameter(self.orbit, criticality.terms[0])
+        v = self._critical.v
+        assert v is not None
+        slope = along_parameter(self.orbit, self.terms[0])
         return float(self.gradient @ v / slope / (self.problem.weights() @ v**2))
 
     @cached_property
@@ -203,7 +218,9 @@ class CurveLinearised:
         """Derivative (n,) of the test function."""
         if self.problem.kind == "period":
             return _unit(len(self.u), -3) / self.problem.period
-        return gradient(self.orbit, self._critical.terms)
+        if self.problem.kind != "Neimark-Sacker":
+            self.problem.orientation.keep(self.terms[0])
+        return gradient(self.orbit, self.terms)
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs."""
@@ -242,7 +259,7 @@ def orbit_curve(
     if kind == "period" and not orbit.autonomous:
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
                          f"cannot keep; vary the frequency of the excitation instead.")
-    curve = OrbitCurve(orbit, kind, problem.period(u))
+    curve = (PeriodCurve if kind == "period" else OrbitCurve)(orbit, kind, problem.period(u))
     return curve, start, {**point.branch.attributes, "scales": orbit.scales}
 
 

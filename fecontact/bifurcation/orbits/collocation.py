@@ -71,7 +71,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
 
     def evaluate(self, u: Array) -> CollocationLinearisation:
         """As :meth:`linearise`, for the residual alone."""
-        return CollocationLinearisation(self, u, whole=False)
+        return CollocationLinearisation(self, u, "nothing")
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, mesh and the extremes of the states."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -169,12 +170,15 @@ class CollocationLinearisation:
     period : float
         Period T [s].
 
+    ``to`` says which derivatives are formed: those to the parameters are zero for 'states'.
     Residual: the collocation rows (N m d), interval by interval, Gauss point by Gauss point, and
     the phase condition where the period is unknown.
     """
 
-    def __init__(self, problem: Discretisation, u: Array, whole: bool = True) -> None:
-        self.problem, self.u, self._whole = problem, u, whole
+    def __init__(
+        self, problem: Discretisation, u: Array, to: Literal["all", "states", "nothing"] = "all"
+    ) -> None:
+        self.problem, self.u, self._to = problem, u, to
         self.period = problem.period(u)
         self._x, self._slopes = problem.at_gauss_points(problem.nodes(u))
         self._last: tuple[Array, float, Bordered] | None = None
@@ -183,7 +187,7 @@ class CollocationLinearisation:
     def residual(self) -> Array:
         """Residual (N m d + 1,), without the last entry for forced systems."""
         problem = self.problem
-        if self._whole:
+        if self._to != "nothing":
             f = self.derivatives[0]
         else:
             f = problem.field.rates(self._times, self._x, problem.parameters(self.u))
@@ -206,6 +210,10 @@ class CollocationLinearisation:
         Of forced systems that to a parameter includes the change of T: it is that of
         T f(T tau, x, p), divided by T.
         """
+        if self._to == "states":
+            f, J, _ = self.problem.field.derivatives(self._times, self._x,
+                                                     self.problem.parameters(self.u), ())
+            return f, J, np.zeros((*f.shape, len(self.problem.active)))
         return self._derivatives_at(self._times, self._x)
 
     def derivatives_beside(self, shifts: list[Array]) -> tuple[Array, Array, Array]:
@@ -259,6 +267,13 @@ class CollocationLinearisation:
         """The matrix [[G_u], [row], [row], ...]."""
         borders = [self._phase] if self.problem.autonomous else []
         return Bordered(self.factors, [*borders, *(Border(self.factors, row) for row in rows)], 1.0)
+
+    def at_fixed_parameters(self) -> Bordered:
+        """The matrix [[G_u], [rows of all parameters]]."""
+        borders = [self._phase] if self.problem.autonomous else []
+        return Bordered(self.factors, [*borders, *(
+            Border.of_unknown(self.factors, place)
+            for place in range(-len(self.problem.active), 0))], 1.0)
 
     def bordered(self, row: Array, closing: float = 1.0) -> "Bordered":
         """The matrix [[G_u], [row]]; ``closing`` = -1 is for x(1) = -x(0)."""

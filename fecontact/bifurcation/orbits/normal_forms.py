@@ -154,9 +154,7 @@ class Expansion:
 
     @cached_property
     def _at_rest(self) -> Bordered:
-        """Equations of the orbit at fixed parameters; a change of the period goes with x' / T."""
-        active = len(self._problem.active)
-        return self._linearised.with_rows([*np.eye(active, len(self._u), len(self._u) - active)])
+        return self._linearised.at_fixed_parameters()
 
     def _oscillating(self, angle: float, bend: Array) -> Array:
         """Periodic h with h' + i angle h - A h = bend at the points, complex."""

@@ -43,22 +43,47 @@ class Term(NamedTuple):
 
 
 class Criticality(NamedTuple):
-    """Value of a test function, and what its derivative is made of."""
+    """Value of a test function, and what its derivative is made of; at folds v (n,) too."""
 
     value: float
     terms: tuple[Term, ...]
+    v: Array | None = None
 
 
-def of_fold(at: CollocationLinearisation) -> tuple[Criticality, Array]:
-    """Smallest singular value of the equations at fixed parameters; v (n,) is returned too."""
-    n, problem = len(at.u), at.problem
-    fixed = np.zeros((2, n))
-    fixed[0, -2] = fixed[1, -1] = 1.0
-    value, left, v = at.with_rows([*fixed]).weakest()
+class Orientation:
+    """Sign of a test function that is a singular value: its vectors turn little along a curve."""
+
+    def __init__(self) -> None:
+        self._before: Term | None = None
+
+    def keep(self, term: Term) -> None:
+        """Let vectors that follow have the direction of these."""
+        self._before = term
+
+    def aligned(self, found: Criticality, widths: Array) -> Criticality:
+        """The test function for w and v of length one, in the direction of those before."""
+        term, = found.terms
+        h = np.repeat(widths, len(term.left) // len(widths))
+        factors = []
+        for number, part in enumerate((term.left, term.states)):
+            factor = 1.0 / float(np.sqrt(h @ (part * part).sum(axis=1)))
+            if self._before is not None and self._before.left.shape == part.shape:
+                factor = float(np.copysign(factor, (part * self._before[number]).sum()))
+            factors.append(factor)
+        one, other = factors
+        return Criticality(one * other * found.value,
+                           (Term(one * term.left, other * term.states, other * term.period),),
+                           None if found.v is None else other * found.v)
+
+
+def of_fold(at: CollocationLinearisation) -> Criticality:
+    """Smallest singular value of the equations at fixed parameters."""
+    problem = at.problem
+    value, left, v = at.at_fixed_parameters().weakest()
     period = float(v[problem.size]) if problem.autonomous else 0.0
     nodes = v[: problem.size].reshape(-1, problem.field.dimension)
     term = Term(-left.reshape(nodes.shape), at_points(problem, nodes, nodes[0]), period)
-    return Criticality(value, (term,)), v
+    return Criticality(value, (term,), v)
 
 
 def along_parameter(at: CollocationLinearisation, term: Term) -> float:
