@@ -29,6 +29,7 @@ from fecontact.bifurcation.orbits.shooting import require_segments
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError, require_finite, require_positive
 from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -112,7 +113,7 @@ Method: TypeAlias = Collocation | Shooting | HarmonicBalance
 
 def orbit_branch(
     field: VectorField,
-    start: BranchPoint | PeriodicMotion | Trajectory | tuple[ArrayLike, ArrayLike],
+    start: BranchPoint | PeriodicMotion | Trajectory | FieldRun | tuple[ArrayLike, ArrayLike],
     parameter: str | None = None, *, method: Method | None = None,
     options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
     scales: ArrayLike | None = None, width: float | None = None, direction: float = 1.0,
@@ -129,7 +130,7 @@ def orbit_branch(
     ----------
     field : VectorField
         The system; that of the branch if ``start`` is a point of one.
-    start : BranchPoint, PeriodicMotion, Trajectory or (times, states)
+    start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
         A Hopf point of equilibria, a period doubling or branch point of orbits; another point of a
         branch of orbits, to continue it; or a settled motion over at least one period.
     parameter : str, optional
@@ -157,7 +158,8 @@ def orbit_branch(
         orbit is found near a motion.
     """
     require_field(field)
-    require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, tuple), start=start)
+    require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, FieldRun, tuple),
+                 start=start)
     require_kind("orbit_branch", (Collocation, Shooting, HarmonicBalance, type(None)),
                  method=method)
     require_finite("orbit_branch", direction=direction)
@@ -185,11 +187,14 @@ def orbit_branch(
                         scales, width, direction, both)
 
 
-def _as_motion(start: PeriodicMotion | Trajectory | tuple[Any, ...]) -> PeriodicMotion:
+def _as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -> PeriodicMotion:
     if isinstance(start, PeriodicMotion):
         return start
     if isinstance(start, Trajectory):
         return PeriodicMotion(start.time, start.states)
+    if isinstance(start, FieldRun):
+        return PeriodicMotion(start.time, start.states,
+                              parameter_values=np.array(list(start.parameters.values())))
     if len(start) != 2:
         raise InputError(f"orbit_branch: start must be two arrays, times and states of a motion, "
                          f"not {len(start)}.")
