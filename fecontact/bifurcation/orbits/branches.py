@@ -165,7 +165,7 @@ def orbit_branch(
     require_finite("orbit_branch", direction=direction)
     chosen = options_of(options, bounds)
     if not isinstance(start, BranchPoint):
-        return _from_motion(field, _as_motion(start), field.parameter_or_only(parameter),
+        return _from_motion(field, as_motion(start), field.parameter_or_only(parameter),
                             method or Collocation(), chosen, scales, width, direction, both)
     if isinstance(start, HopfPoint):
         _require_one_side(start, both)
@@ -187,7 +187,8 @@ def orbit_branch(
                         scales, width, direction, both)
 
 
-def _as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -> PeriodicMotion:
+def as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -> PeriodicMotion:
+    """A run, or times and states, as a motion that orbits start from."""
     if isinstance(start, PeriodicMotion):
         return start
     if isinstance(start, Trajectory):
@@ -352,19 +353,23 @@ def _goes_on(
     return _followed((problem, u, tangent), options, limits, both=both)
 
 
+def attributes_of(problem: CollocationProblem, limits: Array | None) -> dict[str, Any]:
+    """What a branch of orbits by collocation keeps besides its points."""
+    field = problem.field
+    kept: dict[str, Any] = {
+        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
+        "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
+        "periods": problem.periods}
+    return kept if limits is None else kept | {"limits": limits}
+
+
 def _followed(
     start: tuple[CollocationProblem, Array, Array | None], options: ContinuationOptions,
     limits: Array | None, **how: Any,
 ) -> Branch:
     """Follow a branch by collocation and refine its special points."""
     problem, u, tangent = start
-    field = problem.field
-    attributes: dict[str, Any] = {
-        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
-        "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
-        "periods": problem.periods}
-    if limits is not None:
-        attributes["limits"] = limits
+    field, attributes = problem.field, attributes_of(problem, limits)
     name = list(field.parameters)[problem.free]
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     ended = replace(options, stop_at=[*stops, HALVING])
