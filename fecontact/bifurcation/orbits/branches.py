@@ -149,7 +149,7 @@ def orbit_branch(
         Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
         its branch and -1 back, or along either half of the other branch at a branch point.
     both : bool
-        Follow the branch in both directions, from a motion or a regular point.
+        Follow the branch in both directions, from a motion, a regular or a branch point.
 
     Raises
     ------
@@ -177,6 +177,10 @@ def orbit_branch(
     known = start.branch.parameter_name
     name = known if parameter is None else field.parameter_or_only(parameter)
     if name == known and start.kind in _BRANCHING:
+        if both and start.kind == "branch point":
+            return _both_halves(
+                start, chosen, lambda side, options: _beyond(field, start, method, options, scales,
+                                                             width, side * direction))
         _require_one_side(start, both)
         return _beyond(field, start, method, chosen, scales, width, direction)
     if name == known and _keeps(start, method):
@@ -205,7 +209,7 @@ def as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -
 def _require_one_side(point: BranchPoint, both: bool) -> None:
     if both:
         raise InputError(f"{point.place} is where orbits begin, which leave it to one side; both = "
-                         f"True goes with motions and regular points.")
+                         f"True goes with motions, regular and branch points.")
 
 
 def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
@@ -288,6 +292,30 @@ def _from_motion(
             field, given, free, motion.times, motion.states, motion.period, intervals,
             method.degree, motion.periods, widths), method.intervals)
     return _followed((problem, u, None), options, limits, direction=direction, both=both)
+
+
+def _both_halves(
+    point: BranchPoint, options: ContinuationOptions,
+    go: Callable[[float, ContinuationOptions], Branch],
+) -> Branch:
+    """Both halves of the other branch at a branch point, from end to end through it."""
+    halves: list[Branch | None] = []
+    failed: FecontactError = InputError("There is nothing to start from.")
+    for side in (1.0, -1.0):
+        try:
+            halves.append(go(side, replace(options, points=max(options.points // 2, 2))))
+        except FecontactError as error:
+            halves.append(None)
+            failed = error
+    ahead, back = halves
+    if ahead is None or back is None:
+        one = ahead or back
+        if one is None:
+            raise failed
+        return one
+    there = replace(point, tangent=ahead.points[0].tangent)
+    return replace(ahead, points=(*back.reversed().points, there, *ahead.points),
+                   message=" ".join(filter(None, (ahead.message, back.message))))
 
 
 def _beyond(
