@@ -103,10 +103,9 @@ def orbit_family(
 
         \dot x = f(x) + \lambda g(x), \qquad \oint \nabla H \cdot g \, dt \ne 0
 
-    there are periodic orbits for lambda = 0 alone. The branch is one over lambda, which stays where
-    it is to rounding; what changes are the stored values 'period', 'minimum' and 'maximum'. Special
-    points are 'period doubling' and 'branch point'; an orbit is 'stable' if no perturbation grows
-    exponentially.
+    there are periodic orbits for lambda = 0 alone. The branch is one over lambda, which stays to
+    rounding; 'period', 'minimum' and 'maximum' change. Special points are 'period doubling' and
+    'branch point'; an orbit is 'stable' if no perturbation grows exponentially.
 
     Parameters
     ----------
@@ -116,12 +115,10 @@ def orbit_family(
         The orbit of this size is the first; at a Hopf point over lambda the smallest one.
     unfolding : str, optional
         Name of lambda; by default the only parameter of the field.
-    method : Collocation, optional
-        Mesh intervals and degree.
-    options, bounds : ContinuationOptions and (float, float), optional
-        As for :func:`fecontact.bifurcation.orbit_branch`; the bounds are those of the period [s].
-    scales : (d,) sequence, optional
-        Sizes of the states that count as one in the arclength.
+    method, options, scales
+        As for :func:`fecontact.bifurcation.orbit_branch`.
+    bounds : (float, float), optional
+        Of the period [s].
     direction : float
         Above zero towards larger orbits, else towards smaller ones.
     both : bool
@@ -130,8 +127,7 @@ def orbit_family(
     Raises
     ------
     InputError, AnalysisError
-        If lambda does not stay, the start lies outside the bounds, and as
-        :func:`fecontact.bifurcation.orbit_branch`.
+        If lambda does not stay, and as :func:`fecontact.bifurcation.orbit_branch`.
 
     References
     ----------
