@@ -166,6 +166,11 @@ def check_runs(names, printed, folder):
     assert names["found"].exponents[0] == pytest.approx(-6.254, abs=1.0)
     multipliers = abs(np.linalg.eigvals(names["one"].monodromy))
     assert np.log(multipliers.max()) / names["period"] == pytest.approx(-6.254, rel=1e-3)
+    assert names["chaos"].exponents == pytest.approx([0.0714, 0.0, -5.3943], abs=0.06)
+    visits = [len(np.unique(row.round(3))) for row in names["passages"]]
+    assert (visits[0], visits[2], visits[-1]) == (1, 2, 16)
+    assert names["same"].parameters == {"a": 0.2, "b": 0.2, "c": 5.7}
+    assert (folder / "rossler.mp4").stat().st_size > 10000
     assert names["up"].shape == names["down"].shape == (9, 4)
     assert [one.kind for one in names["plane"].attractors] == ["periodic"]
 

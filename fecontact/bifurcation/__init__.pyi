@@ -27,6 +27,7 @@ from .harmonic.response import FrequencyResponse, frequency_response
 from .nonlinear_modes.mode_response import ModeResponse, Resonance, mode_response
 from .nonlinear_modes.nonlinear_mode import NonlinearMode, nonlinear_mode
 from .nonlinear_modes.resonance_curve import ResonanceCurve, resonance_curve
+from .orbit_family import orbit_family
 from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
@@ -82,6 +83,7 @@ __all__ = [
     "nonlinear_mode",
     "observe",
     "orbit_branch",
+    "orbit_family",
     "periodic_motion",
     "poincare_scan",
     "quantity_range",

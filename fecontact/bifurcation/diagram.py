@@ -80,7 +80,7 @@ def follow_branches(
         return observe(field, branch, shown, wanted.component)
 
     def beyond(task: Task, branch: Branch) -> Iterator[Task]:
-        return tasks_beyond(field, branch, task, wanted.switch, _method(wanted),
+        return tasks_beyond(field, branch, task, wanted.switch, _method(wanted), True,
                             f"{task.title}, " if task.generation else "")
 
     result = Branches(contact_field=field, observe=(shown, wanted.component))

@@ -66,12 +66,13 @@ class Task(NamedTuple):
 def branch_tree(
     field: VectorField, first: Branch | Sequence[Branch] | Mapping[str, Branch], *,
     depth: int = 1, switch: Iterable[str] = SWITCHES, method: "Method | None" = None,
-    options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
+    both: bool = True, options: ContinuationOptions | None = None,
+    bounds: tuple[float, float] | None = None,
 ) -> BranchTree:
     """Follow the branches that begin on some, those that begin on these, and so on.
 
     At Hopf points the orbits that are born there, at period doublings those of twice the period, at
-    branch points the other branch, of orbits both of its halves. A branch that a special point
+    branch points the other branch, both of its halves. A branch that a special point
     shares with one that is known already, at its other end or where both cross, is not followed
     again.
 
@@ -87,6 +88,9 @@ def branch_tree(
         Kinds of special points at which to go over: 'Hopf', 'period doubling', 'branch point'.
     method : Collocation, Shooting or HarmonicBalance, optional
         Of the orbits born at Hopf points, by default collocation; others keep theirs.
+    both : bool
+        Follow both halves at branch points; one is enough where the system has a symmetry, of which
+        the other half is the mirror image.
     options : ContinuationOptions, optional
         Steps, tolerances and stopping conditions of each branch.
     bounds : (float, float), optional
@@ -118,7 +122,7 @@ def branch_tree(
     chosen = options_of(options, bounds)
 
     def beyond(task: Task, branch: Branch) -> Iterator[Task]:
-        return tasks_beyond(field, branch, task, kinds, method,
+        return tasks_beyond(field, branch, task, kinds, method, both,
                             "" if len(roots) == 1 and not task.generation else f"{task.title}, ")
 
     tasks = [task for name, branch in roots.items() if depth
@@ -181,9 +185,12 @@ def grow(
 
 def tasks_beyond(
     field: VectorField, branch: Branch, task: Task, kinds: Iterable[str], method: "Method | None",
-    before: str,
+    both: bool, before: str,
 ) -> Iterator[Task]:
-    """The branches that begin at the special points of one; ``before`` their orbits' names."""
+    """The branches that begin at the special points of one; ``before`` their orbits' names.
+
+    At branch points ``both`` halves, or one.
+    """
     for kind in kinds:
         points = branch.of_kind(kind)
         for number, point in enumerate(points):
@@ -191,16 +198,16 @@ def tasks_beyond(
             title = {"Hopf": f"{before}orbits{count}",
                      "period doubling": f"{task.title}, doubled{count}",
                      "branch point": f"{task.title}, crossing{count}"}[kind]
-            yield Task(title, task.generation + 1, partial(_beyond, field, point, method, 1.0),
-                       point)
-            if kind == "branch point" and point.is_orbit:
+            halves = partial(_beyond, field, point, method, 1.0, both)
+            yield Task(title, task.generation + 1, halves, point)
+            if kind == "branch point" and point.is_orbit and both:
                 yield Task(f"{title}, other half", task.generation + 1,
-                           partial(_beyond, field, point, method, -1.0), point)
+                           partial(_beyond, field, point, method, -1.0, both), point)
 
 
 def _beyond(
     field: VectorField, point: BranchPoint, method: "Method | None", direction: float,
-    options: ContinuationOptions,
+    both: bool, options: ContinuationOptions,
 ) -> Branch:
     """The branch that begins at a special point."""
     from fecontact.bifurcation.orbits.branches import orbit_branch
@@ -209,7 +216,7 @@ def _beyond(
         return orbit_branch(field, point, method=method, options=options)
     if point.is_orbit:
         return orbit_branch(field, point, options=options, direction=direction)
-    return equilibrium_branch(field, point, options=options)
+    return equilibrium_branch(field, point, options=options, both=both)
 
 
 def _known(start: BranchPoint, found: Iterable[Branch]) -> bool:

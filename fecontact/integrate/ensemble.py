@@ -95,7 +95,7 @@ def ensemble(
     ----------
     systems : ContactSystem or VectorField, or sequence of E
         The modal bases may differ in everything but the size of the state; fields count at their
-        base values, see :meth:`VectorField.with_`.
+        base values, see :meth:`fecontact.bifurcation.VectorField.with_`.
     times : (K,) or (E, K) array
         Start of each run and the times to keep states at, ascending [s].
     initial : (E, size) array, sequence of E, or one for all

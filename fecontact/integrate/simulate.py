@@ -71,7 +71,7 @@ def simulate(
     Parameters
     ----------
     system : ContactSystem or VectorField
-        The system; a field at its base values, see :meth:`VectorField.with_`.
+        The system; a field at its base values, see :meth:`fecontact.bifurcation.VectorField.with_`.
     t_end, t_start : float
         End and start of the run [s]; by default it starts where the run that it continues ends, or
         at zero.

@@ -9,7 +9,6 @@ import fecontact as fc
 from fecontact.bifurcation import (
     Axis,
     ContinuationOptions,
-    PeriodicMotion,
     basins,
     lyapunov_exponents,
     orbit_branch,
@@ -78,11 +77,8 @@ def test_exponents_of_a_focus_and_of_a_field_of_python():
 def test_doublings_in_a_scan_are_those_of_the_branch():
     start = fc.simulate(ROSSLER.with_(c=2.5), 300.0, initial=[1.0, 1.0, 1.0], outputs=6001,
                         rtol=1e-8)
-    late = start.between(280.0)
-    orbits = orbit_branch(
-        ROSSLER, PeriodicMotion(late.time, late.states,
-                                parameter_values=ROSSLER.values_with(c=2.5)), parameter="c",
-        bounds=(2.4, 4.0), options=ContinuationOptions(step=0.05, points=80))
+    orbits = orbit_branch(ROSSLER, start.between(280.0), "c", bounds=(2.4, 4.0),
+                          options=ContinuationOptions(step=0.05, points=80))
     doubling = next(point for point in orbits.points if point.kind == "period doubling")
     values = doubling.parameter + np.array([-0.12, -0.06, 0.06, 0.12])
     scan = poincare_scan(ROSSLER, "c", values, section=Crossing("x", sense="rising"),

@@ -25,10 +25,14 @@ def counted(
 
     It is the number at the first point plus the changes that the special points in between allow.
     Eigenvalues within rounding of the stability border may lie on either side of it; the admissible
-    number nearest to the computed one is taken.
+    number nearest to the computed one is taken. Where nothing can be told of the stability, the
+    number stays, and behind that it is the computed one.
     """
     if "unstable" not in here.values:
         return 0
+    for side, known in ((there, here), (here, there)):
+        if problem.lost(side.values):
+            return int(known.values["unstable"])
     reached = {int(here.values["unstable"])}
     for point in special:
         if point.kind not in events:

@@ -55,7 +55,8 @@ def continue_branch(
         end = end if whole else End(BranchStatus.POINTS)
         turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
         points = [*turned, *points]
-    return Branch(name, tuple(points), end.status, end.message, attributes or {})
+    message = " ".join(filter(None, (end.message, problem.note(points))))
+    return Branch(name, tuple(points), end.status, message, attributes or {})
 
 
 def regular(points: Iterable[BranchPoint]) -> int:

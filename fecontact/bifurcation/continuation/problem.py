@@ -132,6 +132,14 @@ class Problem(Protocol):
         count = int(values.get("unstable", 0))
         return count, count
 
+    def lost(self, values: Mapping[str, Any]) -> bool:
+        """Whether nothing can be told of the stability of a point, from its stored values."""
+        return False
+
+    def note(self, points: Any) -> str:
+        """What is to be told of the points of a branch besides its end."""
+        return ""
+
     def tests(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, float]:
         """Test functions by kind; special points are their zeros. Folds need none."""
         return {}

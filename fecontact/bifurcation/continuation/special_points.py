@@ -69,6 +69,7 @@ def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPo
             found.append(_jump_of_stability(replace(step, there=end)))
         else:
             end = with_count(end, count)
+            found += _change_behind(step, end)
     found.sort(key=lambda point: step.along(point.u))
     if on_bound or ended is not None:
         found.append(BranchPoint(end.u, end.tangent, end.values, None if on_bound else ended))
@@ -127,6 +128,19 @@ def _bound_met(step: Step) -> tuple[Solution, bool] | None:
         u[place] = bound
         end, on_bound = replace(zero[0], u=u), True
     return end, on_bound
+
+
+def _change_behind(step: Step, end: Solution) -> list[BranchPoint]:
+    """A change of stability since it was last known, where it is known again; empty if none."""
+    problem, here = step.problem, step.here
+    if not problem.lost(here.values) or problem.lost(end.values):
+        return []
+    before, after = (int(at.values["unstable"]) for at in (here, end))
+    if before == after:
+        return []
+    error = abs(float(end.u[-1] - here.u[-1])) + step.length * step.parameter_rate()
+    return [special_point(here.u, here.tangent, here.values, UNRESOLVED, {
+        "unstable_before": before, "unstable_after": after, "parameter_error": error})]
 
 
 def _jump_of_stability(step: Step) -> BranchPoint:

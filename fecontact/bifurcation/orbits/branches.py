@@ -29,6 +29,7 @@ from fecontact.bifurcation.orbits.shooting import require_segments
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError, require_finite, require_positive
 from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -124,7 +125,7 @@ Method: TypeAlias = Collocation | Shooting | HarmonicBalance
 
 def orbit_branch(
     field: VectorField,
-    start: BranchPoint | PeriodicMotion | Trajectory | tuple[ArrayLike, ArrayLike],
+    start: BranchPoint | PeriodicMotion | Trajectory | FieldRun | tuple[ArrayLike, ArrayLike],
     parameter: str | None = None, *, method: Method | None = None,
     options: ContinuationOptions | None = None, bounds: tuple[float, float] | None = None,
     scales: ArrayLike | None = None, width: float | None = None, direction: float = 1.0,
@@ -141,7 +142,7 @@ def orbit_branch(
     ----------
     field : VectorField
         The system; that of the branch if ``start`` is a point of one.
-    start : BranchPoint, PeriodicMotion, Trajectory or (times, states)
+    start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
         A Hopf point of equilibria, a period doubling or branch point of orbits; another point of a
         branch of orbits, to continue it; or a settled motion over at least one period.
     parameter : str, optional
@@ -160,7 +161,7 @@ def orbit_branch(
         Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
         its branch and -1 back, or along either half of the other branch at a branch point.
     both : bool
-        Follow the branch in both directions, from a motion or a regular point.
+        Follow the branch in both directions, from a motion, a regular or a branch point.
 
     Raises
     ------
@@ -169,13 +170,14 @@ def orbit_branch(
         orbit is found near a motion.
     """
     require_field(field)
-    require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, tuple), start=start)
+    require_kind("orbit_branch", (BranchPoint, PeriodicMotion, Trajectory, FieldRun, tuple),
+                 start=start)
     require_kind("orbit_branch", (Collocation, Shooting, HarmonicBalance, type(None)),
                  method=method)
     require_finite("orbit_branch", direction=direction)
     chosen = options_of(options, bounds)
     if not isinstance(start, BranchPoint):
-        return _from_motion(field, _as_motion(start), field.parameter_or_only(parameter),
+        return _from_motion(field, as_motion(start), field.parameter_or_only(parameter),
                             method or Collocation(), chosen, scales, width, direction, both)
     if isinstance(start, HopfPoint):
         _require_one_side(start, both)
@@ -187,6 +189,10 @@ def orbit_branch(
     known = start.branch.parameter_name
     name = known if parameter is None else field.parameter_or_only(parameter)
     if name == known and start.kind in _BRANCHING:
+        if both and start.kind == "branch point":
+            return _both_halves(
+                start, chosen, lambda side, options: _beyond(field, start, method, options, scales,
+                                                             width, side * direction))
         _require_one_side(start, both)
         return _beyond(field, start, method, chosen, scales, width, direction)
     if name == known and _keeps(start, method):
@@ -197,11 +203,15 @@ def orbit_branch(
                         scales, width, direction, both)
 
 
-def _as_motion(start: PeriodicMotion | Trajectory | tuple[Any, ...]) -> PeriodicMotion:
+def as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -> PeriodicMotion:
+    """A run, or times and states, as a motion that orbits start from."""
     if isinstance(start, PeriodicMotion):
         return start
     if isinstance(start, Trajectory):
         return PeriodicMotion(start.time, start.states)
+    if isinstance(start, FieldRun):
+        return PeriodicMotion(start.time, start.states,
+                              parameter_values=np.array(list(start.parameters.values())))
     if len(start) != 2:
         raise InputError(f"orbit_branch: start must be two arrays, times and states of a motion, "
                          f"not {len(start)}.")
@@ -211,7 +221,7 @@ def _as_motion(start: PeriodicMotion | Trajectory | tuple[Any, ...]) -> Periodic
 def _require_one_side(point: BranchPoint, both: bool) -> None:
     if both:
         raise InputError(f"{point.place} is where orbits begin, which leave it to one side; both = "
-                         f"True goes with motions and regular points.")
+                         f"True goes with motions, regular and branch points.")
 
 
 def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
@@ -300,6 +310,30 @@ def _from_motion(
     return _followed((problem, u, None), method, options, limits, direction=direction, both=both)
 
 
+def _both_halves(
+    point: BranchPoint, options: ContinuationOptions,
+    go: Callable[[float, ContinuationOptions], Branch],
+) -> Branch:
+    """Both halves of the other branch at a branch point, from end to end through it."""
+    halves: list[Branch | None] = []
+    failed: FecontactError = InputError("There is nothing to start from.")
+    for side in (1.0, -1.0):
+        try:
+            halves.append(go(side, replace(options, points=max(options.points // 2, 2))))
+        except FecontactError as error:
+            halves.append(None)
+            failed = error
+    ahead, back = halves
+    if ahead is None or back is None:
+        one = ahead or back
+        if one is None:
+            raise failed
+        return one
+    there = replace(point, tangent=ahead.points[0].tangent)
+    return replace(ahead, points=(*back.reversed().points, there, *ahead.points),
+                   message=" ".join(filter(None, (ahead.message, back.message))))
+
+
 def _beyond(
     field: VectorField, point: BranchPoint, method: Method | None,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
@@ -367,6 +401,16 @@ def _goes_on(
     return _followed((problem, u, tangent), chosen, options, limits, both=both)
 
 
+def attributes_of(problem: CollocationProblem, limits: Array | None) -> dict[str, Any]:
+    """What a branch of orbits by collocation keeps besides its points."""
+    field = problem.field
+    kept: dict[str, Any] = {
+        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
+        "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
+        "periods": problem.periods, "intervals": problem.intervals}
+    return kept if limits is None else kept | {"limits": limits}
+
+
 def _followed(
     start: tuple[CollocationProblem, Array, Array | None], method: Collocation,
     options: ContinuationOptions, limits: Array | None, **how: Any,
@@ -374,13 +418,8 @@ def _followed(
     """Follow a branch by collocation and refine its special points."""
     problem, u, tangent = start
     field = problem.field
-    attributes: dict[str, Any] = {
-        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
-        "parameter_values": problem.values, "scales": problem.scales, "degree": problem.degree,
-        "periods": problem.periods, "intervals": problem.intervals,
+    attributes = attributes_of(problem, limits) | {
         "tolerance": method.tolerance, "most_intervals": method.most_intervals}
-    if limits is not None:
-        attributes["limits"] = limits
     name = list(field.parameters)[problem.free]
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     ended = replace(options, stop_at=[*stops, HALVING])

@@ -1,6 +1,6 @@
 """Floquet multipliers and stability of a periodic orbit."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,6 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions
@@ -170,8 +171,9 @@ def floquet_of_product(M: Array, autonomous: bool) -> Floquet:
     return Floquet(multipliers, trivial)
 
 
-# Slope of the parameter along a branch, in widths of the diagram, below which its sign is rounding.
-FLAT = 1e-8
+# Slope of the parameter along a branch, in widths of the diagram, below which its sign is rounding,
+# and below which it may be where multipliers are lost.
+FLAT, _FLAT_LOST = 1e-8, 1e-4
 # A multiplier differs from one if its distance exceeds this multiple of the trivial error.
 _RESOLVED = 10.0
 
@@ -201,6 +203,15 @@ def multiplier_tests(mu, trivial, out):
     out[0], out[1], out[2] = minus.real, plus.real, pairs.real
 
 
+def lost(stored: Mapping[str, Any]) -> bool:
+    """Whether the multipliers of an orbit are lost in rounding, from its stored values.
+
+    Differences that grow by more than the inverse of rounding along one part of the orbit, and
+    shrink along another, as on canards, leave the trivial multiplier anywhere.
+    """
+    return float(stored.get("trivial_error", 0.0)) > _WORST
+
+
 def unresolved(
     slopes: tuple[float, float],
     values: tuple[Mapping[str, Any], Mapping[str, Any]],
@@ -210,7 +221,8 @@ def unresolved(
 
     Towards a homoclinic orbit, on a canard and in a conservative family the parameter changes by
     less than round-off: its turns are no folds, and sign changes in the test for branch points no
-    crossings. In a conservative family a second multiplier equals one throughout.
+    crossings. In a conservative family a second multiplier equals one throughout. Where multipliers
+    are lost nothing of them counts, and turns of the parameter only where it changes much.
 
     Parameters
     ----------
@@ -227,6 +239,12 @@ def unresolved(
         found.add("branch point")
     if all(flat) and all(_near_one(stored) for stored in values):
         found.add("branch point")
+    if any(lost(stored) for stored in values):
+        found.add("branch point")
+        if min(abs(slope) for slope in slopes) < _FLAT_LOST:
+            found.add("fold")
+        if any(float(stored["trivial_error"]) > _LOST for stored in values):
+            found |= {"period doubling", "torus"}
     return found
 
 
@@ -254,6 +272,19 @@ class FloquetTests:
         """Test functions of 'period doubling', 'torus' and 'branch point'."""
         found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
         return found
+
+    def lost(self, values: Mapping[str, Any]) -> bool:
+        """See :func:`fecontact.bifurcation.orbits.floquet.lost`."""
+        return lost(values)
+
+    def note(self, points: Sequence[BranchPoint]) -> str:
+        """Where multipliers are lost, if anywhere."""
+        places = [point.parameter for point in points if lost(point.values)]
+        if not places:
+            return ""
+        return (f"Multipliers of {len(places)} orbits are lost in rounding, at parameters from "
+                f"{min(places):.10g} to {max(places):.10g}: nothing is known of their stability, "
+                f"and special points are not sought among them.")
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""

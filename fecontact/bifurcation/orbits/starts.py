@@ -159,9 +159,11 @@ def _return_time(t: Array, x: Array) -> float:
 
 
 def corrected(
-    problem: CollocationProblem, u: Array, tolerance: float = 1e-10
+    problem: CollocationProblem, u: Array, tolerance: float = 1e-10, family: bool = False
 ) -> tuple[CollocationProblem, Array]:
     """The orbit near u at fixed parameter, on a mesh equidistributed for it.
+
+    Of a ``family`` at a fixed parameter that of its size, where the parameter may move.
 
     Raises
     ------
@@ -173,13 +175,14 @@ def corrected(
             mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree,
                                    problem.intervals)
             problem, u, _ = problem.on_mesh(mesh, u, np.zeros_like(u))
-        u = _newton(problem, u, tolerance)
+        u = _newton(problem, u, tolerance, family)
         problem = replace(problem, reference=problem.nodes(u).copy(), age=0)
     return problem, u
 
 
 def corrected_samples(
-    sampled: Callable[[int], tuple[CollocationProblem, Array]], intervals: int
+    sampled: Callable[[int], tuple[CollocationProblem, Array]], intervals: int,
+    family: bool = False,
 ) -> tuple[CollocationProblem, Array]:
     """The orbit on so many intervals, near samples that ``sampled(intervals)`` puts on a mesh.
 
@@ -191,21 +194,31 @@ def corrected_samples(
         As :func:`corrected`, if none does.
     """
     try:
-        return corrected(*sampled(intervals))
+        return corrected(*sampled(intervals), family=family)
     except AnalysisError:
         for finer in _FINER:
             try:
-                problem, u = corrected(*sampled(finer * intervals))
+                problem, u = corrected(*sampled(finer * intervals), family=family)
                 problem, u, _ = on_intervals((problem, u, np.zeros_like(u)), intervals)
-                return corrected(problem, u)
+                return corrected(problem, u, family=family)
             except AnalysisError:
                 continue
         raise
 
 
-def _newton(problem: CollocationProblem, u: Array, tolerance: float) -> Array:
+def size_row(problem: CollocationProblem, u: Array) -> Array:
+    """Row (N + 1,) of the size of an orbit u: what moves its states away from their means."""
+    nodes = problem.nodes(u)
+    row = np.zeros_like(u)
+    row[: problem.size] = (nodes - nodes.mean(axis=0)).reshape(-1)
+    return problem.weights() * row / np.sqrt(problem.weights() @ row**2)
+
+
+def _newton(problem: CollocationProblem, u: Array, tolerance: float, family: bool) -> Array:
     row = np.zeros_like(u)
     row[-1] = 1.0
+    if family:
+        row = size_row(problem, u)
     name = list(problem.field.parameters)[problem.free]
     where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
     size = float(np.linalg.norm(np.ptp(problem.nodes(u), axis=0)))

@@ -94,7 +94,7 @@ class FieldSteps:
         return Events.of_rows(np.vstack(rows), np.vstack(states))
 
     def advance(self, most: int) -> int:
-        """Try so many steps; how the run stands, see :mod:`.step_loop`.
+        """Try so many steps; how the run stands, such as ``step_loop.RUNNING``.
 
         Raises
         ------

@@ -112,7 +112,7 @@ def plot_phase_space(
         Runs, and orbits of branches (``point.orbit(field)``).
     coordinates : sequence of two or three
         States by name, for runs of vector fields, or by number from 0; or rows (size,) that give a
-        quantity from a state, such as :meth:`ContactField.displacement_row`.
+        quantity from a state, such as ``displacement_row`` of a contact field.
     labels : sequence of str, optional
         Names of the axes.
     path : str or Path, optional

@@ -1,0 +1,207 @@
+"""Families of periodic orbits of conservative systems."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.points import HopfPoint
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of
+from fecontact.bifurcation.orbits import starts
+from fecontact.bifurcation.orbits.branches import Collocation, as_motion, attributes_of
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.same_orbit import VANISHING
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import FecontactError, InputError, require_finite
+from fecontact.core.types import Array, ArrayLike, ComplexArray
+from fecontact.integrate.field_runs.field_run import FieldRun
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.system.fields.vector_field import VectorField, require_field
+
+# Change of the unfolding parameter that rounding and discretisation may make.
+_STAYS = 1e-6
+# Part of a step to which special points are located, and tolerance of Newton's method, which the
+# unfolding parameter shows.
+_PRECISION, _TOLERANCE = 1e-9, 1e-11
+# Distance of a multiplier from the unit circle beyond which a perturbation grows; beyond the first
+# of the others it may, beyond the second it must. Of pairs that meet the root of rounding is known.
+_GROWS, _MAY, _MUST = 1e-6, 1e-9, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyProblem(CollocationProblem):
+    """Orbits of a conservative system: two multipliers are one, the others come in pairs mu, 1/mu.
+
+    A pair leaves the unit circle at -1, where orbits of twice the period begin, or at 1, at a
+    branch point of families. Turns of the unfolding parameter, and pairs on the circle, are no
+    special points.
+    """
+
+    confirms: ClassVar[frozenset[str]] = frozenset()
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """As of other orbits; unstable are those of which a perturbation grows exponentially."""
+        found = super().point(u, linearisation, tangent)
+        unstable = _beyond(found["multipliers"], _GROWS)
+        return found | {"unstable": unstable, "stable": unstable == 0}
+
+    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
+        """Least and largest number of growing perturbations that rounding leaves open."""
+        multipliers = values["multipliers"]
+        return _beyond(multipliers, _MUST), _beyond(multipliers, _MAY)
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """Functions that change sign where a pair meets at -1, and at 1."""
+        others = _others(linearisation.floquet.multipliers)
+        size = 1.0 + np.abs(others)
+        return {"period doubling": float(np.prod((others + 1.0) / size).real),
+                "branch point": float(np.prod((others - 1.0) / size).real),
+                VANISHING: super().tests(u, linearisation, tangent)[VANISHING]}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """Points are told by their test functions alone."""
+        return {}
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of the unfolding parameter are rounding."""
+        return {"fold"}
+
+
+def _others(multipliers: ComplexArray) -> ComplexArray:
+    """The multipliers but for the two that are one."""
+    return multipliers[np.argsort(np.abs(multipliers - 1.0))[2:]]
+
+
+def _beyond(multipliers: ComplexArray, distance: float) -> int:
+    return int(np.count_nonzero(np.abs(_others(multipliers)) > 1.0 + distance))
+
+
+def orbit_family(
+    field: VectorField,
+    start: HopfPoint | PeriodicMotion | Trajectory | FieldRun | tuple[ArrayLike, ArrayLike],
+    unfolding: str | None = None,
+    *,
+    method: Collocation | None = None,
+    options: ContinuationOptions | None = None,
+    bounds: tuple[float, float] | None = None,
+    scales: ArrayLike | None = None,
+    direction: float = 1.0,
+    both: bool = False,
+) -> Branch:
+    r"""Follow the periodic orbits of a conservative system at fixed parameters.
+
+    A first integral leaves a family of orbits, and no equation for each. The unfolding parameter
+    lambda, such as a damping, is free in place of one: in
+
+    .. math::
+
+        \dot x = f(x) + \lambda g(x), \qquad \oint \nabla H \cdot g \, dt \ne 0
+
+    there are periodic orbits for lambda = 0 alone. The branch is one over lambda, which stays to
+    rounding; 'period', 'minimum' and 'maximum' change. Special points are 'period doubling' and
+    'branch point'; an orbit is 'stable' if no perturbation grows exponentially.
+
+    Parameters
+    ----------
+    field : VectorField
+        Does not depend on time.
+    start : HopfPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
+        The orbit of this size is the first; at a Hopf point over lambda the smallest one.
+    unfolding : str, optional
+        Name of lambda; by default the only parameter of the field.
+    method, options, scales
+        As for :func:`fecontact.bifurcation.orbit_branch`.
+    bounds : (float, float), optional
+        Of the period [s].
+    direction : float
+        Above zero towards larger orbits, else towards smaller ones.
+    both : bool
+        Follow the family in both directions, from a motion.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        If lambda does not stay, and as :func:`fecontact.bifurcation.orbit_branch`.
+
+    References
+    ----------
+    F. J. Munoz-Almaraz et al., Continuation of periodic orbits in conservative and Hamiltonian
+    systems, Physica D 181 (2003) 1.
+    """
+    require_field(field)
+    require_kind("orbit_family", (HopfPoint, PeriodicMotion, Trajectory, FieldRun, tuple),
+                 start=start)
+    require_kind("orbit_family", (Collocation, type(None)), method=method)
+    require_finite("orbit_family", direction=direction)
+    free = field.index(field.parameter_or_only(unfolding))
+    if field.forcing_period(field.values) is not None:
+        raise InputError("orbit_family: the field depends on time, and so has no families of "
+                         "orbits; follow its orbits with orbit_branch.")
+    chosen = options_of(options, bounds)
+    chosen = replace(chosen, bounds=(-np.inf, np.inf), second_bounds=chosen.bounds,
+                     tolerance=min(chosen.tolerance, _TOLERANCE))
+    how = method or Collocation()
+    if isinstance(start, HopfPoint):
+        if both or field.index(start.branch.parameter_name) != free:
+            raise InputError(f"{start.place} has a family to one side, over "
+                             f"{start.branch.parameter_name!r}; leave out both, and name that "
+                             f"parameter.")
+        begun = starts.at_hopf(field, start, how.intervals, how.degree, chosen, scales, 1.0)
+        return _stays(field, free, _first(begun, chosen))
+    motion = as_motion(start)
+    values = field.values if motion.parameter_values is None else motion.parameter_values.copy()
+    sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
+    problem, u = starts.corrected_samples(
+        lambda intervals: starts.from_samples(
+            field, values, free, motion.times, motion.states, motion.period, intervals, how.degree,
+            1, np.append(sizes, 1.0)), how.intervals, family=True)
+    low, high = chosen.second_bounds
+    if not low <= problem.period(u) <= high:
+        raise InputError(f"The start has the period {problem.period(u):.6g} s, outside the bounds "
+                         f"{low:g} to {high:g} s.")
+    unit = np.zeros_like(u)
+    unit[-1] = 1.0
+    tangent = problem.linearise(u).solve(starts.size_row(problem, u), unit)
+    tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
+    return _stays(field, free, _followed((problem, u, tangent), chosen, limits, both))
+
+
+def _first(
+    begun: Iterator[tuple[starts.Start, Array | None]], options: ContinuationOptions
+) -> Branch:
+    """The branch of the first start that leads anywhere."""
+    failed: FecontactError = InputError("There is nothing to start from.")
+    for found, limits in begun:
+        try:
+            return _followed(found, options, limits)
+        except FecontactError as error:
+            failed = error
+    raise failed
+
+
+def _followed(
+    start: starts.Start, options: ContinuationOptions, limits: Array | None, both: bool = False
+) -> Branch:
+    """Follow a family from a start."""
+    problem, u, tangent = start
+    kept = {entry.name: getattr(problem, entry.name) for entry in fields(problem)}
+    family = FamilyProblem(**kept | {"limits": limits, "precision": _PRECISION})
+    return continue_branch(family, u, options, name=list(problem.field.parameters)[problem.free],
+                           tangent=tangent, both=both, attributes=attributes_of(problem, limits))
+
+
+def _stays(field: VectorField, free: int, family: Branch) -> Branch:
+    """The family; InputError unless its parameter stayed where it was."""
+    moved = float(np.ptp(family.parameter))
+    if moved > _STAYS * (1.0 + abs(float(family.parameter[0]))):
+        name = list(field.parameters)[free]
+        raise InputError(f"The orbits are no family at one value of {name!r}, which moves by "
+                         f"{moved:.3g} along them: the field is not conservative; follow them "
+                         f"with orbit_branch.")
+    return family
