@@ -12,7 +12,7 @@ from fecontact.bifurcation.continuation.newton import corrected, norm
 from fecontact.bifurcation.continuation.points import BranchPoint, special_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
-from fecontact.bifurcation.events.conditions import Condition
+from fecontact.bifurcation.events.conditions import DURATION, Condition
 from fecontact.bifurcation.events.orbit import EventOrbit
 from fecontact.bifurcation.events.phases import Motion
 from fecontact.bifurcation.events.reduced import reduced
@@ -27,7 +27,7 @@ from fecontact.integrate.solvers import SetValued
 _BEYOND, _FITS = (0.1, 0.01, 1e-3), 1e-5
 # What is left of a condition at a border counts as nothing below this; at most so many borders are
 # met at once.
-_NOTHING, _DEPTH = 1e-6, 4
+_NOTHING, _DEPTH = 1e-5, 4
 # Most borders on one branch.
 _MOST = 40
 # Distance from a border within which turns of the branch belong to it.
@@ -138,7 +138,7 @@ def _side(
         stored = [reduced(problem, point) for point in found]
         if not ended:
             return Going([*points, *stored], piece.status, piece.message)
-        condition = problem.linearise(last.u).least
+        condition = _nothing_left(problem, last.u)[0]
         kind = border_of(problem, last.u, condition)
         following = None if kind in stops else _following(problem, last, options)
         stored[-1] = _border(problem, last, stored[-1], condition, kind, following is not None)
@@ -214,12 +214,12 @@ def _following(
 
 
 def _nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
-    """The conditions that have nothing left at a border."""
+    """The conditions that have nothing left at a border, those of durations first."""
     found = problem.linearise(u).conditions
     least = min(abs(condition.left) for condition in found)
     return sorted((condition for condition in found
                    if abs(condition.left) < max(_NOTHING, 10.0 * least)),
-                  key=lambda condition: abs(condition.left))
+                  key=lambda condition: (condition.what != DURATION, abs(condition.left)))
 
 
 def _null_vector(problem: EventOrbit, matrix: Array) -> Array:

@@ -22,6 +22,9 @@ DURATION, RATE, WITHIN, BEGIN, CROSSING = range(5)
 _NEAR = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 _PARTS = np.concatenate([[0.0], _NEAR, np.linspace(0.02, 0.98, 49), 1.0 - _NEAR[::-1], [1.0]])
 _PLACES = 9
+# Parts of the period below which a phase has no rate at its end, and what vanishes at both of its
+# ends has no minimum between them.
+_BRIEF, _SHORT = 1e-6, 1e-2
 # Minima below this part of the scale are looked at closely.
 _CLOSE = 0.3
 
@@ -70,9 +73,10 @@ def of_phase(course: Course, i: int, rate: float) -> Iterator[Condition]:
     """The conditions of one phase; ``rate`` is that of what vanishes at its end."""
     phase, T, duration = course.phases[i], course.period, float(course.durations[i])
     yield Condition(duration / T, DURATION, i, phase.event, duration)
-    if phase.event != PERIOD:
-        scale = scales_of(phase, course.margins)[phase.event]
-        yield Condition(-rate * T / scale, RATE, i, phase.event, duration)
+    # What vanishes at both ends of a phase has no rate where the phase has no duration.
+    if phase.event != PERIOD and not (phase.order and abs(duration) < _BRIEF * T):
+        scale = scales_of(phase, course.margins)[phase.event] * (duration / T) ** phase.order
+        yield Condition(float(-rate * T / scale), RATE, i, phase.event, duration)
     if duration > 0.0:
         yield from _within(course, i)
     yield from _at_begin(course, i)
@@ -94,9 +98,11 @@ def _within(course: Course, i: int) -> Iterator[Condition]:
     duration = float(course.durations[i])
     times = duration * _PARTS
     found = sampled(course, i, times)
+    phase = course.phases[i]
     for event in range(found.shape[1]):
         column = found[:, event]
-        if not np.isfinite(column).all():
+        between = phase.order and event == phase.event and duration < _SHORT * course.period
+        if between or not np.isfinite(column).all():
             continue
         low = 1 + np.flatnonzero((column[1:-1] < column[:-2]) & (column[1:-1] <= column[2:]))
         for place in low:
