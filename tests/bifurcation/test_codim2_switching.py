@@ -66,17 +66,17 @@ def test_homoclinic_orbits_from_a_bogdanov_takens_point(of_folds):
 
 
 def two_pairs(t, x, p, out):
-    # Amplitudes r' = r (a - r^2 - s^2 / 2) and s' = s (b - 2 r^2 - s^2).
+    # Amplitudes r' = r (a - r^2 - 0.4 s^2) and s' = s (b - 2 r^2 - s^2).
     r, s = x[0] * x[0] + x[1] * x[1], x[2] * x[2] + x[3] * x[3]
-    g, k = p[0] - r - 0.5 * s, p[1] - 2.0 * r - s
+    g, k = p[0] - r - 0.4 * s, p[1] - 2.0 * r - s
     out[0], out[1] = g * x[0] - x[1], g * x[1] + x[0]
     out[2], out[3] = k * x[2] - 1.7 * x[3], k * x[3] + 1.7 * x[2]
 
 
 @pytest.mark.parametrize(("first", "second", "slope", "w"), [("a", "b", 2.0, 1.0),
-                                                             ("b", "a", 0.5, 1.7)])
+                                                             ("b", "a", 0.4, 1.7)])
 def test_tori_from_a_double_hopf_point(first, second, slope, w, tmp_path):
-    """Orbits r^2 = a lose stability at b = 2 a, those s^2 = b at a = b / 2."""
+    """Orbits r^2 = a lose stability at b = 2 a, those s^2 = b at a = 0.4 b."""
     field = vector_field(two_pairs, {"a": -0.5, "b": -0.5}, 4)
     curve, special = through(field, np.zeros(4), first, "Hopf", second, BOX)
     point, = read_branch(write_branch(tmp_path / "c.h5", curve)).of_kind("double Hopf")
@@ -87,6 +87,7 @@ def test_tori_from_a_double_hopf_point(first, second, slope, w, tmp_path):
     assert tori.column("period") == pytest.approx(np.full(len(tori), 2.0 * np.pi / w), rel=1e-9)
     assert tori.status in (BranchStatus.HOPF, BranchStatus.BOUND)
     assert len(special) == 1
+    assert not tori.of_kind("Chenciner")
     with pytest.raises(InputError, match="no curve to = 'homoclinic' begins there; known are: "
                                          "'Neimark-Sacker'"):
         codim2_curve(field, point, second, to="homoclinic")

@@ -276,7 +276,11 @@ class FoldPoint(BranchPoint):
 
     @property
     def coefficient(self) -> float:
-        """Quadratic coefficient of the normal form of equilibria."""
+        """Quadratic coefficient b of the normal form y' = b y^2.
+
+        Of orbits by collocation |b| with time in periods, y the amplitude of an eigenfunction of
+        unit mean square in the scales of the branch.
+        """
         return float(self._detail("coefficient"))
 
 

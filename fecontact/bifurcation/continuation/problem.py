@@ -20,7 +20,7 @@ class BranchStatus(Enum):
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
     HOPF = ("The orbits shrink to an equilibrium: the branch ends at a Hopf point, a curve of "
-            "folds at a Bautin point.")
+            "folds at a Bautin point, one of homoclinic orbits at a Bogdanov-Takens point.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
     STOPPED = "The branch reached a point at which it was to stop."

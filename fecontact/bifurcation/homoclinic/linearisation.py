@@ -65,7 +65,8 @@ class HomoclinicLinearised:
         """L_s (x(0) - s) and L_u (x(T) - s), together (d,)."""
         nodes = self.problem.nodes(self.u)
         stable, unstable = projections
-        return np.concatenate([stable @ (nodes[0] - self._rest), unstable @ (nodes[-1] - self._rest)])
+        return np.concatenate([stable @ (nodes[0] - self._rest),
+                               unstable @ (nodes[-1] - self._rest)])
 
     @cached_property
     def _phase_row(self) -> Array:

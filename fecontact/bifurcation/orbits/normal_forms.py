@@ -1,7 +1,8 @@
-"""Normal forms of period doublings and Neimark-Sacker points: sub- or supercritical.
+"""Normal forms of folds, and of period doublings and Neimark-Sacker points: sub- or supercritical.
 
 On the centre manifold, with time in periods of the orbit and its phase moving with the flow,
 
+    fold              xi' = b xi^2           v' = A v - a x', with the phase at the speed 1 + a xi
     period doubling   xi' = c xi^3           v antiperiodic, v' = A v
     Neimark-Sacker    z' = i theta z + D z |z|^2        v' + i theta v = A v
 
@@ -40,13 +41,16 @@ def examined(
 
     'coefficient' is c or Re D for eigenfunctions of unit mean square in the scaled states,
     'coefficient_error' the change between two difference steps, 'criticality' their conclusion,
-    see :func:`verdict`. Without ``details`` these are omitted.
+    see :func:`verdict`; at folds |b|, without conclusion. Without ``details`` these are omitted.
     """
     found = linearised.floquet.confirmed(kind)
     if found is None or not details:
         return found
     if kind == "period doubling":
         found |= _judged(Expansion(problem, u, linearised).doubling)
+    elif kind == "fold":
+        found |= _judged(Expansion(problem, u, linearised).fold)
+        del found["criticality"]
     elif kind == "torus":
         expansion = Expansion(problem, u, linearised)
         found |= _judged(partial(expansion.torus, found["angle"]))
@@ -97,6 +101,13 @@ class Expansion:
         self._motion = slopes / self._h
         self._last: tuple[Array, float, list[Array]] | None = None
 
+    def fold(self, step: float) -> float:
+        """Size of the coefficient b of a fold; its sign is that of the direction of v."""
+        V, drift = self._fold_function
+        kernel = self._motion if self._problem.autonomous else V
+        second = self._second(V, V, step) / 2.0 - drift * self._along(V)
+        return abs(float(self._share(self._J, V[:, :, None], kernel, second, 1.0)[0]))
+
     def doubling(self, step: float) -> float:
         """Coefficient c of a period doubling, with differences over ``step``."""
         V = self._doubling_function
@@ -119,6 +130,16 @@ class Expansion:
         return float(self._share(self._turned(angle), columns, _split(V), _split(third), 1.0)[0])
 
     @cached_property
+    def _fold_function(self) -> tuple[Array, float]:
+        """Eigenfunction v of the multiplier 1 at a fold, at the points (N m, d), and a."""
+        system, rows = self._periodic
+        _, _, vectors = np.linalg.svd(system.matrix)
+        found = system.expand(vectors[-1])
+        V = self._at_points(found, self._x.shape[1], 1.0)
+        size = self._size(V)
+        return V / size, float(found[-1]) / size if rows else 0.0
+
+    @cached_property
     def _doubling_function(self) -> Array:
         """Eigenfunction of the multiplier -1 at the points (N m, d)."""
         system = self._bordered(self._J, np.zeros((*self._x.shape, 0)), [], -1.0)
@@ -135,8 +156,12 @@ class Expansion:
         return self._at_points(system.expand(vectors[-1]), len(vectors[-1]), closing)
 
     def _normalised(self, V: Array) -> Array:
+        return V / self._size(V)
+
+    def _size(self, V: Array) -> float:
+        """Root of the mean square of the scaled states."""
         weights = (np.tile(self._problem.rule.weights, self._problem.intervals)[:, None] * self._h)
-        return V / np.sqrt(np.sum(weights * np.abs(V / self._scales) ** 2))
+        return float(np.sqrt(np.sum(weights * np.abs(V / self._scales) ** 2)))
 
     def _response(self, bend: Array) -> tuple[Array, float]:
         """Periodic h with h' - A h = bend - a x' at the points, and the phase acceleration a."""
