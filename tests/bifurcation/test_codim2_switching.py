@@ -264,15 +264,30 @@ def two_tori(t, x, p, out):
     out[3], out[4] = other * x[3] - 0.45 * x[4], other * x[4] + 0.45 * x[3]
 
 
+def flip_and_torus(t, x, p, out):
+    # A doubling at k = 0 along the twisted direction, and a pair exp(pi (lam - 0.1 +- 0.45 i)).
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, u, v = x[0] / r, x[1] / r, r - 1.0, x[2]
+    square = (u * u + v * v + (u * u - v * v) * C + 2.0 * u * v * S) / 2.0
+    growth, other = p[1] - square, p[0] - 0.1 - x[3] * x[3] - x[4] * x[4]
+    low, high = (growth - 1.0) / 2.0, (growth + 1.0) / 2.0
+    radial = low * u + high * (C * u + S * v) - v
+    out[0], out[1] = radial * C - 2.0 * r * S, radial * S + 2.0 * r * C
+    out[2] = low * v + high * (S * u - C * v) + u
+    out[3], out[4] = other * x[3] - 0.45 * x[4], other * x[4] + 0.45 * x[3]
+
+
 @pytest.mark.parametrize(("function", "first", "start", "second", "kind", "found"), [
     (chenciner, "lam", "Neimark-Sacker", "k", "Chenciner", (0.0, 0.2)),
     (flip_fold, "lam", "fold", "k", "fold-flip", (0.0, 0.0)),
     (flip_fold, "k", "period doubling", "lam", "fold-flip", (0.0, 0.0)),
     (turning_fold, "lam", "fold", "k", "fold-Neimark-Sacker", (0.0, 0.0)),
     (turning_fold, "k", "Neimark-Sacker", "lam", "fold-Neimark-Sacker", (0.0, 0.0)),
-    (two_tori, "lam", "Neimark-Sacker", "k", "double Neimark-Sacker", (0.0, 0.1))])
+    (two_tori, "lam", "Neimark-Sacker", "k", "double Neimark-Sacker", (0.0, 0.1)),
+    (flip_and_torus, "k", "period doubling", "lam", "flip-Neimark-Sacker", (0.1, 0.0)),
+    (flip_and_torus, "lam", "Neimark-Sacker", "k", "flip-Neimark-Sacker", (0.1, 0.0))])
 def test_special_points_of_curves_of_orbits(function, first, start, second, kind, found):
-    states = {"chenciner": 3, "two_tori": 5}.get(function.__name__, 4)
+    states = {"chenciner": 3, "two_tori": 5, "flip_and_torus": 5}.get(function.__name__, 4)
     field = vector_field(function, {"lam": 0.25 if states == 4 else -0.2, "k": -0.4}, states)
     t = np.linspace(0.0, np.pi, 400)
     motion = np.zeros((400, states))

@@ -6,17 +6,21 @@ from systems import two_mass_field, two_mass_system, with_force
 from test_branch_ends import homoclinic, lens, takens
 from test_orbit_curves import ring
 
+from fecontact import ContactSystem, Ground, basis_from_matrices
 from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
     ContinuationOptions,
     HarmonicBalance,
     Shooting,
+    codim2_curve,
     contact_field,
     equilibrium_branch,
+    find_equilibrium,
     orbit_branch,
     vector_field,
 )
+from fecontact.laws import BilateralCubic, CubicFriction
 
 
 @pytest.mark.parametrize(("largest", "within"), [(0.01, 1e-9), (0.05, 1e-8), (0.2, 1e-7)])
@@ -81,6 +85,49 @@ def test_orbits_of_two_masses_between_two_hopf_points(between, method):
     assert end.values["period"] == pytest.approx(last.period, rel=1e-5)
     largest = max(np.ptp([at.values["minimum"][0], at.values["maximum"][0]]) for at in orbits)
     assert np.ptp([end.values["minimum"][0], end.values["maximum"][0]]) < 1e-2 * largest
+
+
+@pytest.fixture(scope="module")
+def wells():
+    """A mass between two wells, q - q^3, driven by friction that falls with velocity on a belt.
+
+    Orbits about the left well end at one homoclinic to the saddle between them.
+    """
+    rows = np.zeros((2, 3, 1))
+    rows[0, 0, 0] = rows[1, 1, 0] = 1.0
+    basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": rows}, damping=[[0.02]])
+    system = ContactSystem(
+        basis, normal=BilateralCubic(stiffness=(0.0, -2.0), cubic_stiffness=(0.0, 1.0),
+                                     preload=(0.2, 0.0)),
+        friction=CubicFriction(0.4, 0.2, minimum_velocity=1.0), ground=Ground(speed=1.0))
+    field = contact_field(system, {"ground.speed": None, "basis.damping.0.0": None})
+    rest = find_equilibrium(field, start=[-1.0, 0.0])
+    hopf, = equilibrium_branch(field, rest, "ground.speed", bounds=(0.5, 1.2), both=True).of_kind(
+        "Hopf")
+    orbits = orbit_branch(field, hopf, method=Collocation(60), bounds=(0.5, 1.2),
+                          scales=[1.0, 1.0], options=ContinuationOptions(largest_step=0.2))
+    assert orbits.status is BranchStatus.HOMOCLINIC
+    return field, orbits
+
+
+@pytest.mark.parametrize("method", [pytest.param(Shooting(4), marks=pytest.mark.long),
+                                    HarmonicBalance(harmonics=40)])
+def test_stick_free_orbits_that_end_homoclinic(wells, method):
+    """The belt's speed there is the same by all methods, and on the curve of homoclinic orbits."""
+    field, orbits = wells
+    near = next(at for at in orbits if at.values["period"] > 11.0)
+    found = orbit_branch(field, near.orbit(field, 4000), "ground.speed", method=method,
+                         bounds=(0.5, 1.2), scales=[1.0, 1.0],
+                         direction=float(np.sign(near.tangent[-1])),
+                         options=ContinuationOptions(largest_step=0.2))
+    assert found.status is BranchStatus.HOMOCLINIC
+    end = found.points[-1]
+    assert end.parameter == pytest.approx(orbits.points[-1].parameter, abs=1e-6)
+    curve = codim2_curve(field, end, "basis.damping.0.0", to="homoclinic",
+                         bounds={"ground.speed": (0.5, 1.2), "basis.damping.0.0": (0.015, 0.025)},
+                         options=ContinuationOptions(points=2))
+    assert curve.points[0].parameter == pytest.approx(end.parameter, abs=1e-6)
+    assert curve.points[0].values["truncation_error"] < 1e-7
 
 
 @pytest.mark.parametrize("method", [Collocation(20), HarmonicBalance(harmonics=9)])

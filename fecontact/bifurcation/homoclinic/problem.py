@@ -21,9 +21,8 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues
-from fecontact.bifurcation.fields.vector_field import VectorField
 from fecontact.bifurcation.homoclinic import open_mesh
-from fecontact.bifurcation.homoclinic.linearisation import HomoclinicLinearised
+from fecontact.bifurcation.homoclinic.linearisation import HomoclinicLinearised, OpenOrbit
 from fecontact.bifurcation.homoclinic.saddle import (
     Saddle,
     discriminant,
@@ -48,29 +47,14 @@ _LEAST, _SLOWEST = 1e-2, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class HomoclinicProblem(Problem):
-    """Homoclinic orbits; u = [nodes ((N m + 1) d), saddle (d), second, first parameter].
+class HomoclinicProblem(OpenOrbit, Problem):
+    """The problem of following homoclinic orbits; see :class:`OpenOrbit`.
 
     Attributes
     ----------
-    field, values : VectorField, (k,) array
-        Both free parameters are taken from u.
-    active : (int, int)
-        Indices of the second and the first parameter.
-    mesh : (N + 1,) array
-        Ends of the intervals, from 0 to 1.
-    degree : int
-        m.
-    time : float
-        Length T of the interval [s].
-    reference : (N m + 1, d) array
-        Nodes of the orbit that fixes the phase.
-    scales : (d + 2,) array
-        Scales of the states and of both parameters.
-    rows : pair of arrays
-        Left subspaces of the saddle of the orbit before, stable and unstable.
     leading : pair of (d,) arrays or None
-        Left eigenvectors of its leading eigenvalues, unstable and stable, where these are real.
+        Left eigenvectors of the leading eigenvalues of the saddle of the orbit before, unstable
+        and stable, where these are real.
     intervals : int
         Number of intervals after each step.
     distance : float
@@ -79,43 +63,10 @@ class HomoclinicProblem(Problem):
         Largest amplitude and largest rate of the saddle up to here.
     """
 
-    field: VectorField
-    values: Array
-    active: tuple[int, int]
-    mesh: Array
-    degree: int
-    time: float
-    reference: Array
-    scales: Array
-    rows: tuple[Array, Array]
-    leading: tuple[Array | None, Array | None]
-    intervals: int
+    leading: tuple[Array | None, Array | None] = (None, None)
+    intervals: int = 60
     distance: float = DISTANCE
     largest: tuple[float, float] = (0.0, 0.0)
-
-    @cached_property
-    def sizes(self) -> Array:
-        """Scales (d,) of the states."""
-        return self.scales[:-2]
-
-    @property
-    def size(self) -> int:
-        """Number of nodal unknowns, those of the last node included."""
-        return self.reference.size
-
-    def nodes(self, u: Array) -> Array:
-        """Nodes (N m + 1, d)."""
-        return u[: self.size].reshape(self.reference.shape)
-
-    def rest(self, u: Array) -> Array:
-        """The saddle (d,)."""
-        return np.ascontiguousarray(u[self.size : -2])
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[list(self.active)] = u[-2:]
-        return values
 
     def linearise(self, u: Array) -> HomoclinicLinearised:
         """The equations about u."""
