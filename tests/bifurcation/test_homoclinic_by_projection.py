@@ -266,8 +266,58 @@ def test_special_points_of_the_curve(function, q, states, kind, at):
     assert point.values["q"] == pytest.approx(at, abs=2e-4)
 
 
-def driven(t, x, p, out):
-    out[0], out[1] = x[1], -p[0] * x[0] - 0.1 * x[1] + p[1] * np.cos(t)
+def pendulum(t, x, p, out):
+    # phi'' + a phi' + sin(phi) = I on the circle x = cos(phi), y = sin(phi).
+    growth = 1.0 - x[0] * x[0] - x[1] * x[1]
+    out[0] = growth * x[0] - x[2] * x[1]
+    out[1] = growth * x[1] + x[2] * x[0]
+    out[2] = p[0] - p[1] * x[2] - x[1]
+
+
+def left_over(a, drive):
+    """Speed with which the pendulum leaves the saddle a turn before it comes back to it, squared.
+
+    Back in time along the stable direction; negative where it turns before.
+    """
+    from scipy.integrate import solve_ivp
+
+    saddle = np.pi - np.arcsin(drive)
+    slope = -(a + np.sqrt(a * a - 4.0 * np.cos(saddle))) / 2.0
+    run = solve_ivp(lambda phi, half: [drive - np.sin(phi) - a * np.sqrt(2.0 * max(half[0], 0.0))],
+                    (saddle - 1e-5, saddle - 2.0 * np.pi), [0.5 * (slope * 1e-5) ** 2],
+                    method="DOP853", rtol=1e-11, atol=1e-14)
+    return run.y[0, -1]
+
+
+def test_rotations_of_a_pendulum():
+    """I = (4 / pi) a + O(a^3), up to where the saddle meets the equilibrium below, I = 1."""
+    from scipy.integrate import solve_ivp
+    from scipy.optimize import brentq
+
+    def rates(t, x):
+        out = np.zeros(3)
+        pendulum(t, x, [0.9, 0.3], out)
+        return out
+
+    field = vector_field(pendulum, {"I": 0.9, "a": 0.3}, 3)
+    run = solve_ivp(rates, (0.0, 100.0), [1.0, 0.0, 3.0], rtol=1e-9, atol=1e-11,
+                    t_eval=np.linspace(80.0, 100.0, 8000))
+    orbits = orbit_branch(field, (run.t, run.y.T), "I", method=Collocation(intervals=60),
+                          direction=-1.0, bounds=(0.0, 1.2))
+    assert orbits.status is BranchStatus.HOMOCLINIC
+    curve = codim2_curve(field, orbits.points[-1], "a", to="homoclinic",
+                         bounds={"I": (0.0, 1.2), "a": (0.0, 2.0)})
+    assert curve.status is BranchStatus.SADDLE_NODE
+    drive, a = curve.parameter, curve.column("a")
+    some = (a > 0.01) & (a < 0.5)
+    assert polyfit(a[some] ** 2, (drive / a)[some], 3)[0] == pytest.approx(4.0 / np.pi, abs=1e-6)
+    near = int(np.argmin(np.abs(a - 0.5)))
+    assert drive[near] == pytest.approx(
+        brentq(lambda value: left_over(a[near], value), 0.5, 0.7, xtol=1e-12), abs=1e-7)
+    # The end, from the strong stable direction of the saddle-node.
+    end = brentq(lambda value: left_over(value, 1.0), 1.0, 1.4, xtol=1e-10)
+    assert a[-1] == pytest.approx(end, abs=1e-3)
+    assert drive[-1] == pytest.approx(1.0, abs=1e-5)
 
 
 def test_kind_errors(field, near, curve):

@@ -44,6 +44,8 @@ _LONGEST, _STEP = 10.0, 0.4
 _LONGER = 10.0
 # Amplitude and rates of the saddle, in the largest ones of the curve, at which it ends.
 _LEAST, _SLOWEST = 1e-2, 0.2
+# Ratio of its rates at which the saddle counts as one that meets another equilibrium.
+_MEETS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,7 @@ class HomoclinicProblem(OpenOrbit, Problem):
             row = leading_row(saddle.jacobian, leading[0])
             if value is not None and known is not None and row is not None:
                 # In units of the leading part at the middle, which does not depend on T.
-                part = float(row @ end) * np.exp(min(0.5 * rate * self.time, 500.0))
+                part = float(row @ end) * np.exp(min(0.5 * rate * self.time, 100.0))
                 found[f"{name} orbit flip"] = part * float(np.sign(row @ known))
         return found
 
@@ -162,11 +164,11 @@ class HomoclinicProblem(OpenOrbit, Problem):
         return resting(tangents, float(self.scales[-1]))
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
-        """Where both orbit and rates vanish, at a Bogdanov-Takens point."""
-        amplitude, rate = self.amplitude(u), max(self.saddle(u).rates)
-        if amplitude < _LEAST * self.largest[0] and rate < _SLOWEST * self.largest[1]:
+        """Where both orbit and rates vanish, at a Bogdanov-Takens point, or one rate alone."""
+        amplitude, rates = self.amplitude(u), self.saddle(u).rates
+        if amplitude < _LEAST * self.largest[0] and max(rates) < _SLOWEST * self.largest[1]:
             return BranchStatus.HOPF
-        return None
+        return BranchStatus.SADDLE_NODE if min(rates) < _MEETS * max(rates) else None
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[HomoclinicProblem, Array, Array]":
         """The problem for the next step: interval, mesh, phase and subspaces for this orbit."""
