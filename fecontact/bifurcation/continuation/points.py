@@ -240,7 +240,8 @@ class BranchPoint:
         """'supercritical', 'subcritical' or 'undecided'; None where no normal form tells it.
 
         It is known at Hopf points, at forks of equilibria, and of orbits by collocation at period
-        doublings and Neimark-Sacker points.
+        doublings and Neimark-Sacker points; of others
+        :func:`fecontact.bifurcation.with_normal_form` finds it.
         """
         found = self._details.get("criticality")
         return None if found is None else str(found)
