@@ -244,7 +244,22 @@ def spiral_back(t, x, p, out):
     out[3] = 0.5 * x[3] - p[1] * x[2]
 
 
+def pushed(t, x, p, out):
+    # z, which is zero, would push x: int exp(-t / 2) (q x - x^2) x' dt = 0 turns the manifold over.
+    out[0] = x[1]
+    out[1] = x[0] - x[0] * x[0] + p[0] * x[1] + (p[1] * x[0] - x[0] * x[0]) * x[2]
+    out[2] = -0.5 * x[2]
+
+
+def pushed_back(t, x, p, out):
+    out[0] = -x[1]
+    out[1] = -x[0] + x[0] * x[0] - p[0] * x[1] - (p[1] * x[0] - x[0] * x[0]) * x[2]
+    out[2] = 0.5 * x[2]
+
+
 @pytest.mark.parametrize(("function", "q", "states", "kind", "at"), [
+    (pushed, 0.3, 3, "stable inclination flip", (16.0 - 4.0 * DELTA**2) / 20.0),
+    (pushed_back, 0.3, 3, "unstable inclination flip", (16.0 - 4.0 * DELTA**2) / 20.0),
     (dragged, 0.9, 3, "stable orbit flip", 1.5 * (16.0 - 4.0 * DELTA**2) / 20.0),
     (dragged_back, 0.9, 3, "unstable orbit flip", 1.5 * (16.0 - 4.0 * DELTA**2) / 20.0),
     (spiral, 0.1, 4, "stable double eigenvalue", 0.0),
@@ -255,14 +270,16 @@ def test_special_points_of_the_curve(function, q, states, kind, at):
     z comes back along the slow direction but for int exp(t / 2) (q x^2 - x^3) dt = 0.
     """
     field = vector_field(function, {"a": -0.5, "q": q}, states)
-    begin = np.array([1.0, 0.0, 2.0 * (q - 1.0), 0.0])[:states]
+    z = 2.0 * (q - 1.0) if "dragged" in function.__name__ else 0.0
+    begin = np.array([1.0, 0.0, z, 0.0])[:states]
     hopf = equilibrium_branch(field, begin, "a", bounds=(-0.5, 0.5)).of_kind("Hopf")[0]
     orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), bounds=(-0.5, 0.5))
     assert orbits.status is BranchStatus.HOMOCLINIC
     curve = codim2_curve(field, orbits.points[-1], "q", to="homoclinic",
-                         bounds={"a": (-0.5, 0.5), "q": (-0.3, 1.5)})
+                         bounds={"a": (-0.5, 0.5), "q": (-0.3, 0.2 if states == 4 else 1.5)})
     assert np.abs(curve.parameter).max() < 1e-7
-    point, = curve.of_kind(kind)
+    point, = curve.special
+    assert point.kind == kind
     assert point.values["q"] == pytest.approx(at, abs=2e-4)
 
 

@@ -23,8 +23,8 @@ class BranchStatus(Enum):
             "folds at a Bautin point, one of homoclinic orbits at a Bogdanov-Takens point.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
-    SADDLE_NODE = ("The saddle of the homoclinic orbits meets another equilibrium, in a fold, where "
-                   "they begin or end.")
+    SADDLE_NODE = ("The saddle of the homoclinic orbits meets another equilibrium in a fold: there "
+                   "the curve ends.")
     STOPPED = "The branch reached a point at which it was to stop."
     CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
               "again.")

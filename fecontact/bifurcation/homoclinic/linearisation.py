@@ -187,6 +187,23 @@ class HomoclinicLinearised:
             [self._phase_row.reshape(-1), np.zeros(d + 2)]))
         return small, weights
 
+    @cached_property
+    def adjoint(self) -> tuple[Array, Array, Array]:
+        """Ends (d,) of the bounded solution p of p' = -f_x^T p, and int p f_p dt (2,).
+
+        The latter is of length one in widths of the diagram; its direction is that in which the
+        manifolds part as the second and the first parameter change, at right angles to the curve.
+        """
+        d = self.problem.field.dimension
+        rows = self._small[0][: 3 * d]
+        left = np.linalg.svd(rows[:, : 3 * d] / np.abs(rows[:, : 3 * d]).max(axis=1)[:, None])[0]
+        found = left[:, -1] / np.abs(rows[:, : 3 * d]).max(axis=1)
+        parts = (found @ rows[:, 3 * d :]) * self.problem.scales[-2:]
+        found, parts = (each / np.linalg.norm(parts) for each in (found, parts))
+        stable, unstable = self._projections(self.jacobian)
+        n = len(stable)
+        return (found[2 * d : 2 * d + n] @ stable, found[2 * d + n :] @ unstable, parts)
+
     def _reduced(self, row: Array) -> tuple[Array, Array]:
         """A row over u reduced to x(0), x(T), s and the parameters, and its multiples."""
         d = self.problem.field.dimension

@@ -27,7 +27,7 @@ from fecontact.bifurcation.homoclinic.saddle import (
     Saddle,
     discriminant,
     flown,
-    leading_row,
+    leading_rows,
     left_subspaces,
     saddle_of,
 )
@@ -44,6 +44,8 @@ _LONGEST, _STEP = 10.0, 0.4
 _LONGER = 10.0
 # Amplitude and rates of the saddle, in the largest ones of the curve, at which it ends.
 _LEAST, _SLOWEST = 1e-2, 0.2
+# Part of an orbit, or of its adjoint solution, along a leading direction that is rounding.
+_ABSENT = 1e-4
 # Ratio of its rates at which the saddle counts as one that meets another equilibrium.
 _MEETS = 1e-3
 
@@ -135,22 +137,29 @@ class HomoclinicProblem(OpenOrbit, Problem):
         return float(np.abs(change[-2:] / self.scales[-2:]).max())
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
-        """Test functions of neutral saddles, double leading eigenvalues and orbit flips."""
+        """Test functions of neutral saddles, double leading eigenvalues and flips."""
         saddle = self.saddle(u)
         out, back = saddle.rates
         found = {"neutral saddle": (out - back) / (out + back)}
-        away = self.away(u)
-        for name, leading, end, rate, known in (
-                ("unstable", saddle.unstable, away[0], out, self.leading[0]),
-                ("stable", saddle.stable, away[-1], back, self.leading[1])):
+        away, whole = self.away(u), self.amplitude(u)
+        first, last, apart = linearisation.adjoint
+        # Of one sign along the curve, to which the direction is at right angles.
+        along = tangent[-2:] / self.scales[-2:]
+        turn = float(np.sign(apart[0] * along[1] - apart[1] * along[0]))
+        for name, leading, end, rate, known, adjoint in (
+                ("unstable", saddle.unstable, away[0], out, self.leading[0], last),
+                ("stable", saddle.stable, away[-1], back, self.leading[1], first)):
             value = discriminant(leading)
             if value is not None:
                 found[f"{name} double eigenvalue"] = value
-            row = leading_row(saddle.jacobian, leading[0])
-            if value is not None and known is not None and row is not None:
+            rows = leading_rows(saddle.jacobian, leading[0])
+            if value is not None and known is not None and rows is not None:
                 # In units of the leading part at the middle, which does not depend on T.
-                part = float(row @ end) * np.exp(min(0.5 * rate * self.time, 100.0))
-                found[f"{name} orbit flip"] = part * float(np.sign(row @ known))
+                grown = np.exp(min(0.5 * rate * self.time, 100.0))
+                side = float(np.sign(rows[0] @ known))
+                found[f"{name} orbit flip"] = side * grown * float(rows[0] @ end) / whole
+                found[f"{name} inclination flip"] = side * turn * grown * float(
+                    (adjoint * self.sizes) @ rows[1])
         return found
 
     def examine(
@@ -160,8 +169,10 @@ class HomoclinicProblem(OpenOrbit, Problem):
         return {"kind": "turning point"} if kind == "fold" else {}
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of the first parameter where it does not change but for rounding."""
-        return resting(tangents, float(self.scales[-1]))
+        """Turns of a parameter that rests, flips where there is no part along the direction."""
+        absent = {name for name in tests[0] if name.endswith("flip")
+                  and max(abs(side.get(name, np.inf)) for side in tests) < _ABSENT}
+        return resting(tangents, float(self.scales[-1])) | absent
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """Where both orbit and rates vanish, at a Bogdanov-Takens point, or one rate alone."""
@@ -192,10 +203,10 @@ class HomoclinicProblem(OpenOrbit, Problem):
             self.mesh, self.nodes(each), self.degree, places).reshape(-1), each[self.size :]])
             for each in (u, tangent))
         saddle = self.saddle(u)
-        rows = [leading_row(saddle.jacobian, leading[0])
+        rows = [leading_rows(saddle.jacobian, leading[0])
                 for leading in (saddle.unstable, saddle.stable)]
-        leading = [row if row is None or known is None or row @ known >= 0.0 else -row
-                   for row, known in zip(rows, self.leading, strict=True)]
+        leading = [None if row is None else row[0] if known is None or row[0] @ known >= 0.0
+                   else -row[0] for row, known in zip(rows, self.leading, strict=True)]
         largest = (max(self.largest[0], self.amplitude(u)), max(self.largest[1], *saddle.rates))
         return replace(self, mesh=mesh, reference=moved[: len(places) * len(self.sizes)].reshape(
             len(places), -1).copy(), rows=left_subspaces(saddle.jacobian),

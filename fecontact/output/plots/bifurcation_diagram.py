@@ -47,6 +47,7 @@ SPECIAL = {
     "double Neimark-Sacker": ("NSNS", "d"), "neutral saddle": ("NSS", "d"),
     "stable double eigenvalue": ("DRS", "d"), "unstable double eigenvalue": ("DRU", "d"),
     "stable orbit flip": ("OFS", "d"), "unstable orbit flip": ("OFU", "d"),
+    "stable inclination flip": ("IFS", "d"), "unstable inclination flip": ("IFU", "d"),
 }
 # Letters alone, for diagrams of other kinds.
 LETTERS = {kind: letters for kind, (letters, _) in SPECIAL.items()}
