@@ -152,8 +152,12 @@ def check_orbits(names, printed, folder):
     motion = names["motion"]
     assert motion.times[-1] == pytest.approx(names["orbits"].points[40].values["period"])
     assert motion.states[0] == pytest.approx(motion.states[-1], abs=1e-12)
-    assert names["homoclinic"].column("period") == pytest.approx(60.0, rel=1e-9)
-    assert names["homoclinic"].column("m").min() == pytest.approx(-4.0, rel=1e-9)
+    assert names["long_orbits"].column("period") == pytest.approx(60.0, rel=1e-9)
+    assert names["long_orbits"].column("m").min() == pytest.approx(-4.0, rel=1e-9)
+    for name in ("homoclinic", "long_orbits"):
+        m, c = names[name].column("m"), names[name].column("c")
+        order = np.argsort(-m)
+        assert np.interp(1.0, -m[order], c[order]) == pytest.approx(0.743444, rel=2e-3)
     found = {name: [round(point.parameter, 4) for point in branch.of_kind("period doubling")]
              for name, branch in names["tree"].found.items()}
     assert found["orbits 1, doubled"] == [9.2619]

@@ -28,6 +28,7 @@ from .nonlinear_modes.mode_response import ModeResponse, Resonance, mode_respons
 from .nonlinear_modes.nonlinear_mode import NonlinearMode, nonlinear_mode
 from .nonlinear_modes.resonance_curve import ResonanceCurve, resonance_curve
 from .orbit_family import orbit_family
+from .orbit_forms import with_normal_form
 from .orbits.branches import Collocation, Shooting, orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
@@ -90,4 +91,5 @@ __all__ = [
     "resonance_curve",
     "stability_map",
     "vector_field",
+    "with_normal_form",
 ]

@@ -52,8 +52,7 @@ def codim2_curve(
 ) -> Branch:
     """Follow a special point over two parameters, such as the border of flutter or stick-slip.
 
-    The kind of the point selects the curve, or its period: orbits of a fixed large period follow a
-    homoclinic orbit. docs/bifurcation.md lists what its points store, and its special points.
+    docs/bifurcation.md lists what the points store, and the special points of each kind of curve.
 
     Parameters
     ----------

@@ -1,5 +1,4 @@
-"""Curves of orbits that begin at points of codimension two: a point of each is looked for beside them.
-"""
+"""Curves of orbits that begin at points of codimension two; a point of each is looked for."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace

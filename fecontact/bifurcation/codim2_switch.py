@@ -62,7 +62,7 @@ def values_at(field: VectorField, point: BranchPoint, parameter: str) -> Array:
 
 
 def tangent_at(problem: Problem, u: Array, direction: float) -> Array:
-    """Tangent (N + 1,) of length one of a curve; ``direction`` as in :func:`codim2_curve`.
+    """Tangent (N + 1,) of length one of a curve; ``direction`` as in the function codim2_curve.
 
     One parameter may rest where the curve starts; the other one then parametrises it.
     """

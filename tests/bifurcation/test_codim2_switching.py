@@ -66,17 +66,17 @@ def test_homoclinic_orbits_from_a_bogdanov_takens_point(of_folds):
 
 
 def two_pairs(t, x, p, out):
-    # Amplitudes r' = r (a - r^2 - s^2 / 2) and s' = s (b - 2 r^2 - s^2).
+    # Amplitudes r' = r (a - r^2 - 0.4 s^2) and s' = s (b - 2 r^2 - s^2).
     r, s = x[0] * x[0] + x[1] * x[1], x[2] * x[2] + x[3] * x[3]
-    g, k = p[0] - r - 0.5 * s, p[1] - 2.0 * r - s
+    g, k = p[0] - r - 0.4 * s, p[1] - 2.0 * r - s
     out[0], out[1] = g * x[0] - x[1], g * x[1] + x[0]
     out[2], out[3] = k * x[2] - 1.7 * x[3], k * x[3] + 1.7 * x[2]
 
 
 @pytest.mark.parametrize(("first", "second", "slope", "w"), [("a", "b", 2.0, 1.0),
-                                                             ("b", "a", 0.5, 1.7)])
+                                                             ("b", "a", 0.4, 1.7)])
 def test_tori_from_a_double_hopf_point(first, second, slope, w, tmp_path):
-    """Orbits r^2 = a lose stability at b = 2 a, those s^2 = b at a = b / 2."""
+    """Orbits r^2 = a lose stability at b = 2 a, those s^2 = b at a = 0.4 b."""
     field = vector_field(two_pairs, {"a": -0.5, "b": -0.5}, 4)
     curve, special = through(field, np.zeros(4), first, "Hopf", second, BOX)
     point, = read_branch(write_branch(tmp_path / "c.h5", curve)).of_kind("double Hopf")
@@ -87,6 +87,7 @@ def test_tori_from_a_double_hopf_point(first, second, slope, w, tmp_path):
     assert tori.column("period") == pytest.approx(np.full(len(tori), 2.0 * np.pi / w), rel=1e-9)
     assert tori.status in (BranchStatus.HOPF, BranchStatus.BOUND)
     assert len(special) == 1
+    assert not tori.of_kind("Chenciner")
     with pytest.raises(InputError, match="no curve to = 'homoclinic' begins there; known are: "
                                          "'Neimark-Sacker'"):
         codim2_curve(field, point, second, to="homoclinic")
@@ -263,15 +264,30 @@ def two_tori(t, x, p, out):
     out[3], out[4] = other * x[3] - 0.45 * x[4], other * x[4] + 0.45 * x[3]
 
 
+def flip_and_torus(t, x, p, out):
+    # A doubling at k = 0 along the twisted direction, and a pair exp(pi (lam - 0.1 +- 0.45 i)).
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, u, v = x[0] / r, x[1] / r, r - 1.0, x[2]
+    square = (u * u + v * v + (u * u - v * v) * C + 2.0 * u * v * S) / 2.0
+    growth, other = p[1] - square, p[0] - 0.1 - x[3] * x[3] - x[4] * x[4]
+    low, high = (growth - 1.0) / 2.0, (growth + 1.0) / 2.0
+    radial = low * u + high * (C * u + S * v) - v
+    out[0], out[1] = radial * C - 2.0 * r * S, radial * S + 2.0 * r * C
+    out[2] = low * v + high * (S * u - C * v) + u
+    out[3], out[4] = other * x[3] - 0.45 * x[4], other * x[4] + 0.45 * x[3]
+
+
 @pytest.mark.parametrize(("function", "first", "start", "second", "kind", "found"), [
     (chenciner, "lam", "Neimark-Sacker", "k", "Chenciner", (0.0, 0.2)),
     (flip_fold, "lam", "fold", "k", "fold-flip", (0.0, 0.0)),
     (flip_fold, "k", "period doubling", "lam", "fold-flip", (0.0, 0.0)),
     (turning_fold, "lam", "fold", "k", "fold-Neimark-Sacker", (0.0, 0.0)),
     (turning_fold, "k", "Neimark-Sacker", "lam", "fold-Neimark-Sacker", (0.0, 0.0)),
-    (two_tori, "lam", "Neimark-Sacker", "k", "double Neimark-Sacker", (0.0, 0.1))])
+    (two_tori, "lam", "Neimark-Sacker", "k", "double Neimark-Sacker", (0.0, 0.1)),
+    (flip_and_torus, "k", "period doubling", "lam", "flip-Neimark-Sacker", (0.1, 0.0)),
+    (flip_and_torus, "lam", "Neimark-Sacker", "k", "flip-Neimark-Sacker", (0.1, 0.0))])
 def test_special_points_of_curves_of_orbits(function, first, start, second, kind, found):
-    states = {"chenciner": 3, "two_tori": 5}.get(function.__name__, 4)
+    states = {"chenciner": 3, "two_tori": 5, "flip_and_torus": 5}.get(function.__name__, 4)
     field = vector_field(function, {"lam": 0.25 if states == 4 else -0.2, "k": -0.4}, states)
     t = np.linspace(0.0, np.pi, 400)
     motion = np.zeros((400, states))

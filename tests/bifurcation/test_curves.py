@@ -165,8 +165,8 @@ def test_the_folds_through_a_bogdanov_takens_point():
     fold = codim2_curve(field, point, "c", bounds=BOX)
     assert fold.column("b") == pytest.approx(0.25 * fold.column("c") ** 2, abs=1e-11)
     assert np.sort(fold.column("c"))[[0, -1]] == pytest.approx([-2.0, 2.0], rel=1e-9)
-    with pytest.raises(InputError, match="on a curve of folds starts no other curve here"):
-        codim2_curve(field, fold.of_kind("Bogdanov-Takens")[0], "c")
+    with pytest.raises(InputError, match="parameter = 'b' is that of the branch"):
+        codim2_curve(field, point, "b")
 
 
 def characteristic_border(B, v0):

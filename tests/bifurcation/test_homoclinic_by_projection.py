@@ -244,7 +244,22 @@ def spiral_back(t, x, p, out):
     out[3] = 0.5 * x[3] - p[1] * x[2]
 
 
+def pushed(t, x, p, out):
+    # z, which is zero, would push x: int exp(-t / 2) (q x - x^2) x' dt = 0 turns the manifold over.
+    out[0] = x[1]
+    out[1] = x[0] - x[0] * x[0] + p[0] * x[1] + (p[1] * x[0] - x[0] * x[0]) * x[2]
+    out[2] = -0.5 * x[2]
+
+
+def pushed_back(t, x, p, out):
+    out[0] = -x[1]
+    out[1] = -x[0] + x[0] * x[0] - p[0] * x[1] - (p[1] * x[0] - x[0] * x[0]) * x[2]
+    out[2] = 0.5 * x[2]
+
+
 @pytest.mark.parametrize(("function", "q", "states", "kind", "at"), [
+    (pushed, 0.3, 3, "stable inclination flip", (16.0 - 4.0 * DELTA**2) / 20.0),
+    (pushed_back, 0.3, 3, "unstable inclination flip", (16.0 - 4.0 * DELTA**2) / 20.0),
     (dragged, 0.9, 3, "stable orbit flip", 1.5 * (16.0 - 4.0 * DELTA**2) / 20.0),
     (dragged_back, 0.9, 3, "unstable orbit flip", 1.5 * (16.0 - 4.0 * DELTA**2) / 20.0),
     (spiral, 0.1, 4, "stable double eigenvalue", 0.0),
@@ -255,19 +270,71 @@ def test_special_points_of_the_curve(function, q, states, kind, at):
     z comes back along the slow direction but for int exp(t / 2) (q x^2 - x^3) dt = 0.
     """
     field = vector_field(function, {"a": -0.5, "q": q}, states)
-    begin = np.array([1.0, 0.0, 2.0 * (q - 1.0), 0.0])[:states]
+    z = 2.0 * (q - 1.0) if "dragged" in function.__name__ else 0.0
+    begin = np.array([1.0, 0.0, z, 0.0])[:states]
     hopf = equilibrium_branch(field, begin, "a", bounds=(-0.5, 0.5)).of_kind("Hopf")[0]
     orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), bounds=(-0.5, 0.5))
     assert orbits.status is BranchStatus.HOMOCLINIC
     curve = codim2_curve(field, orbits.points[-1], "q", to="homoclinic",
-                         bounds={"a": (-0.5, 0.5), "q": (-0.3, 1.5)})
+                         bounds={"a": (-0.5, 0.5), "q": (-0.3, 0.2 if states == 4 else 1.5)})
     assert np.abs(curve.parameter).max() < 1e-7
-    point, = curve.of_kind(kind)
+    point, = curve.special
+    assert point.kind == kind
     assert point.values["q"] == pytest.approx(at, abs=2e-4)
 
 
-def driven(t, x, p, out):
-    out[0], out[1] = x[1], -p[0] * x[0] - 0.1 * x[1] + p[1] * np.cos(t)
+def pendulum(t, x, p, out):
+    # phi'' + a phi' + sin(phi) = I on the circle x = cos(phi), y = sin(phi).
+    growth = 1.0 - x[0] * x[0] - x[1] * x[1]
+    out[0] = growth * x[0] - x[2] * x[1]
+    out[1] = growth * x[1] + x[2] * x[0]
+    out[2] = p[0] - p[1] * x[2] - x[1]
+
+
+def left_over(a, drive):
+    """Speed with which the pendulum leaves the saddle a turn before it comes back to it, squared.
+
+    Back in time along the stable direction; negative where it turns before.
+    """
+    from scipy.integrate import solve_ivp
+
+    saddle = np.pi - np.arcsin(drive)
+    slope = -(a + np.sqrt(a * a - 4.0 * np.cos(saddle))) / 2.0
+    run = solve_ivp(lambda phi, half: [drive - np.sin(phi) - a * np.sqrt(2.0 * max(half[0], 0.0))],
+                    (saddle - 1e-5, saddle - 2.0 * np.pi), [0.5 * (slope * 1e-5) ** 2],
+                    method="DOP853", rtol=1e-11, atol=1e-14)
+    return run.y[0, -1]
+
+
+def test_rotations_of_a_pendulum():
+    """I = (4 / pi) a + O(a^3), up to where the saddle meets the equilibrium below, I = 1."""
+    from scipy.integrate import solve_ivp
+    from scipy.optimize import brentq
+
+    def rates(t, x):
+        out = np.zeros(3)
+        pendulum(t, x, [0.9, 0.3], out)
+        return out
+
+    field = vector_field(pendulum, {"I": 0.9, "a": 0.3}, 3)
+    run = solve_ivp(rates, (0.0, 100.0), [1.0, 0.0, 3.0], rtol=1e-9, atol=1e-11,
+                    t_eval=np.linspace(80.0, 100.0, 8000))
+    orbits = orbit_branch(field, (run.t, run.y.T), "I", method=Collocation(intervals=60),
+                          direction=-1.0, bounds=(0.0, 1.2))
+    assert orbits.status is BranchStatus.HOMOCLINIC
+    curve = codim2_curve(field, orbits.points[-1], "a", to="homoclinic",
+                         bounds={"I": (0.0, 1.2), "a": (0.0, 2.0)})
+    assert curve.status is BranchStatus.SADDLE_NODE
+    drive, a = curve.parameter, curve.column("a")
+    some = (a > 0.01) & (a < 0.5)
+    assert polyfit(a[some] ** 2, (drive / a)[some], 3)[0] == pytest.approx(4.0 / np.pi, abs=1e-6)
+    near = int(np.argmin(np.abs(a - 0.5)))
+    assert drive[near] == pytest.approx(
+        brentq(lambda value: left_over(a[near], value), 0.5, 0.7, xtol=1e-12), abs=1e-7)
+    # The end, from the strong stable direction of the saddle-node.
+    end = brentq(lambda value: left_over(value, 1.0), 1.0, 1.4, xtol=1e-10)
+    assert a[-1] == pytest.approx(end, abs=1e-3)
+    assert drive[-1] == pytest.approx(1.0, abs=1e-5)
 
 
 def test_kind_errors(field, near, curve):

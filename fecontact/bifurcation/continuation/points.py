@@ -248,7 +248,8 @@ class BranchPoint:
         """'supercritical', 'subcritical' or 'undecided'; None where no normal form tells it.
 
         It is known at Hopf points, at forks of equilibria, and of orbits by collocation at period
-        doublings and Neimark-Sacker points.
+        doublings and Neimark-Sacker points; of others
+        :func:`fecontact.bifurcation.with_normal_form` finds it.
         """
         found = self._details.get("criticality")
         return None if found is None else str(found)
@@ -284,7 +285,11 @@ class FoldPoint(BranchPoint):
 
     @property
     def coefficient(self) -> float:
-        """Quadratic coefficient of the normal form of equilibria."""
+        """Quadratic coefficient b of the normal form y' = b y^2.
+
+        Of orbits by collocation |b| with time in periods, y the amplitude of an eigenfunction of
+        unit mean square in the scales of the branch.
+        """
         return float(self._detail("coefficient"))
 
 

@@ -20,11 +20,13 @@ class BranchStatus(Enum):
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
     HOPF = ("The orbits shrink to an equilibrium: the branch ends at a Hopf point, a curve of "
-            "folds at a Bautin point.")
+            "folds at a Bautin point, one of homoclinic orbits at a Bogdanov-Takens point.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
     DISCONTINUITY = ("The orbit meets a border of its contact states, which the last point names: "
                      "beyond it no orbit of its neighbourhood goes on.")
+    SADDLE_NODE = ("The saddle of the homoclinic orbits meets another equilibrium in a fold: there "
+                   "the curve ends.")
     STOPPED = "The branch reached a point at which it was to stop."
     CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
               "again.")

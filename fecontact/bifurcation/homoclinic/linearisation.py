@@ -1,10 +1,11 @@
 """Equations of a homoclinic orbit about some unknowns, and solutions of systems with them."""
 
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.homoclinic import open_mesh
 from fecontact.bifurcation.homoclinic.saddle import left_subspaces, like
 from fecontact.bifurcation.linalg import bordered_kernels, condensation
@@ -13,11 +14,67 @@ from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
-if TYPE_CHECKING:
-    from fecontact.bifurcation.homoclinic.problem import HomoclinicProblem
-
 # Step of the differences of the subspaces, in scales of the states and widths of the diagram.
 _DIFFERENCE = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class OpenOrbit:
+    """A homoclinic orbit; u = [nodes ((N m + 1) d), saddle (d), second, first parameter].
+
+    Attributes
+    ----------
+    field, values : VectorField, (k,) array
+        Both free parameters are taken from u.
+    active : (int, int)
+        Indices of the second and the first parameter.
+    mesh : (N + 1,) array
+        Ends of the intervals, from 0 to 1.
+    degree : int
+        m.
+    time : float
+        Length T of the interval [s].
+    reference : (N m + 1, d) array
+        Nodes of the orbit that fixes the phase.
+    scales : (d + 2,) array
+        Scales of the states and of both parameters.
+    rows : pair of arrays
+        Left subspaces of the saddle of the orbit before, stable and unstable.
+    """
+
+    field: VectorField
+    values: Array
+    active: tuple[int, int]
+    mesh: Array
+    degree: int
+    time: float
+    reference: Array
+    scales: Array
+    rows: tuple[Array, Array]
+
+    @property
+    def sizes(self) -> Array:
+        """Scales (d,) of the states."""
+        return self.scales[:-2]
+
+    @property
+    def size(self) -> int:
+        """Number of nodal unknowns, those of the last node included."""
+        return self.reference.size
+
+    def nodes(self, u: Array) -> Array:
+        """Nodes (N m + 1, d)."""
+        return u[: self.size].reshape(self.reference.shape)
+
+    def rest(self, u: Array) -> Array:
+        """The saddle (d,)."""
+        return np.ascontiguousarray(u[self.size : -2])
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[list(self.active)] = u[-2:]
+        return values
 
 
 class HomoclinicLinearised:
@@ -26,7 +83,7 @@ class HomoclinicLinearised:
     Rows: collocation (N m d), saddle (d), projections (d), phase.
     """
 
-    def __init__(self, problem: "HomoclinicProblem", u: Array) -> None:
+    def __init__(self, problem: OpenOrbit, u: Array) -> None:
         self.problem, self.u = problem, u
         self._x, self._slopes = open_mesh.at_gauss_points(problem.mesh, problem.nodes(u),
                                                           problem.degree)
@@ -65,7 +122,8 @@ class HomoclinicLinearised:
         """L_s (x(0) - s) and L_u (x(T) - s), together (d,)."""
         nodes = self.problem.nodes(self.u)
         stable, unstable = projections
-        return np.concatenate([stable @ (nodes[0] - self._rest), unstable @ (nodes[-1] - self._rest)])
+        return np.concatenate([stable @ (nodes[0] - self._rest),
+                               unstable @ (nodes[-1] - self._rest)])
 
     @cached_property
     def _phase_row(self) -> Array:
@@ -128,6 +186,23 @@ class HomoclinicLinearised:
         small[3 * d], weights = self._reduced(np.concatenate(
             [self._phase_row.reshape(-1), np.zeros(d + 2)]))
         return small, weights
+
+    @cached_property
+    def adjoint(self) -> tuple[Array, Array, Array]:
+        """Ends (d,) of the bounded solution p of p' = -f_x^T p, and int p f_p dt (2,).
+
+        The latter is of length one in widths of the diagram; its direction is that in which the
+        manifolds part as the second and the first parameter change, at right angles to the curve.
+        """
+        d = self.problem.field.dimension
+        rows = self._small[0][: 3 * d]
+        left = np.linalg.svd(rows[:, : 3 * d] / np.abs(rows[:, : 3 * d]).max(axis=1)[:, None])[0]
+        found = left[:, -1] / np.abs(rows[:, : 3 * d]).max(axis=1)
+        parts = (found @ rows[:, 3 * d :]) * self.problem.scales[-2:]
+        found, parts = (each / np.linalg.norm(parts) for each in (found, parts))
+        stable, unstable = self._projections(self.jacobian)
+        n = len(stable)
+        return (found[2 * d : 2 * d + n] @ stable, found[2 * d + n :] @ unstable, parts)
 
     def _reduced(self, row: Array) -> tuple[Array, Array]:
         """A row over u reduced to x(0), x(T), s and the parameters, and its multiples."""

@@ -21,7 +21,8 @@ def node_times(mesh: Array, degree: int) -> Array:
 def _closed(mesh: Array, nodes: Array, degree: int) -> tuple[Array, Array]:
     """Nodes (N m, d) less the line between the ends, and the rise (d,) of that line."""
     rise = nodes[-1] - nodes[0]
-    return np.ascontiguousarray(nodes[:-1] - periodic.node_times(mesh, degree)[:, None] * rise), rise
+    line = periodic.node_times(mesh, degree)[:, None] * rise
+    return np.ascontiguousarray(nodes[:-1] - line), rise
 
 
 def at_gauss_points(mesh: Array, nodes: Array, degree: int) -> tuple[Array, Array]:

@@ -21,14 +21,13 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues
-from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.homoclinic import open_mesh
-from fecontact.bifurcation.homoclinic.linearisation import HomoclinicLinearised
+from fecontact.bifurcation.homoclinic.linearisation import HomoclinicLinearised, OpenOrbit
 from fecontact.bifurcation.homoclinic.saddle import (
     Saddle,
     discriminant,
     flown,
-    leading_row,
+    leading_rows,
     left_subspaces,
     saddle_of,
 )
@@ -45,32 +44,21 @@ _LONGEST, _STEP = 10.0, 0.4
 _LONGER = 10.0
 # Amplitude and rates of the saddle, in the largest ones of the curve, at which it ends.
 _LEAST, _SLOWEST = 1e-2, 0.2
+# Part of an orbit, or of its adjoint solution, along a leading direction that is rounding.
+_ABSENT = 1e-4
+# Ratio of its rates at which the saddle counts as one that meets another equilibrium.
+_MEETS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class HomoclinicProblem(Problem):
-    """Homoclinic orbits; u = [nodes ((N m + 1) d), saddle (d), second, first parameter].
+class HomoclinicProblem(OpenOrbit, Problem):
+    """The problem of following homoclinic orbits; see :class:`OpenOrbit`.
 
     Attributes
     ----------
-    field, values : VectorField, (k,) array
-        Both free parameters are taken from u.
-    active : (int, int)
-        Indices of the second and the first parameter.
-    mesh : (N + 1,) array
-        Ends of the intervals, from 0 to 1.
-    degree : int
-        m.
-    time : float
-        Length T of the interval [s].
-    reference : (N m + 1, d) array
-        Nodes of the orbit that fixes the phase.
-    scales : (d + 2,) array
-        Scales of the states and of both parameters.
-    rows : pair of arrays
-        Left subspaces of the saddle of the orbit before, stable and unstable.
     leading : pair of (d,) arrays or None
-        Left eigenvectors of its leading eigenvalues, unstable and stable, where these are real.
+        Left eigenvectors of the leading eigenvalues of the saddle of the orbit before, unstable
+        and stable, where these are real.
     intervals : int
         Number of intervals after each step.
     distance : float
@@ -79,43 +67,10 @@ class HomoclinicProblem(Problem):
         Largest amplitude and largest rate of the saddle up to here.
     """
 
-    field: VectorField
-    values: Array
-    active: tuple[int, int]
-    mesh: Array
-    degree: int
-    time: float
-    reference: Array
-    scales: Array
-    rows: tuple[Array, Array]
-    leading: tuple[Array | None, Array | None]
-    intervals: int
+    leading: tuple[Array | None, Array | None] = (None, None)
+    intervals: int = 60
     distance: float = DISTANCE
     largest: tuple[float, float] = (0.0, 0.0)
-
-    @cached_property
-    def sizes(self) -> Array:
-        """Scales (d,) of the states."""
-        return self.scales[:-2]
-
-    @property
-    def size(self) -> int:
-        """Number of nodal unknowns, those of the last node included."""
-        return self.reference.size
-
-    def nodes(self, u: Array) -> Array:
-        """Nodes (N m + 1, d)."""
-        return u[: self.size].reshape(self.reference.shape)
-
-    def rest(self, u: Array) -> Array:
-        """The saddle (d,)."""
-        return np.ascontiguousarray(u[self.size : -2])
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[list(self.active)] = u[-2:]
-        return values
 
     def linearise(self, u: Array) -> HomoclinicLinearised:
         """The equations about u."""
@@ -182,22 +137,29 @@ class HomoclinicProblem(Problem):
         return float(np.abs(change[-2:] / self.scales[-2:]).max())
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
-        """Test functions of neutral saddles, double leading eigenvalues and orbit flips."""
+        """Test functions of neutral saddles, double leading eigenvalues and flips."""
         saddle = self.saddle(u)
         out, back = saddle.rates
         found = {"neutral saddle": (out - back) / (out + back)}
-        away = self.away(u)
-        for name, leading, end, rate, known in (
-                ("unstable", saddle.unstable, away[0], out, self.leading[0]),
-                ("stable", saddle.stable, away[-1], back, self.leading[1])):
+        away, whole = self.away(u), self.amplitude(u)
+        first, last, apart = linearisation.adjoint
+        # Of one sign along the curve, to which the direction is at right angles.
+        along = tangent[-2:] / self.scales[-2:]
+        turn = float(np.sign(apart[0] * along[1] - apart[1] * along[0]))
+        for name, leading, end, rate, known, adjoint in (
+                ("unstable", saddle.unstable, away[0], out, self.leading[0], last),
+                ("stable", saddle.stable, away[-1], back, self.leading[1], first)):
             value = discriminant(leading)
             if value is not None:
                 found[f"{name} double eigenvalue"] = value
-            row = leading_row(saddle.jacobian, leading[0])
-            if value is not None and known is not None and row is not None:
+            rows = leading_rows(saddle.jacobian, leading[0])
+            if value is not None and known is not None and rows is not None:
                 # In units of the leading part at the middle, which does not depend on T.
-                part = float(row @ end) * np.exp(min(0.5 * rate * self.time, 500.0))
-                found[f"{name} orbit flip"] = part * float(np.sign(row @ known))
+                grown = np.exp(min(0.5 * rate * self.time, 100.0))
+                side = float(np.sign(rows[0] @ known))
+                found[f"{name} orbit flip"] = side * grown * float(rows[0] @ end) / whole
+                found[f"{name} inclination flip"] = side * turn * grown * float(
+                    (adjoint * self.sizes) @ rows[1])
         return found
 
     def examine(
@@ -207,15 +169,17 @@ class HomoclinicProblem(Problem):
         return {"kind": "turning point"} if kind == "fold" else {}
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of the first parameter where it does not change but for rounding."""
-        return resting(tangents, float(self.scales[-1]))
+        """Turns of a parameter that rests, flips where there is no part along the direction."""
+        absent = {name for name in tests[0] if name.endswith("flip")
+                  and max(abs(side.get(name, np.inf)) for side in tests) < _ABSENT}
+        return resting(tangents, float(self.scales[-1])) | absent
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
-        """Where both orbit and rates vanish, at a Bogdanov-Takens point."""
-        amplitude, rate = self.amplitude(u), max(self.saddle(u).rates)
-        if amplitude < _LEAST * self.largest[0] and rate < _SLOWEST * self.largest[1]:
+        """Where both orbit and rates vanish, at a Bogdanov-Takens point, or one rate alone."""
+        amplitude, rates = self.amplitude(u), self.saddle(u).rates
+        if amplitude < _LEAST * self.largest[0] and max(rates) < _SLOWEST * self.largest[1]:
             return BranchStatus.HOPF
-        return None
+        return BranchStatus.SADDLE_NODE if min(rates) < _MEETS * max(rates) else None
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[HomoclinicProblem, Array, Array]":
         """The problem for the next step: interval, mesh, phase and subspaces for this orbit."""
@@ -239,10 +203,10 @@ class HomoclinicProblem(Problem):
             self.mesh, self.nodes(each), self.degree, places).reshape(-1), each[self.size :]])
             for each in (u, tangent))
         saddle = self.saddle(u)
-        rows = [leading_row(saddle.jacobian, leading[0])
+        rows = [leading_rows(saddle.jacobian, leading[0])
                 for leading in (saddle.unstable, saddle.stable)]
-        leading = [row if row is None or known is None or row @ known >= 0.0 else -row
-                   for row, known in zip(rows, self.leading, strict=True)]
+        leading = [None if row is None else row[0] if known is None or row[0] @ known >= 0.0
+                   else -row[0] for row, known in zip(rows, self.leading, strict=True)]
         largest = (max(self.largest[0], self.amplitude(u)), max(self.largest[1], *saddle.rates))
         return replace(self, mesh=mesh, reference=moved[: len(places) * len(self.sizes)].reshape(
             len(places), -1).copy(), rows=left_subspaces(saddle.jacobian),

@@ -83,13 +83,19 @@ def like(rows: Array, reference: Array) -> Array:
         raise AnalysisError("The subspaces of the saddle turn too far in one step.") from None
 
 
-def leading_row(jacobian: Array, eigenvalue: complex) -> Array | None:
-    """Left eigenvector (d,) of length one of a leading eigenvalue; None if that is not real."""
+def leading_rows(jacobian: Array, eigenvalue: complex) -> tuple[Array, Array] | None:
+    """Left and right eigenvectors (d,) of a leading eigenvalue; None if that is not real.
+
+    The left one has the length one, their product is one.
+    """
     if abs(eigenvalue.imag) > _REAL * abs(eigenvalue):
         return None
-    found, vectors = np.linalg.eig(jacobian.T)
-    row = vectors[:, int(np.argmin(np.abs(found - eigenvalue)))].real
-    return np.asarray(row / np.linalg.norm(row))
+    found = []
+    for matrix in (jacobian.T, jacobian):
+        values, vectors = np.linalg.eig(matrix)
+        found.append(vectors[:, int(np.argmin(np.abs(values - eigenvalue)))].real)
+    row = found[0] / np.linalg.norm(found[0])
+    return row, found[1] / float(row @ found[1])
 
 
 def flown(saddle: Saddle, away: Array, times: Array, leaving: bool) -> Array:

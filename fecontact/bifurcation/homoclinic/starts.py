@@ -61,7 +61,8 @@ def homoclinic_curve(
              for name, index in zip(names, active, strict=True)]
     if motion is None:
         mesh = np.asarray(point.values["mesh"], dtype=float)
-        nodes, rest = open_mesh.nodes_of(point.u, d), np.asarray(point.values["saddle"], dtype=float)
+        nodes = open_mesh.nodes_of(point.u, d)
+        rest = np.asarray(point.values["saddle"], dtype=float)
         time = float(point.values["time"])
     else:
         given = (len(point.values["mesh"]) - 1 if "degree" in known else _INTERVALS)
@@ -94,7 +95,7 @@ def _cut_open(
     field: VectorField, values: Array, motion: PeriodicMotion, point: BranchPoint, intervals: int,
     degree: int, sizes: Array,
 ) -> tuple[Array, Array, Array, float]:
-    """Nodes, saddle, mesh and time of an orbit that begins and ends where it is next to a saddle."""
+    """Nodes, saddle, mesh and time of an orbit that begins and ends next to a saddle."""
     times, states = motion.times - motion.times[0], np.ascontiguousarray(motion.states)
     speed = np.linalg.norm(field.rates(np.zeros(len(times)), states, values) / sizes, axis=1)
     found = newton(field, states[int(np.argmin(speed))].copy(), values, _TOLERANCE)

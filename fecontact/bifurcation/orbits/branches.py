@@ -83,7 +83,7 @@ class Shooting:
     """Multiple shooting with the compiled integrator, for contact systems only.
 
     Suited to steep friction, impacts and many states, where collocation needs many intervals.
-    Extremes of the states are taken from samples; no normal form of period doublings is computed.
+    Extremes of the states are taken from samples; normal forms by ``with_normal_form`` alone.
 
     Parameters
     ----------

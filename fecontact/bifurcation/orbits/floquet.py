@@ -112,7 +112,7 @@ class Floquet:
         return rest
 
     def turning(self, *critical: complex) -> bool:
-        """Whether a pair beside the critical multipliers lies on the unit circle, and is complex."""
+        """Whether a complex pair beside the critical multipliers lies on the unit circle."""
         rest = self.beside(*critical)
         pairs = rest[rest.imag > 1e-6]
         return bool(len(pairs)) and float(np.abs(np.abs(pairs) - 1.0).min()) <= _NEAR

@@ -1,7 +1,8 @@
-"""Normal forms of period doublings and Neimark-Sacker points: sub- or supercritical.
+"""Normal forms of folds, and of period doublings and Neimark-Sacker points: sub- or supercritical.
 
 On the centre manifold, with time in periods of the orbit and its phase moving with the flow,
 
+    fold              xi' = b xi^2           v' = A v - a x', with the phase at the speed 1 + a xi
     period doubling   xi' = c xi^3           v antiperiodic, v' = A v
     Neimark-Sacker    z' = i theta z + D z |z|^2        v' + i theta v = A v
 
@@ -41,13 +42,16 @@ def examined(
 
     'coefficient' is c or Re D for eigenfunctions of unit mean square in the scaled states,
     'coefficient_error' the change between two difference steps, 'criticality' their conclusion,
-    see :func:`verdict`. Without ``details`` these are omitted.
+    see :func:`verdict`; at folds |b|, without conclusion. Without ``details`` these are omitted.
     """
     found = linearised.floquet.confirmed(kind)
     if found is None or not details:
         return found
     if kind == "period doubling":
         found |= _judged(Expansion(problem, u, linearised).doubling)
+    elif kind == "fold":
+        found |= _judged(Expansion(problem, u, linearised).fold)
+        del found["criticality"]
     elif kind == "torus":
         expansion = Expansion(problem, u, linearised)
         found |= _judged(partial(expansion.torus, found["angle"]))
@@ -92,14 +96,22 @@ class Expansion:
         self._values = problem.parameters(u)
         self._times = problem.times * self._T
         nodes = problem.nodes(u)
-        self._x, _ = problem.at_gauss_points(nodes)
+        self._x, slopes = problem.at_gauss_points(nodes)
         self._scales = problem.scales[: nodes.shape[1]]
         size = np.ptp(nodes, axis=0) / self._scales
         self._range = np.maximum(size, 0.1 * size.max()) * self._scales
         self._f, J, _ = linearised.derivatives
         self._J = self._T * J
         self._h = np.repeat(problem.widths, problem.degree)[:, None]
+        self._motion = slopes / self._h
         self._last: tuple[Array, float, list[Array]] | None = None
+
+    def fold(self, step: float) -> float:
+        """Size of the coefficient b of a fold; its sign is that of the direction of v."""
+        V, drift = self._fold_function
+        kernel = self._motion if self._problem.autonomous else V
+        second = self._second(V, V, step) / 2.0 - drift * self._along(V)
+        return abs(float(self._share(self._J, V[:, :, None], kernel, second)[0]))
 
     def doubling(self, step: float) -> float:
         """Coefficient c of a period doubling, with differences over ``step``."""
@@ -123,6 +135,19 @@ class Expansion:
         return float(self._share(self._turned(angle), columns, _split(V), _split(third))[0])
 
     @cached_property
+    def _fold_function(self) -> tuple[Array, float]:
+        """Eigenfunction v of the multiplier 1 at a fold, at the points (N m, d), and a."""
+        autonomous = self._problem.autonomous
+        motion = self._motion[:, :, None] if autonomous else np.zeros((*self._x.shape, 0))
+        rows = [np.append(self._problem.phase_row, 0.0)] if autonomous else []
+        system = self._bordered(self._J, motion, rows)
+        _, _, vectors = np.linalg.svd(system.matrix)
+        found = system.expand(vectors[-1])
+        V = self._at_points(found, self._x.shape[1])
+        size = self._size(V)
+        return V / size, float(found[-1]) / size if autonomous else 0.0
+
+    @cached_property
     def _doubling_functions(self) -> tuple[Array, Array]:
         """Multiples (N m, d) of the equations at the points, and v at the points.
 
@@ -140,8 +165,12 @@ class Expansion:
         return self._normalised(_joined(self._at_points(nodes, len(vectors[-1]))))
 
     def _normalised(self, V: Array) -> Array:
+        return V / self._size(V)
+
+    def _size(self, V: Array) -> float:
+        """Root of the mean square of the scaled states."""
         weights = (np.tile(self._problem.rule.weights, self._problem.intervals)[:, None] * self._h)
-        return V / np.sqrt(np.sum(weights * np.abs(V / self._scales) ** 2))
+        return float(np.sqrt(np.sum(weights * np.abs(V / self._scales) ** 2)))
 
     def _response(self, bend: Array) -> tuple[Array, float]:
         """Periodic h with h' - A h = bend - a x' at the points, and the phase acceleration a."""
@@ -164,7 +193,7 @@ class Expansion:
         return _joined(self._at_points(found, turned.shape[1]))
 
     def _share(self, A: Array, columns: Array, kernel: Array, g: Array) -> Array:
-        """Both coefficients c for which w' - A w = g - columns c is solvable.
+        """Coefficients c for which w' - A w = g - columns c is solvable.
 
         The equations without the columns have the solution ``kernel``.
         """
@@ -172,8 +201,9 @@ class Expansion:
         row = np.empty((len(A), D))
         to_nodes(np.ascontiguousarray(kernel), problem.rule.weights[:, None] * problem.rule.values,
                  problem.widths, row)
-        both = (row, _split(1j * _joined(row)))
-        rows = [np.append(one.reshape(-1), np.zeros(2)) for one in both]
+        count = columns.shape[2]
+        both = [row] if count == 1 else [row, _split(1j * _joined(row))]
+        rows = [np.append(one.reshape(-1), np.zeros(count)) for one in both]
         system = self._bordered(A, columns, rows)
         side = np.append((self._h * g).reshape(-1), np.zeros(len(rows)))
         return system.solve(side)[len(A) * D :]

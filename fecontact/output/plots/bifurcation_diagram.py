@@ -40,6 +40,14 @@ SPECIAL = {
     "period doubling": ("PD", "^"), "Neimark-Sacker": ("NS", "v"), "cusp": ("CP", "P"),
     "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
     "double Hopf": ("HH", ">"), "unresolved": ("?", "x"),
+    "generalised period doubling": ("GPD", "p"), "Chenciner": ("CH", "h"),
+    "resonance 1:1": ("R1", "1"), "resonance 1:2": ("R2", "2"), "resonance 1:3": ("R3", "3"),
+    "resonance 1:4": ("R4", "4"), "fold-flip": ("FPD", "d"),
+    "fold-Neimark-Sacker": ("FNS", "d"), "flip-Neimark-Sacker": ("PDNS", "d"),
+    "double Neimark-Sacker": ("NSNS", "d"), "neutral saddle": ("NSS", "d"),
+    "stable double eigenvalue": ("DRS", "d"), "unstable double eigenvalue": ("DRU", "d"),
+    "stable orbit flip": ("OFS", "d"), "unstable orbit flip": ("OFU", "d"),
+    "stable inclination flip": ("IFS", "d"), "unstable inclination flip": ("IFU", "d"),
 }
 # Letters alone, for diagrams of other kinds.
 LETTERS = {kind: letters for kind, (letters, _) in SPECIAL.items()}
