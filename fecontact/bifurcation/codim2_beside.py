@@ -30,11 +30,11 @@ from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.codim2 import equilibrium_curve
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales, newton
 from fecontact.bifurcation.equilibria.normal_forms import hopf
-from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Distances from the Bautin point along the second parameter, in the width of the diagram, at which
 # the fold is looked for, and the range of the first parameter about the Hopf point there.

@@ -8,12 +8,12 @@ from fecontact.bifurcation.continuation.points import (
     PeriodDoublingPoint,
     with_details,
 )
-from fecontact.system.fields.vector_field import VectorField, require_field
 from fecontact.bifurcation.orbits.collocation import require_mesh
 from fecontact.bifurcation.orbits.normal_forms import examined, verdict
 from fecontact.bifurcation.orbits.starts import corrected_samples, from_samples
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Samples of the orbit, degree of the polynomials, doublings of the intervals, and the change of the
 # coefficient from mesh to mesh at which it has converged.

@@ -13,11 +13,11 @@ from fecontact.bifurcation.events.conditions import Condition, Course, of_phase
 from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventLinearisation, EventOrbit
 from fecontact.bifurcation.events.phases import PERIOD, Phase, Strike
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.solvers import SetValued
+from fecontact.system.fields.vector_field import VectorField
 
 # Step of differences of a condition, in scales of the states and parameters.
 _STEP = 1e-5

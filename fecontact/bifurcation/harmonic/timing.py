@@ -3,9 +3,9 @@
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, made_values
-from fecontact.system.fields.vector_field import VectorField
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Further values of a parameter, as factors, at which the period is asked for.
 _BESIDE = (0.97, 1.01, 1.043)

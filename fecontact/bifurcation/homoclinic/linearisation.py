@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 
-from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.homoclinic import open_mesh
 from fecontact.bifurcation.homoclinic.saddle import left_subspaces, like
 from fecontact.bifurcation.linalg import bordered_kernels, condensation
@@ -13,6 +12,7 @@ from fecontact.bifurcation.linalg.bordered import Border
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Step of the differences of the subspaces, in scales of the states and widths of the diagram.
 _DIFFERENCE = 1e-5

@@ -8,13 +8,13 @@ import numpy as np
 from fecontact.bifurcation.continuation.points import BranchPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.equilibria.equilibrium import newton
-from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.homoclinic import open_mesh
 from fecontact.bifurcation.homoclinic.problem import HomoclinicProblem
 from fecontact.bifurcation.homoclinic.saddle import left_subspaces, saddle_of
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.system.fields.vector_field import VectorField
 
 # Mesh for orbits that were not found by collocation.
 _INTERVALS, _DEGREE = 80, 4

@@ -12,10 +12,10 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.equilibria.equilibrium import newton, sorted_eigenvalues
-from fecontact.system.fields.vector_field import VectorField
 from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import interpolate, node_times
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Samples of an orbit for the first estimate of the shift.
 _SAMPLES = 512
