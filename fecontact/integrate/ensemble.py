@@ -139,9 +139,11 @@ def ensemble(
     seen = [Events.none(members[0].size)] * count
     done, leave = [0], [False]
 
+    series = solver.series if isinstance(solver, Rodas5P) else "never"
+
     def compiled(index: int, state: Array) -> None:
         run = start(members[index], state, instants[index], rtol=float(rtol), max_step=max_step,
-                    work=False, events=watched)
+                    work=False, events=watched, series=series)
         result = step_loop.RUNNING
         while result == step_loop.RUNNING:
             if leave[0]:
