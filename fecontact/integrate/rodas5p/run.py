@@ -14,7 +14,6 @@ from fecontact.integrate.rodas5p.event_kernels import FOUND, Watch
 from fecontact.integrate.rodas5p.small_systems import advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.variational import Vary
-from fecontact.integrate.series.advance import advance_for as advance_series
 from fecontact.integrate.series.branches import Series
 
 
@@ -106,6 +105,9 @@ class Run:
     def _advance(self) -> Callable[[int], int]:
         """What goes on by so many steps."""
         if self.series is not None:
+            # Compiled for runs that need it only.
+            from fecontact.integrate.series.small_systems import advance_for as advance_series
+
             expand = advance_series(self.problem)
             return lambda steps: expand(self.problem, self.progress, self.output, self.watch,
                                         self.series, steps)

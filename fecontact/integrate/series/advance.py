@@ -7,7 +7,6 @@ from the ends of that piece, none of which is missed, or where its force falls t
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import types
@@ -330,7 +329,8 @@ def _advance_by(problem, progress, output, watch, series, most):
         counts[STEPS] += 1
         stops = False
         if switched:
-            _set_speeds(first, h, series)
+            if meets != MET_RELEASE:
+                _set_speeds(first, h, series)
             change = _switch(node, meets, h, series)
             if watched and change != 0:
                 stops = _note_change(reached, change, node, progress, watch)
@@ -347,8 +347,3 @@ def advance(problem, progress, output, watch, series, most):
     """Go on by up to ``most`` steps; returns how it ended, as ``step_loop.advance`` does."""
     return _advance_by(borrowed(problem), borrowed(progress), borrowed(output), borrowed(watch),
                        borrowed(series), most)
-
-
-def advance_for(problem: state.Problem) -> Any:
-    """The loop for a system."""
-    return advance

@@ -135,7 +135,7 @@ def series_for(
         2, 1, _first_states(system, pieces, state),
         *np.zeros((3, m, COEFFICIENTS)), np.zeros((len(signals) if work else 0, COEFFICIENTS)), own, own.copy(), own.copy(), own.copy(),
         np.zeros((SERIES_POWERS, COEFFICIENTS)), np.zeros((3, COEFFICIENTS)),
-        np.zeros((DEPTH + 2, COEFFICIENTS)))
+        np.zeros((DEPTH + 3, COEFFICIENTS)))
 
 
 def chosen_series(

@@ -80,7 +80,8 @@ def _add_penetration(j, k, s, series):
     series.u[j, k] = total
     if series.states[j, ACTS] and _curved(series.pieces[j, series.states[j, PLACE]]):
         series.square[j, k] = _product(series.u[j], series.u[j], k)
-        series.cube[j, k] = _product(series.square[j], series.u[j], k)
+        if series.pieces[j, series.states[j, PLACE], DAMPING + 2] != 0.0:
+            series.cube[j, k] = _product(series.square[j], series.u[j], k)
 
 
 @helper
@@ -94,9 +95,10 @@ def _force(j, k, h, series):
         total += piece[ELASTIC]
     if _curved(piece):
         # The rate of u^2 is 2 u v.
-        total += piece[ELASTIC + 2] * series.square[j, k] + rise * (
-            0.5 * piece[DAMPING + 1] * series.square[j, k + 1]
-            + piece[DAMPING + 2] * series.cube[j, k + 1] / 3.0)
+        total += (piece[ELASTIC + 2] * series.square[j, k]
+                  + rise * 0.5 * piece[DAMPING + 1] * series.square[j, k + 1])
+        if piece[DAMPING + 2] != 0.0:
+            total += rise * piece[DAMPING + 2] * series.cube[j, k + 1] / 3.0
     return total
 
 
@@ -106,8 +108,7 @@ def expand(y, h, s, series):
     q, v = series.q, series.v
     m, n = len(q), len(s.gap)
     for i in range(m):
-        q[i, 0], v[i, 0] = y[i], y[m + i]
-        q[i, 1] = h * y[m + i]
+        q[i, 0], q[i, 1] = y[i], h * y[m + i]
     for j in range(n):
         _add_penetration(j, 0, s, series)
     for k in range(DEGREE):
@@ -116,18 +117,21 @@ def expand(y, h, s, series):
             series.F[j, k] = _force(j, k, h, series)
         if k + 2 > DEGREE:
             break
-        factor = h * _INVERSE[k + 1] * h * _INVERSE[k + 2]
+        ahead = h * _INVERSE[k + 2]
+        factor = h * _INVERSE[k + 1] * ahead
         for i in range(m):
-            total = series.forcing[i, k]
+            # The newest coefficients come last, lest all else wait for them.
+            total, damped = series.forcing[i, k], 0.0
             for j in range(n):
                 total += s.Ty[j, i] * series.F[j, k]
             for other in range(m):
-                total -= (s.stiffness[i, other] * q[other, k]
-                          + s.damping[i, other] * v[other, k])
-            q[i, k + 2] = factor * total
-            v[i, k + 1] = (k + 2) * q[i, k + 2] / h
+                total -= s.stiffness[i, other] * q[other, k]
+                damped += s.damping[i, other] * q[other, k + 1]
+            q[i, k + 2] = factor * total - ahead * damped
     for i in range(m):
-        v[i, DEGREE] = 0.0
+        for k in range(DEGREE):
+            v[i, k] = (k + 1) / h * q[i, k + 1]
+        v[i, 0], v[i, DEGREE] = y[m + i], 0.0
 
 
 @helper

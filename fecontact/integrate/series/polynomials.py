@@ -20,7 +20,7 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 
 # Highest power of the series.
-DEGREE = 24
+DEGREE = 23
 COEFFICIENTS = DEGREE + 1
 # Halvings until what touches zero counts as positive, or as zero if it is below by more.
 _DEEPEST = 48
@@ -28,8 +28,13 @@ DEPTH = _DEEPEST + 2
 _ROUNDING = 1e-15
 _MOST_NEWTON = 60
 
-_TO_BERNSTEIN = np.array([[math.comb(i, k) / math.comb(DEGREE, k) for i in range(COEFFICIENTS)]
-                          for k in range(COEFFICIENTS)])
+# Matrices that make Bernstein coefficients of coefficients of powers, and of those of the whole
+# interval those of its left and right halves.
+_POWERS = np.arange(COEFFICIENTS)
+_TO_BERNSTEIN = np.array([[math.comb(i, k) / math.comb(DEGREE, k) for k in _POWERS]
+                          for i in _POWERS])
+_LEFT = np.array([[math.comb(i, k) / 2.0**i for k in _POWERS] for i in _POWERS])
+_RIGHT = _LEFT[::-1, ::-1].copy()
 
 
 @helper
@@ -42,53 +47,46 @@ def value_at(c, x):
 
 
 @helper
-def _to_bernstein(c, out):
-    """Fill ``out`` with the Bernstein coefficients of c."""
-    for i in range(COEFFICIENTS):
-        out[i] = c[0]
-    for k in range(1, COEFFICIENTS):
-        for i in range(COEFFICIENTS):
-            out[i] += _TO_BERNSTEIN[k, i] * c[k]
-
-
-@helper
-def _halve(b, left):
-    """Bernstein coefficients of the left half to ``left``; b becomes those of the right half."""
-    for k in range(DEGREE):
-        left[k] = b[0]
-        for i in range(DEGREE - k):
-            b[i] = 0.5 * (b[i] + b[i + 1])
-    left[DEGREE] = b[0]
+def _apply(matrix, b, out):
+    """Fill ``out`` with the product of a matrix and b."""
+    # The length as it is known when this runs: loops of a fixed length are not vectorised.
+    for i in range(len(b)):
+        total = 0.0
+        for k in range(len(b)):
+            total += matrix[i, k] * b[k]
+        out[i] = total
 
 
 @helper
 def _changes(b):
-    """Number of changes of sign, zeros left out, and the first sign; 2 stands for more than one."""
-    first, last, count = 0.0, 0.0, 0
-    for i in range(COEFFICIENTS):
-        if b[i] != 0.0:
-            if first == 0.0:
-                first = b[i]
-            elif last * b[i] < 0.0:
-                count += 1
-            last = b[i]
-    return count, first
+    """Number of changes of sign; zero counts as positive."""
+    count = 0
+    for i in range(len(b) - 1):
+        count += (b[i] < 0.0) != (b[i + 1] < 0.0)
+    return count
 
 
 @helper
-def _bracketed(c, low, high):
-    """The zero of c between low, where it is positive, and high, where it is negative."""
-    at_low, at_high = value_at(c, low), value_at(c, high)
-    if not at_high < 0.0:
-        return high
-    x = 0.5 * (low + high)
-    if at_low > 0.0:
-        x = low + (high - low) * (at_low / (at_low - at_high))
+def _only_zero(c, b, low, width, size):
+    """The zero of c in an interval where its Bernstein coefficients b change their sign once.
+
+    ``size`` is the largest of the coefficients.
+    """
+    k = DEGREE
+    while k > 0 and b[k - 1] < 0.0:
+        k -= 1
+    if b[k] >= 0.0:
+        return low + width
+    # The zero of the control polygon is near; Newton's steps stay within what encloses the zero.
+    high = low + width
+    x = low + width * (k - 1 + b[k - 1] / (b[k - 1] - b[k])) / DEGREE
     for _ in range(_MOST_NEWTON):
-        total, slope = 0.0, 0.0
-        for k in range(DEGREE, -1, -1):
+        total, slope = c[DEGREE], 0.0
+        for i in range(DEGREE - 1, -1, -1):
             slope = slope * x + total
-            total = total * x + c[k]
+            total = total * x + c[i]
+        if abs(total) <= 2e-16 * size:
+            return x
         if total > 0.0:
             low = x
         else:
@@ -106,9 +104,9 @@ def _bracketed(c, low, high):
 def first_zero(p, limit, room):
     """The first zero of p from above within 0 < x <= limit, or 2 ``limit`` if there is none.
 
-    Zero at once where p begins negative. ``room`` (DEPTH + 2, n + 1) is to work in.
+    Zero at once where p begins negative. ``room`` (DEPTH + 3, n + 1) is to work in.
     """
-    c, b = room[DEPTH], room[DEPTH + 1]
+    c, b, half = room[DEPTH], room[DEPTH + 1], room[DEPTH + 2]
     power, below, size = 1.0, 0.0, 0.0
     for k in range(COEFFICIENTS):
         c[k] = p[k] * power
@@ -120,23 +118,24 @@ def first_zero(p, limit, room):
         return 0.0
     if c[0] + below > 0.0 or below == 0.0:
         return 2.0 * limit
-    _to_bernstein(c, b)
+    _apply(_TO_BERNSTEIN, c, b)
     low, width, depth, waiting = 0.0, 1.0, 0, 0
     while True:
-        count, first = _changes(b)
-        if first < 0.0:
+        if b[0] < 0.0:
             return low * limit
+        count = _changes(b)
         if count == 1:
-            return _bracketed(c, low, low + width) * limit
+            return _only_zero(c, b, low, width, size) * limit
         if count > 0:
             least = 0.0
             for i in range(COEFFICIENTS):
                 least = min(least, b[i])
             if depth < _DEEPEST:
                 # The right half waits in the row of its depth.
-                _halve(b, room[depth])
-                for i in range(COEFFICIENTS):
-                    b[i], room[depth, i] = room[depth, i], b[i]
+                _apply(_RIGHT, b, room[depth])
+                _apply(_LEFT, b, half)
+                for i in range(len(b)):
+                    b[i] = half[i]
                 depth += 1
                 width *= 0.5
                 waiting |= 1 << depth
