@@ -144,9 +144,11 @@ def ensemble(
         require_rodas(solver)
     done, leave = [0], [False]
 
+    series = solver.series if isinstance(solver, Rodas5P) else "never"
+
     def compiled(index: int, state: Array) -> None:
         run = start_any(members[index], state, instants[index], rtol=float(rtol),
-                        max_step=max_step, events=watched)
+                        max_step=max_step, events=watched, series=series)
         result = step_loop.RUNNING
         while result == step_loop.RUNNING:
             if leave[0]:

@@ -180,6 +180,13 @@ class NormalLaw(NodeLaw):
         """
         return np.zeros((1, nodes))
 
+    def pieces(self, share: Array) -> Array | None:
+        """Pieces (n, p, 11) of a law that is polynomial piece by piece, else None.
+
+        See :mod:`fecontact.laws.pieces`; the time integrator expands the motion with them.
+        """
+        return None
+
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         return stored_energy(self.kernel.address, penetration, self.table(share),

@@ -23,10 +23,10 @@ def start_state(moving: Moving, initial: Any, time: float) -> Array:
 
 def start_any(
     moving: Moving, state: Array, times: Array, *, rtol: float, max_step: float | None = None,
-    vary: bool = False, events: Sequence[AnyEvent] = (),
+    vary: bool = False, events: Sequence[AnyEvent] = (), series: str = "never",
 ) -> Run | FieldSteps:
     """A run before its first step, without powers, of a contact system or of a field."""
     if isinstance(moving, ContactSystem):
         return start(moving, state, times, rtol=rtol, max_step=max_step, work=False, vary=vary,
-                     events=events)
+                     events=events, series=series)
     return start_field(moving, state, times, rtol=rtol, max_step=max_step, vary=vary, events=events)

@@ -38,6 +38,7 @@ class Checkpoint:
             # Addresses of laws are integers, and differ from process to process.
             if np.asarray(item).dtype.kind == "f":
                 mark.update(np.ascontiguousarray(item).tobytes())
+        mark.update(b"steps" if run.series is None else b"series")
         return cls(path, run, mark.hexdigest())
 
     def read(self) -> None:
@@ -88,7 +89,11 @@ class Checkpoint:
     def _parts(self) -> list[Any]:
         """The arrays from which a run goes on."""
         watch = self.run.watch
-        return [*_leaves(self.run.progress), watch.zones, watch.own_values]
+        return [*_leaves(self.run.progress), watch.zones, watch.own_values, *self._contacts()]
+
+    def _contacts(self) -> list[Any]:
+        """States of the contacts of a run by power series."""
+        return [] if self.run.series is None else [self.run.series.states]
 
     def keep(self) -> None:
         """Write the file if the last time was some while ago."""

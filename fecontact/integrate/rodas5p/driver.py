@@ -20,6 +20,7 @@ from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.state import Control, Output, Problem, progress_for, room_for
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, propagate, variation_for
+from fecontact.integrate.series.branches import chosen_series
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
@@ -47,6 +48,7 @@ def start(
     vary: bool | tuple[ContactSystem, ContactSystem, float] = False,
     vary_rtol: float | None = None,
     events: Sequence[AnyEvent] = (),
+    series: str = "auto",
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -78,6 +80,8 @@ def start(
         ``rtol`` of their size by default, or of a thousandth of the largest.
     events : sequence of ContactEvents, Crossing and Event
         What to watch for.
+    series : 'auto', 'always' or 'never'
+        Whether to expand the motion in power series; see :class:`fecontact.integrate.Rodas5P`.
     """
     if not np.isfinite(state).all():
         raise InputError("The initial state holds values that are not finite.")
@@ -127,7 +131,8 @@ def start(
             1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate.address if vary else 0),
-        watch_for(system, events, bool(vary)))
+        watch_for(system, events, bool(vary)),
+        None if vary else chosen_series(system, state, rtol, max_step, events, work, series))
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
@@ -218,10 +223,11 @@ def integrate(
     progress: Callable[[float], None] | None = None,
     checkpoint: Path | None = None,
     events: Sequence[AnyEvent] = (),
+    series: str = "auto",
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events)
+    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()

@@ -1,8 +1,8 @@
 """A run of the compiled integrator: what it goes on from, and what it has found."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.rodas5p.small_systems import advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.variational import Vary
+from fecontact.integrate.series.branches import Series
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,8 @@ class Run:
         All that is needed to go on.
     watch : Watch
         What is watched for; what was found is in ``events``.
+    series : Series or None
+        Tables of a system whose motion is expanded in power series; None for Rodas5P.
     """
 
     problem: Problem
@@ -45,6 +48,7 @@ class Run:
     output: Output
     variation: Vary
     watch: Watch
+    series: Series | None = None
     found: list[tuple[Array, Array]] = field(default_factory=list)
 
     @property
@@ -87,8 +91,11 @@ class Run:
 
     @property
     def statistics(self) -> dict[str, int]:
-        """Counts of steps, rejected steps, right-hand sides and Jacobians."""
+        """Counts of steps, rejected steps, right-hand sides and Jacobians, or of series."""
         counts = self.progress.counts
+        if self.series is not None:
+            return {"steps": int(counts[state.STEPS]), "rejected": int(counts[state.REJECTIONS]),
+                    "series": int(counts[state.RATES])}
         return {"steps": int(counts[state.STEPS]),
                 "rejected": int(counts[state.REJECTIONS]),
                 "right_hand_sides": int(counts[state.RATES]),
@@ -100,12 +107,21 @@ class Run:
         return np.swapaxes(self.variation.transitions, 1, 2)
 
     @cached_property
-    def _advance(self) -> Any:
-        return advance_for(self.problem, self.variation)
+    def _advance(self) -> Callable[[int], int]:
+        """What goes on by so many steps."""
+        if self.series is not None:
+            # Compiled for runs that need it only.
+            from fecontact.integrate.series.small_systems import advance_for as advance_series
+
+            expand = advance_series(self.problem)
+            return lambda steps: expand(self.problem, self.progress, self.output, self.watch,
+                                        self.series, steps)
+        step = advance_for(self.problem, self.variation)
+        return lambda steps: step(self.problem, self.progress, self.room, self.output,
+                                  self.variation, self.watch, steps)
 
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""
-        status = self._advance(self.problem, self.progress, self.room, self.output,
-                               self.variation, self.watch, steps)
+        status = self._advance(steps)
         take_events(self.watch, self.found, self.time)
         return int(status)

@@ -8,6 +8,7 @@ import numpy as np
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, Positive
+from fecontact.laws.pieces import pieces_of
 from fecontact.laws.signatures import normal_law
 
 
@@ -48,6 +49,14 @@ class LinearContact(NormalLaw):
     def penetration_scale(self) -> float:
         """Penetration under 1 N on the whole face, or on each node [m], the smallest of all."""
         return 1.0 / float(np.max(self.stiffness))
+
+    def pieces(self, share: Array) -> Array | None:
+        """Nothing, and the force c u + d v."""
+        if self.kernel is not _linear:
+            return None
+        c, d = self.table(share).T
+        return pieces_of(len(share), [[-np.inf, 0.0], [0.0, np.inf, 0.0, c, 0.0, d, 0.0, 0.0,
+                                                       0.0, c, d]])
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
@@ -113,6 +122,17 @@ class TwoSidedStop(NormalLaw):
     def onsets(self, nodes: int) -> Array:
         """Zero and minus the clearance (2, n) [m]."""
         return np.array([np.zeros(nodes), np.broadcast_to(-np.asarray(self.clearance), nodes)])
+
+    def pieces(self, share: Array) -> Array | None:
+        """Upper stop, nothing, lower stop, for n = 1 or n = 2; else None."""
+        K, s, exponent, factor = self.table(share).T
+        below = np.where(exponent == 1.0, [K * s, K, 0.0 * K], [-K * s * s, -2.0 * K * s, -K])
+        above = np.where(exponent == 1.0, [0.0 * K, K, 0.0 * K], [0.0 * K, 0.0 * K, K])
+        if self.kernel is not _two_sided or not np.isin(exponent, (1.0, 2.0)).all():
+            return None
+        return pieces_of(len(share), [
+            [-np.inf, -s, *below, *(-factor * below), 1.0, 0.0, -factor], [-s, 0.0],
+            [0.0, np.inf, *above, *(factor * above), 1.0, 0.0, factor]])
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in both stops [J]: the integral of F(u, 0) from 0 to u."""

@@ -12,6 +12,7 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive, UpToOne
+from fecontact.laws.pieces import pieces_of
 from fecontact.laws.signatures import normal_law
 
 DampingModel = Literal["exact", "hunt-crossley", "lankarani-nikravesh", "flores"]
@@ -64,6 +65,17 @@ class _Power(NormalLaw):
         sizes = [np.size(value) for value in vars(self).values() if not isinstance(value, str)]
         table = self.table(np.ones(max(sizes)))
         return float(np.min(table[:, 1] * table[:, 0] ** (-1.0 / table[:, 2])))
+
+    def pieces(self, share: Array) -> Array | None:
+        """Nothing, and the force, for n = 1 or n = 2; else None."""
+        scale, length, exponent, factor = self.table(share).T
+        if self.kernel is not _power or not np.isin(exponent, (1.0, 2.0)).all():
+            return None
+        K = scale / length**exponent
+        e = [0.0 * K, np.where(exponent == 1.0, K, 0.0), np.where(exponent == 2.0, K, 0.0)]
+        return pieces_of(len(share), [
+            [-np.inf, 0.0],
+            [0.0, np.inf, *e, *(factor * one for one in e), 1.0, 0.0, factor]])
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""

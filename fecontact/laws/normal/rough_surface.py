@@ -10,6 +10,7 @@ from fecontact.core.compiled import helper
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive
+from fecontact.laws.pieces import pieces_of
 from fecontact.laws.signatures import normal_law
 
 _TAU = 2.0 * math.pi
@@ -157,6 +158,16 @@ class RoughSurface(NormalLaw):
     def penetration_scale(self) -> float:
         """Roughness height R_Z [m], the smallest of all nodes."""
         return float(np.min(self.roughness_height))
+
+    def pieces(self, share: Array) -> Array | None:
+        """Nothing, part of the asperities, and all of them, for uniform heights; else None."""
+        if self.kernel is not uniform:
+            return None
+        c, R, d = self.table(share).T
+        return pieces_of(len(share), [
+            [-np.inf, 0.0],
+            [0.0, R, 0.0, 0.0, 0.5 * c / R, 0.0, d / R, 0.0, 0.0, 0.5 * c, d],
+            [R, np.inf, -0.5 * c * R, c, 0.0, d, 0.0, 0.0, -0.5 * c * R, c, d]])
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the asperities [J]: the integral of F(u, 0) from 0 to u."""

@@ -1,0 +1,349 @@
+"""Steps by power series, from one switch of the contacts to the next.
+
+Between two switches forces are polynomials of displacements, velocities and signals, and the series
+of the motion converges for all times. A step is as long as its last coefficients allow, and ends
+before that where a node leaves the piece of its law that acts: at the first zero of its distance
+from the ends of that piece, none of which is missed, or where its force falls to zero.
+"""
+
+import math
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import helper, i8, kernel, routine
+from fecontact.core.references import borrowed
+from fecontact.integrate.rodas5p import state
+from fecontact.integrate.rodas5p.event_kernels import (
+    LIFT_OFF,
+    NODES,
+    STICK,
+    TOUCH_DOWN,
+    WATCH,
+    FOUND,
+)
+from fecontact.integrate.rodas5p.state import (
+    ENERGY,
+    OUTPUTS,
+    RATES,
+    REJECTIONS,
+    SPEED_SCALE,
+    STARTED,
+    STEP,
+    STEPS,
+    TIME,
+    WORST_NODE,
+)
+from fecontact.integrate.rodas5p.step_loop import (
+    FINISHED,
+    MINIMUM_STEP,
+    NOT_FINITE,
+    RUNNING,
+    STOPPED,
+)
+from fecontact.integrate.series.branches import (
+    ACTS,
+    MET,
+    MET_LOWER,
+    MET_NOTHING,
+    MET_RELEASE,
+    MET_UPPER,
+    PLACE,
+    SERIES,
+)
+from fecontact.integrate.series.expansion import (
+    CONTACT_LOSS,
+    DASHPOT_LOSS,
+    DRIVE_POWER,
+    LOAD_POWER,
+    MODAL_LOSS,
+    expand,
+    expand_powers,
+    integrate_powers,
+    set_forcing,
+)
+from fecontact.integrate.series.polynomials import COEFFICIENTS, DEGREE, first_zero, value_at
+from fecontact.laws.pieces import LOWER, RELEASE, UPPER
+from fecontact.system.powers import (
+    CONTACT_DAMPING,
+    DASHPOTS,
+    DRIVE,
+    LOAD,
+    MODAL_DAMPING,
+    POWER_COUNT,
+)
+
+ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.OUTPUT, WATCH, SERIES, i8)
+
+# Columns of the work in the order of `Series.powers`.
+_WORKS = np.array([DRIVE, LOAD, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING])
+# Steps grow at most so much at a time.
+_LARGEST_GROWTH = 50.0
+# Switches at one time, per node, beyond which time goes on regardless.
+_MOST_SWITCHES = 8
+
+
+@helper
+def _length(control, progress, series, h):
+    """Part of h until the last terms of the series are within the tolerance; inf if not finite."""
+    last, before = 0.0, 0.0
+    speed = max(progress.numbers[SPEED_SCALE], control.speed_scale)
+    for i in range(len(series.q)):
+        size = max(max(progress.extremes[i], abs(progress.state[i])),
+                   control.displacement_scale[i])
+        size = min(size, speed / control.largest[i] * h / DEGREE) * series.tolerance
+        last = max(last, abs(series.q[i, DEGREE]) / size)
+        before = max(before, abs(series.q[i, DEGREE - 1]) / size)
+        if not abs(series.q[i, DEGREE]) < np.inf:
+            return -1.0
+    return _within(last, before)
+
+
+@helper
+def _within(last, before):
+    """Part at which the last two terms are within 1."""
+    x = _LARGEST_GROWTH
+    if last > 1e-40:
+        x = min(x, math.exp(math.log(last) * (-1.0 / DEGREE)))
+    if before > 1e-38:
+        x = min(x, math.exp(math.log(before) * (-1.0 / (DEGREE - 1))))
+    return x
+
+
+@helper
+def _work_length(control, progress, series, h):
+    """The same of the work."""
+    kinetic = 0.0
+    for i in range(len(series.q)):
+        kinetic += 0.5 * series.v[i, 0] ** 2
+    energy = max(max(progress.numbers[ENERGY], kinetic), control.energy_scale)
+    for k in range(POWER_COUNT):
+        energy = max(energy, abs(progress.work[k]))
+    progress.numbers[ENERGY] = energy
+    last, before = 0.0, 0.0
+    for row in range(len(series.powers)):
+        last = max(last, abs(series.powers[row, DEGREE]))
+        before = max(before, abs(series.powers[row, DEGREE - 1]))
+    scale = 1.0 / (series.tolerance * energy)
+    return _within(last * scale, before * scale)
+
+
+@routine
+def _first_switch(limit, h, series):
+    """Part of h at which a node leaves its piece first, that node, and what it meets."""
+    first, node, meets = 2.0 * limit, -1, MET_NOTHING
+    line = series.line[0]
+    for j in range(len(series.states)):
+        piece, met = series.pieces[j, series.states[j, PLACE]], series.states[j, MET]
+        u = series.u[j]
+        for what in range(1, 4):
+            if what == MET_LOWER:
+                if not piece[LOWER] > -np.inf:
+                    continue
+                for k in range(COEFFICIENTS):
+                    line[k] = u[k]
+                line[0] -= piece[LOWER]
+            elif what == MET_UPPER:
+                if not piece[UPPER] < np.inf:
+                    continue
+                for k in range(COEFFICIENTS):
+                    line[k] = -u[k]
+                line[0] += piece[UPPER]
+            else:
+                r0, r1, r2 = piece[RELEASE], piece[RELEASE + 1], piece[RELEASE + 2]
+                if r2 == 0.0:
+                    continue
+                sign = 1.0 if series.states[j, ACTS] else -1.0
+                for k in range(COEFFICIENTS):
+                    line[k] = sign * r1 * u[k]
+                    if k < DEGREE:
+                        line[k] += sign * r2 * (k + 1) / h * u[k + 1]
+                line[0] += sign * r0
+            if what == met:
+                # Zero but for rounding: it has just been passed.
+                line[0] = 0.0
+            part = first_zero(line, min(first, limit), series.room)
+            if part <= limit and part < first:
+                first, node, meets = part, j, what
+    return first, node, meets
+
+
+@helper
+def _switch(j, meets, h, series):
+    """Let node j go on to where it is past what it has met, at a time at which u, v are series[0].
+
+    Returns whether its force begins (1), ends (-1) or neither (0).
+    """
+    acted = series.states[j, ACTS]
+    if meets == MET_RELEASE:
+        series.states[j, ACTS], series.states[j, MET] = 1 - acted, MET_RELEASE
+        return 1 - 2 * acted
+    up = meets == MET_UPPER
+    here = series.pieces[j, series.states[j, PLACE]]
+    u = here[UPPER] if up else here[LOWER]
+    series.states[j, PLACE] += 1 if up else -1
+    series.states[j, MET] = MET_LOWER if up else MET_UPPER
+    piece = series.pieces[j, series.states[j, PLACE]]
+    r0, r1, r2 = piece[RELEASE], piece[RELEASE + 1], piece[RELEASE + 2]
+    acts = 0
+    if r2 == 0.0:
+        acts = 1 if r0 != 0.0 or r1 != 0.0 else 0
+    elif r0 + r1 * u + r2 * series.line[1, j] > 0.0:
+        acts = 1
+    series.states[j, ACTS] = acts
+    return acts - acted
+
+
+@helper
+def _set_speeds(x, h, series):
+    """Rates of the penetrations at the part x of h."""
+    for j in range(len(series.u)):
+        total = 0.0
+        for k in range(DEGREE, 0, -1):
+            total = total * x + k * series.u[j, k]
+        series.line[1, j] = total / h
+
+
+@routine
+def _write(t, h, reached, problem, progress, output, series):
+    """Write the outputs up to the time ``reached`` within the step."""
+    row, m = progress.counts[OUTPUTS], len(series.q)
+    while row < len(output.times) and output.times[row] <= reached:
+        x = (output.times[row] - t) / h
+        for i in range(m):
+            output.states[row, i] = value_at(series.q[i], x)
+            output.states[row, m + i] = value_at(series.v[i], x)
+        if problem.control.work:
+            for k in range(len(progress.work)):
+                output.work[row, k] = progress.work[k]
+            for k in range(len(_WORKS)):
+                output.work[row, _WORKS[k]] += value_at(series.powers[k], x)
+        row += 1
+    progress.counts[OUTPUTS] = row
+
+
+@helper
+def _note(t, kind, node, progress, watch):
+    row = watch.counts[FOUND]
+    watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
+    for k in range(len(progress.state)):
+        watch.states[row, k] = progress.state[k]
+    watch.counts[FOUND] = row + 1
+
+
+@helper
+def _note_change(t, change, j, progress, watch):
+    """Note that the force of node j begins or ends; whether the run stops there."""
+    stops = False
+    if change > 0:
+        _note(t, TOUCH_DOWN, j, progress, watch)
+        _note(t, STICK, j, progress, watch)
+        stops = watch.stops[TOUCH_DOWN] != 0 or watch.stops[STICK] != 0
+    elif change < 0:
+        _note(t, LIFT_OFF, j, progress, watch)
+        stops = watch.stops[LIFT_OFF] != 0
+    return stops
+
+
+@helper
+def _take_scales(control, progress):
+    m = len(control.largest)
+    for i in range(m):
+        progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
+        speed = abs(progress.state[m + i]) * control.largest[i]
+        progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE], speed)
+
+
+@helper
+def _expanded(t, h, problem, progress, series):
+    """Expand the motion from t on; the longest step within the tolerance as a part of h."""
+    s, control = problem.system, problem.control
+    set_forcing(t, h, s, series)
+    expand(progress.state, h, s, series)
+    part = _length(control, progress, series, h)
+    if control.work:
+        expand_powers(h, s, series)
+        part = min(part, _work_length(control, progress, series, h))
+    progress.counts[RATES] += 1
+    return part
+
+
+@helper
+def _advance_by(problem, progress, output, watch, series, most):
+    numbers, counts, control = progress.numbers, progress.counts, problem.control
+    m, n = len(series.q), len(series.states)
+    t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
+    smallest = 1e-14 * max(abs(output.times[0]), abs(end))
+    watched = watch.counts[NODES] != 0
+    if counts[STARTED] == 0:
+        for k in range(2 * m):
+            output.states[0, k] = progress.state[k]
+        counts[STARTED], counts[OUTPUTS] = 1, 1
+    attempts, switches = 0, 0
+    while counts[OUTPUTS] < len(output.times):
+        if switches == 0 and (attempts >= most or (
+                watched and watch.counts[FOUND] + 4 * _MOST_SWITCHES * n > len(watch.found))):
+            break
+        attempts += 1
+        _take_scales(control, progress)
+        part = _expanded(t, h, problem, progress, series)
+        if part < 0.0:
+            numbers[TIME], numbers[STEP] = t, h
+            return NOT_FINITE
+        if not part * h >= smallest:
+            counts[WORST_NODE] = 0
+            counts[REJECTIONS] += 1
+            numbers[TIME], numbers[STEP] = t, part * h
+            return MINIMUM_STEP
+        part = min(part, series.longest / h)
+        whole = part * h
+        at_end = t + 1.01 * whole >= end
+        if at_end:
+            part = (end - t) / h
+        first, node, meets = _first_switch(part, h, series)
+        change = 0
+        switched = node >= 0
+        if switched and first * h <= smallest:
+            switches += 1
+            if switches > _MOST_SWITCHES * n:
+                # What happens at one time without end: a little later it is another place.
+                switched, first = False, min(part, 1e3 * smallest / h)
+        elif switched:
+            switches = 0
+        if not switched:
+            first = min(first, part)
+            switches = 0
+        reached = end if at_end and first >= part else t + first * h
+        if control.work:
+            integrate_powers(h, series)
+        _write(t, h, reached, problem, progress, output, series)
+        for i in range(m):
+            progress.state[i] = value_at(series.q[i], first)
+            progress.state[m + i] = value_at(series.v[i], first)
+        if control.work:
+            for k in range(len(_WORKS)):
+                progress.work[_WORKS[k]] += value_at(series.powers[k], first)
+        if first * h > smallest:
+            for j in range(n):
+                series.states[j, MET] = MET_NOTHING
+        counts[STEPS] += 1
+        stops = False
+        if switched:
+            if meets != MET_RELEASE:
+                _set_speeds(first, h, series)
+            change = _switch(node, meets, h, series)
+            if watched and change != 0:
+                stops = _note_change(reached, change, node, progress, watch)
+        t, h = reached, whole
+        if stops:
+            numbers[TIME], numbers[STEP] = t, h
+            return STOPPED
+    numbers[TIME], numbers[STEP] = t, h
+    return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
+
+
+@kernel(ADVANCE, nogil=True)
+def advance(problem, progress, output, watch, series, most):
+    """Go on by up to ``most`` steps; returns how it ended, as ``step_loop.advance`` does."""
+    return _advance_by(borrowed(problem), borrowed(progress), borrowed(output), borrowed(watch),
+                       borrowed(series), most)

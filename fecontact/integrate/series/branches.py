@@ -1,0 +1,256 @@
+"""Systems whose forces are polynomials of the state between switches, and their tables."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import block, f8, i8, matrix, vector
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, Integers
+from fecontact.integrate.events import AnyEvent, ContactEvents
+from fecontact.integrate.series.polynomials import COEFFICIENTS, DEPTH
+from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.pieces import PIECE, UPPER
+from fecontact.laws.signals.base import Signal
+from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics
+from fecontact.system.contact_system import ContactSystem
+
+# Sizes up to which series are taken unasked; their cost grows with the square of the modes.
+MOST_MODES, MOST_NODES = 4, 4
+# Modes so much faster than the slowest motion are left to implicit steps if their damping ratio is
+# larger: they need not be resolved.
+_FAST, _DAMPED = 100.0, 0.3
+# Errors of a step, in parts of the tolerance of the run, and at least.
+_PART, _ROUNDING = 1e-4, 2e-16
+
+# Columns of `Series.states`: piece of the law that acts, whether its force does, and which limit
+# of it has just been met.
+PLACE, ACTS, MET = range(3)
+MET_NOTHING, MET_LOWER, MET_UPPER, MET_RELEASE = range(4)
+# Powers that are integrated: columns of `Series.powers`.
+SERIES_POWERS = 5
+
+
+class Series(NamedTuple):
+    """A system whose motion is expanded in time, and the state of its contacts.
+
+    Attributes
+    ----------
+    pieces : (n, p, 11) array
+        Pieces of the normal laws, see :mod:`fecontact.laws.pieces`.
+    constants : (g,) array
+        Constant parts of the signals: motions of the drive, then loads.
+    sines : (h, 4) array
+        Number of the signal, amplitude, angular frequency and phase of each sine.
+    constant_force, sine_force, cosine_force : (m,), (h, m), (h, m) arrays
+        Modal forces of all that is constant, and of each sine and its cosine.
+    longest, tolerance : float
+        Longest step [s]; error of a step as a part of the scales of the run.
+    drives, sticks : int
+        Number of the drive's motions; whether nodes in contact count as sticking.
+    states : (n, 3) integer array
+        State of each node.
+    q, v : (m, n + 1) arrays
+        Coefficients of modal displacements and velocities over the step.
+    forcing : (m, n + 1) array
+        Those of the modal forces that are given in time.
+    signal : (g, n + 1) array
+        Those of the signals; (0, n + 1) where no powers are integrated.
+    u, F, square, cube : (n, n + 1) arrays
+        Those of the penetrations, forces, and of u^2 and u^3.
+    powers : (5, n + 1) array
+        Those of the powers, then of their integrals.
+    line, room : (3, n + 1), (d, n + 1) arrays
+        Room to work in.
+    """
+
+    pieces: Array
+    constants: Array
+    sines: Array
+    constant_force: Array
+    sine_force: Array
+    cosine_force: Array
+    longest: float
+    tolerance: float
+    drives: int
+    sticks: int
+    states: Integers
+    q: Array
+    v: Array
+    forcing: Array
+    signal: Array
+    u: Array
+    F: Array
+    square: Array
+    cube: Array
+    powers: Array
+    line: Array
+    room: Array
+
+
+SERIES = types.NamedTuple(
+    [block, vector, matrix, vector, matrix, matrix, f8, f8, i8, i8, types.Array(i8, 2, "C"),
+     *[matrix] * 11], Series)
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Why a system cannot be expanded in time."""
+
+    reason: str
+
+
+def series_for(
+    system: ContactSystem, state: Array, rtol: float, max_step: float | None,
+    events: tuple[AnyEvent, ...], work: bool,
+) -> Series | Obstacle:
+    """Tables of a system at the start of a run, or what stands in the way."""
+    why = _obstacle(system, events)
+    if why is not None:
+        return Obstacle(why)
+    pieces = law_pieces(system)
+    signals = [*system.drive.motions[:2], *system.load.signals.values()]
+    parts = [sines_of(signal) for signal in signals]
+    if pieces is None or any(part is None for part in parts):
+        raise RuntimeError("An obstacle was not seen.")
+    sines = np.array([(g, *row) for g, part in enumerate(parts) if part is not None
+                      for row in part[1] if row[0] != 0.0]).reshape(-1, 4)
+    constants = np.array([part[0] for part in parts if part is not None])
+    arrays = system.arrays
+    # Modal forces (g, m) of a signal and of its rate.
+    of_value = np.vstack([arrays.drive_stiffness[:, None] * arrays.drive_shapes,
+                          arrays.load_shapes])
+    of_rate = np.vstack([arrays.drive_damping[:, None] * arrays.drive_shapes,
+                         0.0 * arrays.load_shapes])
+    number, amplitude, w = sines[:, 0].astype(int), sines[:, 1:2], sines[:, 2:3]
+    m, n = system.basis.modes, system.basis.contact_nodes
+    own = np.zeros((n, COEFFICIENTS))
+    return Series(
+        pieces, constants, sines, arrays.constant_load + constants @ of_value,
+        amplitude * of_value[number], amplitude * w * of_rate[number],
+        np.inf if max_step is None else float(max_step), max(_PART * rtol, _ROUNDING),
+        2, 1, _first_states(system, pieces, state),
+        *np.zeros((3, m, COEFFICIENTS)), np.zeros((len(signals) if work else 0, COEFFICIENTS)), own, own.copy(), own.copy(), own.copy(),
+        np.zeros((SERIES_POWERS, COEFFICIENTS)), np.zeros((3, COEFFICIENTS)),
+        np.zeros((DEPTH + 3, COEFFICIENTS)))
+
+
+def chosen_series(
+    system: ContactSystem, state: Array, rtol: float, max_step: float | None,
+    events: Sequence[AnyEvent], work: bool, use: str,
+) -> Series | None:
+    """Tables of a system for which series are used; InputError where they cannot 'always' be."""
+    if use == "never":
+        return None
+    found = series_for(system, state, rtol, max_step, tuple(events), work)
+    if isinstance(found, Obstacle):
+        if use == "always":
+            raise InputError(f"Rodas5P: series = 'always' is for systems whose forces are "
+                             f"polynomials between switches of contacts, but {found.reason}; "
+                             f"leave it out.")
+        return None
+    return found if use == "always" or worthwhile(system, found.pieces) else None
+
+
+def law_pieces(system: ContactSystem) -> Array | None:
+    """Pieces (n, p, 11) of the normal laws of all nodes, or None."""
+    found = [law.pieces(share) for _, share, law in system.law_groups("normal")]
+    given = [table for table in found if table is not None]
+    if len(given) < len(found):
+        return None
+    most = max(table.shape[1] for table in given)
+    rows = []
+    for table in given:
+        # What a law has less of begins and ends at infinity.
+        full = np.zeros((len(table), most, PIECE))
+        full[..., : UPPER + 1] = np.inf
+        full[:, : table.shape[1]] = table
+        rows.append(full)
+    return np.concatenate(rows)
+
+
+def sines_of(signal: Signal) -> tuple[float, list[tuple[float, float, float]]] | None:
+    """Constant part of a signal, and amplitude, angular frequency and phase of its sines."""
+    if type(signal) is Constant:
+        return float(signal.value), []
+    if type(signal) is Harmonic:
+        return 0.0, [(signal.amplitude, signal.angular_frequency, signal.phase)]
+    if type(signal) is Harmonics:
+        return 0.0, [tuple(row) for row in signal.parameters()[1:].reshape(-1, 3).tolist()]
+    return None
+
+
+def _first_states(system: ContactSystem, pieces: Array, state: Array) -> Integers:
+    """States (n, 3) of the nodes at the start."""
+    m, n = system.basis.modes, system.basis.contact_nodes
+    rows = system.arrays.Ty
+    states = np.zeros((n, 3), dtype=np.int64)
+    for j in range(n):
+        u, v = -float(rows[j] @ state[:m]) - system.arrays.gap[j], -float(rows[j] @ state[m:])
+        place = int(np.searchsorted(pieces[j, :, UPPER], u))
+        states[j] = place, acts(pieces[j, place], u, v), MET_NOTHING
+    return states
+
+
+def acts(piece: Array, u: float, v: float) -> bool:
+    """Whether the force of a piece is not cut off."""
+    release = piece[-3:]
+    if not release.any():
+        return False
+    return bool(release[2] == 0.0 or release @ [1.0, u, v] > 0.0)
+
+
+def _obstacle(system: ContactSystem, events: tuple[AnyEvent, ...]) -> str | None:
+    basis, arrays, ground = system.basis, system.arrays, system.ground
+    if basis.dimension == 3:
+        return "bodies in space are not among them"
+    if ground.wavy and basis.ground_nodes.any():
+        return "the ground is wavy"
+    for _, _, law in system.law_groups("friction"):
+        if not (type(law) is ConstantFriction and not np.any(law.friction_coefficient)
+                and not np.any(law.viscous_coefficient)):
+            return "there is friction"
+    for _, share, law in system.law_groups("normal"):
+        if law.pieces(share) is None:
+            return f"{type(law).__name__} is not piecewise polynomial"
+    for signal in (*system.drive.motions, *system.load.signals.values()):
+        if sines_of(signal) is None:
+            return f"{type(signal).__name__} is neither constant nor harmonic"
+    if not np.array_equal(arrays.stiffness, arrays.stiffness.T):
+        return "the stiffness is not symmetric"
+    if not all(isinstance(one, ContactEvents) for one in events):
+        return "events other than ContactEvents are not located in them"
+    if events and (arrays.Tx.any() or any(motion.largest_speed(0.0, 1.0) for motion
+                                          in system.prescribed_motion.motions)):
+        return "ContactEvents are located in them only where contact nodes do not slide"
+    return None
+
+
+def worthwhile(system: ContactSystem, pieces: Array) -> bool:
+    """Whether series are the faster way: few modes, none of them fast and much damped."""
+    m, n = system.basis.modes, system.basis.contact_nodes
+    if m > MOST_MODES or n > MOST_NODES:
+        return False
+    slow = [w for signal in (*system.drive.motions, *system.load.signals.values())
+            for _, w, _ in (sines_of(signal) or (0.0, []))[1] if w > 0.0]
+    for closed in (False, True):
+        stiffness, damping = system.arrays.stiffness, system.arrays.damping
+        if closed:
+            piece = np.abs(pieces)
+            rows = system.arrays.Ty
+            stiffness = stiffness + rows.T @ (piece[:, :, 3].max(axis=1)[:, None] * rows)
+            damping = damping + rows.T @ (piece[:, :, 5].max(axis=1)[:, None] * rows)
+        rates = np.linalg.eigvals(np.block([[np.zeros((m, m)), np.eye(m)],
+                                            [-stiffness, -damping]]))
+        size = np.abs(rates)
+        if not closed:
+            slow += size[size > 0.0].tolist()
+        if not slow:
+            continue
+        fast = size > _FAST * min(slow)
+        if (-rates.real[fast] > _DAMPED * size[fast]).any():
+            return False
+    return True

@@ -1,0 +1,52 @@
+"""Steps by power series for systems of one or two nodes that few modes move.
+
+As in :mod:`fecontact.integrate.rodas5p.small_systems`, loops over one or two numbers are written out
+for arrays of a known size. Those over coefficients are not, so that they are vectorised.
+"""
+
+from functools import cache
+from typing import Any
+
+from fecontact.core.compiled import kernel
+from fecontact.core.references import constants
+from fecontact.integrate.rodas5p import small_systems
+from fecontact.integrate.rodas5p.state import Problem
+from fecontact.integrate.series.advance import ADVANCE, advance
+from fecontact.integrate.series.branches import SERIES, SERIES_POWERS
+from fecontact.integrate.series.polynomials import COEFFICIENTS
+from fecontact.laws.pieces import PIECE
+
+# Modes and nodes.
+SIZES = ((1, 1), (2, 1), (3, 1), (2, 2))
+
+
+def advance_for(problem: Problem) -> Any:
+    """The loop for a system of this size, or for all."""
+    nodes, modes = problem.system.Tx.shape
+    if (modes, nodes) in SIZES and problem.system.second_motion == 0:
+        return _advance(modes, nodes)
+    return advance
+
+
+@cache
+def _advance(modes: int, nodes: int) -> Any:
+    return kernel(ADVANCE, constants=constants(fixed_values(modes, nodes)), nogil=True)(
+        advance.py_func)
+
+
+def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
+    """What is the same in all systems of a size, for each type of tuples."""
+    m, n = modes, nodes
+    return small_systems.fixed_values(m, n) | {SERIES: {
+        "pieces": (n, None, PIECE), "sines": (None, 4), "constant_force": (m,),
+        "sine_force": (None, m), "cosine_force": (None, m), "states": (n, 3), "drives": 2,
+        **dict.fromkeys(("q", "v", "forcing"), (m, COEFFICIENTS)),
+        **dict.fromkeys(("u", "F", "square", "cube"), (n, COEFFICIENTS)),
+        "signal": (None, COEFFICIENTS), "powers": (SERIES_POWERS, COEFFICIENTS),
+    }}
+
+
+# What they are compiled from is at hand while the loop itself has just been compiled.
+if advance.stats.cache_misses:
+    for size in SIZES:
+        _advance(*size)
