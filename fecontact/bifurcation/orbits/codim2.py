@@ -16,7 +16,7 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.criticality import (
     Criticality,
-    Orientation,
+    ContinuedSign,
     Term,
     along_parameter,
     gradient,
@@ -64,14 +64,14 @@ class OrbitCurve(Problem):
         'fold', 'period doubling', 'Neimark-Sacker' or 'period'.
     period : float
         The period [s] of all orbits, for the kind 'period'.
-    orientation : Orientation
+    sign : ContinuedSign
         Sign of the test function, continued along the curve.
     """
 
     orbit: CollocationProblem
     kind: str
     period: float = 1.0
-    orientation: Orientation = field(default_factory=Orientation)
+    sign: ContinuedSign = field(default_factory=ContinuedSign)
 
     keeps_matrix: ClassVar[bool] = True
     polishes: ClassVar[bool] = True
@@ -198,7 +198,7 @@ class CurveLinearised:
         if kind == "Neimark-Sacker":
             return of_torus(self.orbit)
         found = of_fold(self.orbit) if kind == "fold" else of_doubling(self.orbit)
-        return self.problem.orientation.aligned(found, self.problem.orbit.widths)
+        return self.problem.sign.aligned(found, self.problem.orbit.widths)
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -219,7 +219,7 @@ class CurveLinearised:
         if self.problem.kind == "period":
             return _unit(len(self.u), -3) / self.problem.period
         if self.problem.kind != "Neimark-Sacker":
-            self.problem.orientation.keep(self.terms[0])
+            self.problem.sign.keep(self.terms[0])
         return gradient(self.orbit, self.terms)
 
     def solve(self, row: Array, rhs: Array) -> Array:

@@ -50,7 +50,7 @@ class Criticality(NamedTuple):
     v: Array | None = None
 
 
-class Orientation:
+class ContinuedSign:
     """Sign of a test function that is a singular value: its vectors turn little along a curve."""
 
     def __init__(self) -> None:
