@@ -175,8 +175,11 @@ class _Located:
             return self.points[0], float("nan")
         errors = [max(change, _LEAST_FALL * before, self._rounding)
                   for change, before in zip(changes, [0.0, *changes], strict=False)]
-        fine = [k for k, error in enumerate(errors) if error <= self._tolerance]
-        return self.points[fine[0] if fine else -2], errors[fine[0] if fine else -1]
+        # A coefficient may have needed finer meshes than are to be kept.
+        kept = [k for k in range(len(errors))
+                if k == 0 or len(self.points[k].values["mesh"]) <= self._most + 1]
+        k = next((k for k in kept if errors[k] <= self._tolerance), kept[-1])
+        return self.points[k], errors[k]
 
 
 def _unit(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
