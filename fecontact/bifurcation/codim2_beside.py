@@ -17,8 +17,10 @@ from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import (
     BranchHeader,
     BranchPoint,
+    DoubleHopfPoint,
     FoldPoint,
     HopfPoint,
+    ZeroHopfPoint,
     special_point,
 )
 from fecontact.bifurcation.continuation.problem import (
@@ -116,9 +118,8 @@ def torus_beside(field: VectorField, point: BranchPoint, parameter: str) -> Bran
     AnalysisError
         If none is found on either side.
     """
-    frequency = float(point.values["frequency_hz"] if "frequency_hz" in point.values
-                      else point._detail("frequency_hz"))
-    square = (2.0 * np.pi * frequency) ** 2
+    assert isinstance(point, ZeroHopfPoint | DoubleHopfPoint)
+    square = (2.0 * np.pi * point.frequency_hz) ** 2
     found = _first(field, point, parameter, square, _TORI,
                    lambda branch: branch.points[-1].kind == "Neimark-Sacker")
     if found is None:
