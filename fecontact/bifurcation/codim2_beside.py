@@ -163,9 +163,9 @@ def _first(
     tried = [(over, at) for over in sorted(width, key=lambda name: name != across)
              for at in beside]
     for over, at in tried:
-        hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
         reach = _ABOUT * width[over]
         try:
+            hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
             branch = orbit_branch(
                 field, hopf_point, method=Collocation(_INTERVALS), options=options,
                 bounds=(hopf_point.parameter - reach, hopf_point.parameter + reach),
