@@ -17,8 +17,10 @@ from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import (
     BranchHeader,
     BranchPoint,
+    DoubleHopfPoint,
     FoldPoint,
     HopfPoint,
+    ZeroHopfPoint,
     special_point,
 )
 from fecontact.bifurcation.continuation.problem import (
@@ -116,9 +118,8 @@ def torus_beside(field: VectorField, point: BranchPoint, parameter: str) -> Bran
     AnalysisError
         If none is found on either side.
     """
-    frequency = float(point.values["frequency_hz"] if "frequency_hz" in point.values
-                      else point._detail("frequency_hz"))
-    square = (2.0 * np.pi * frequency) ** 2
+    assert isinstance(point, ZeroHopfPoint | DoubleHopfPoint)
+    square = (2.0 * np.pi * point.frequency_hz) ** 2
     found = _first(field, point, parameter, square, _TORI,
                    lambda branch: branch.points[-1].kind == "Neimark-Sacker")
     if found is None:
@@ -162,9 +163,9 @@ def _first(
     tried = [(over, at) for over in sorted(width, key=lambda name: name != across)
              for at in beside]
     for over, at in tried:
-        hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
         reach = _ABOUT * width[over]
         try:
+            hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
             branch = orbit_branch(
                 field, hopf_point, method=Collocation(_INTERVALS), options=options,
                 bounds=(hopf_point.parameter - reach, hopf_point.parameter + reach),

@@ -177,6 +177,10 @@ def test_folds_and_tori_from_a_resonance_1_1():
     assert [at.kind for at in folds.special if at.kind != "turning point"] == ["resonance 1:1"]
     again, = folds.of_kind("resonance 1:1")
     assert [again.values["b"], again.values["c"]] == pytest.approx([0.0, 0.0], abs=1e-5)
+    found = codim2_curve(field, again, "c", to="Neimark-Sacker", bounds=box)
+    assert found.parameter == pytest.approx(np.zeros(len(found)), abs=1e-10)
+    assert np.sort(found.column("c"))[[0, -1]] == pytest.approx([-0.8, 0.0], abs=1e-5)
+    assert not found.of_kind("Chenciner")
 
 
 def half(t, x, p, out):

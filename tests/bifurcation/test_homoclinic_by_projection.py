@@ -185,6 +185,28 @@ def test_sandstedes_model(sandstede, tmp_path):
     assert motion.times[-1] == curve.points[0].values["time"]
 
 
+def koper(t, x, p, out):
+    # Koper's van der Pol oscillator of three variables.
+    out[0] = 10.0 * (p[1] * x[1] - x[0] * x[0] * x[0] + 3.0 * x[0] - p[0])
+    out[1] = x[0] - 2.0 * x[1] + x[2]
+    out[2] = x[1] - x[2]
+
+
+def test_value_of_auto():
+    """AUTO-07p's manual (demo kpr) prints lambda = -1.851185 at k = -0.15."""
+    field = vector_field(koper, {"lam": -1.0, "k": -0.15}, 3)
+    rests = equilibrium_branch(field, [1.8, 1.8, 1.8], "lam", bounds=(-6.0, 6.0), both=True)
+    hopf = min(rests.of_kind("Hopf"), key=lambda at: at.parameter)
+    orbits = orbit_branch(field, hopf, method=Collocation(intervals=80), bounds=(-6.0, 6.0))
+    assert orbits.status is BranchStatus.HOMOCLINIC
+    curve = codim2_curve(field, orbits.points[-1], "k", to="homoclinic", both=False,
+                         options=ContinuationOptions(points=10),
+                         bounds={"lam": (-3.0, 0.0), "k": (-0.3, 0.0)})
+    assert curve.points[0].values["k"] == pytest.approx(-0.15, rel=1e-12)
+    assert curve.points[0].values["lam"] == pytest.approx(-1.851185, abs=6e-7)
+    assert curve.column("truncation_error").max() < 1e-8
+
+
 def well(t, x, p, out):
     # x'' = x - x^2 + a x' + b x x'
     out[0] = x[1]

@@ -40,6 +40,7 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
+_AT_RESONANCE = 1e-6  # distance of the cosine of the angle from 1 or -1 at these resonances
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
 # Points at which a pair beside the critical multipliers passes the unit circle, by the curve.
 _PAIRS = {"fold": "fold-Neimark-Sacker", "period doubling": "flip-Neimark-Sacker",
@@ -141,7 +142,8 @@ class OrbitCurve(Problem):
         mean = float(sum(critical).real) / 2.0
         found = {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
                  for order in (1, 2, 3, 4)}
-        if abs(mean) < 1.0:
+        # Next to the resonances 1:1 and 1:2 the coefficient grows beyond all numbers.
+        if abs(mean) < 1.0 - _AT_RESONANCE:
             found["Chenciner"] = Expansion(self.orbit, u, orbit).torus(
                 float(np.arccos(mean)), _NORMAL_FORM_STEP)
         return found | {"fold-Neimark-Sacker": unit, "flip-Neimark-Sacker": flip,
