@@ -12,6 +12,7 @@ from fecontact.bifurcation import (
     basins,
     lyapunov_exponents,
     orbit_branch,
+    periodic_motion,
     poincare_scan,
     vector_field,
 )
@@ -162,6 +163,23 @@ def test_basins_of_a_forced_field():
     for one in low:
         state = fc.simulate(field, 2.0 * np.pi, initial=one.points[0], outputs=2, rtol=1e-9)
         assert state.states[-1] == pytest.approx(one.points[0], abs=1e-4)
+
+
+def test_settled_motions_of_fields_start_branches():
+    calm = periodic_motion(ROSSLER.with_(c=2.5), initial=[1.0, 1.0, 1.0], transient=300.0,
+                           longest_period=20.0)
+    assert calm.parameter_values == pytest.approx([0.2, 0.2, 2.5])
+    orbits = orbit_branch(ROSSLER, calm, "c", bounds=(2.4, 2.6))
+    assert calm.period == pytest.approx(orbits.points[0].values["period"], rel=1e-5)
+    assert orbits.points[0].parameter == 2.5
+    swing = periodic_motion(DUFFING.with_(force=0.1), initial=[1.0, 0.0])
+    assert (swing.periods, swing.period) == (1, pytest.approx(2.0 * np.pi))
+    doubled = periodic_motion(ROSSLER.with_(c=3.5), initial=[1.0, 1.0, 1.0], transient=300.0,
+                              longest_period=20.0)
+    assert doubled.period == pytest.approx(2.0 * calm.period, rel=0.05)
+    with pytest.raises(fc.AnalysisError, match="comes to rest"):
+        periodic_motion(LORENZ.with_(rho=5.0), initial=[1.0, 1.0, 1.0], transient=100.0,
+                        longest_period=10.0)
 
 
 def test_strobed_states_of_several_fields():

@@ -165,6 +165,24 @@ class Failing(Pendulum):
         return super().rates(t, x, values)
 
 
+def test_ensembles_of_fields_are_their_single_runs():
+    times = np.linspace(0.0, 10.0, 5)
+    starts = np.array([[0.5, 0.0], [1.0, 0.2], [2.0, 0.0], [0.1, 1.0]])
+    for field in (Pendulum(), Pendulum().with_(g=3.0)):
+        many = fc.ensemble(field, times, initial=starts, workers=2, events=Crossing("angle"))
+        for start, states, events in zip(starts, many.states, many.events, strict=True):
+            alone = fc.simulate(field, 10.0, initial=start, outputs=times, events=Crossing("angle"))
+            assert (alone.states == states).all()
+            assert (alone.events.time == events.time).all()
+    mixed = fc.ensemble([LORENZ, LORENZ.with_(rho=0.5)], [0.0, 30.0], initial=[1.0, 1.0, 1.0],
+                        chain=2)
+    # The second goes on where the first one ended, and comes to rest.
+    assert np.abs(mixed.states[0, -1]).max() > 1.0
+    assert np.abs(mixed.states[1, -1]).max() < 1e-5
+    with pytest.raises(ZeroDivisionError):
+        fc.ensemble(Failing(), times, initial=starts, workers=2)
+
+
 def test_what_a_field_of_python_raises_comes_through():
     with pytest.raises(ZeroDivisionError, match="no rates"):
         fc.simulate(Failing(), 3.0, initial=[1.0, 0.0])

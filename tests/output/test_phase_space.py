@@ -10,11 +10,18 @@ from fields_in_time import LORENZ, Pendulum
 from systems import impact_oscillator
 
 import fecontact as fc
-from fecontact.bifurcation import PeriodicMotion
+from fecontact.bifurcation import PeriodicMotion, orbit_branch, poincare_scan, vector_field
 from fecontact.integrate import Crossing
 from fecontact.io import read_run, write_run
-from fecontact.plot import plot_phase_space, render_phase_space
+from fecontact.plot import plot_branches, plot_phase_space, render_phase_space
 
+
+def damped(t, x, p, out):
+    out[0] = x[1]
+    out[1] = -0.4 * x[1] - x[0] + p[0] * np.cos(2.0 * t)
+
+
+DAMPED = vector_field(damped, {"force": 1.0}, ["x", "v"], period=lambda p: np.pi)
 RUN = fc.simulate(LORENZ, 10.0, initial=[1.0, 1.0, 1.0], events=Crossing("z", value=27.0))
 SWING = fc.simulate(Pendulum(), 10.0, initial=[2.0, 0.0])
 
@@ -102,6 +109,20 @@ def test_runs_come_back_from_files(run, tmp_path):
         assert read.events.kind == run.events.kind
     again = fc.simulate(LORENZ, 11.0, initial=read_run(write_run(tmp_path / "b.h5", RUN)))
     assert (again.states[0] == RUN.states[-1]).all()
+
+
+def test_runs_of_fields_beneath_branches():
+    scan = poincare_scan(DAMPED, "force", [0.5, 1.0, 2.0], transient_periods=20, keep=2,
+                         initial=[0.0, 0.0], down=False)
+    run = fc.simulate(DAMPED, 60.0, initial=[0.0, 0.0], outputs=3001)
+    branch = orbit_branch(DAMPED, run, "force", bounds=(0.4, 2.5), both=True)
+    drawn = plot_branches(branch, lambda point: point.u[0], beneath=scan, observe="x").axes[0]
+    dots = drawn.lines[0].get_xydata()
+    assert dots[:, 0] == pytest.approx(np.repeat([0.5, 1.0, 2.0], 2))
+    assert dots[:, 1] == pytest.approx(scan.up[..., 0].ravel())
+    # The nodes of an orbit begin at t = 0, where the runs are strobed.
+    on_branch = np.interp(dots[:, 0], branch.parameter, [point.u[0] for point in branch.points])
+    assert dots[:, 1] == pytest.approx(on_branch, abs=1e-3)
 
 
 def test_damaged_files_of_runs(tmp_path):

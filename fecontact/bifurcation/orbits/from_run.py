@@ -1,17 +1,21 @@
 """Periodic motions from runs, as starts for branches of orbits."""
 
+from typing import Any
+
 import numpy as np
 
 from fecontact.analysis.periodicity import count_periods
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_not_negative
 from fecontact.core.types import Array
+from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import Moving, in_time
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.forcing_period import common_period
 
 _SAMPLES = 1000
@@ -21,15 +25,16 @@ _MISFIT = 1e-2
 
 
 def periodic_motion(
-    system: ContactSystem, *, initial: Initial = "rest", transient: float | None = None,
+    system: Moving, *, initial: Initial | FieldRun = "rest", transient: float | None = None,
     longest_period: float | None = None, solver: Solver = RODAS5P, rtol: float = 1e-8,
 ) -> PeriodicMotion:
     """Run a system until its motion repeats.
 
     Parameters
     ----------
-    system : ContactSystem
-        Excited with a common period, or not at all.
+    system : ContactSystem or VectorField
+        Excited with a common period, or not at all; a field at its base values, which the motion
+        keeps.
     initial : any
         Start; see :func:`fecontact.simulate`.
     transient : float, optional
@@ -54,28 +59,30 @@ def periodic_motion(
     AnalysisError
         If the motion does not repeat, or comes to rest.
     """
-    require_kind("periodic_motion", ContactSystem, system=system)
+    moving = in_time("periodic_motion", system)
+    values = system.values if isinstance(system, VectorField) else None
     for name, value in (("transient", transient), ("longest_period", longest_period)):
         if value is not None:
             require_not_negative("periodic_motion", **{name: value})
-    excitation = common_period(system)
+    excitation = (common_period(moving) if isinstance(moving, ContactSystem)
+                  else moving.forcing_period(moving.values))
     if excitation is None:
         if transient is None or longest_period is None:
             raise InputError("Nothing excites the system with a period; give transient, the time "
                              "until its motion settles, and longest_period, both in s.")
         end = transient + 2.2 * longest_period
-        run = _run(system, initial, end, np.linspace(transient, end, 6 * _SAMPLES), solver, rtol)
+        run = _run(moving, initial, end, np.linspace(transient, end, 6 * _SAMPLES), solver, rtol)
         if _at_rest(run):
             raise AnalysisError(f"The run comes to rest, or slides steadily, after {transient:g} "
                                 f"s; there is no periodic orbit to start from, so take another "
                                 f"start, or equilibria and their Hopf points.")
-        return PeriodicMotion(run.time, run.states, _period(run, longest_period), 1)
+        return PeriodicMotion(run.time, run.states, _period(run, longest_period), 1, values)
     first = _TRANSIENT_PERIODS if transient is None else max(1, round(transient / excitation))
     largest = _LARGEST if longest_period is None else max(1, round(longest_period / excitation))
     checks = largest + max(2 * largest, 8)
     instants: Array = excitation * np.arange(first, first + checks + 1, dtype=float)
-    run = _run(system, initial, float(instants[-1]), instants, solver, rtol)
-    fine = _run(system, run.states[-1], float(instants[-1] + excitation * largest),
+    run = _run(moving, initial, float(instants[-1]), instants, solver, rtol)
+    fine = _run(moving, run.states[-1], float(instants[-1] + excitation * largest),
                 float(instants[-1]) + excitation * np.linspace(0.0, largest,
                                                                largest * _SAMPLES + 1),
                 solver, rtol, float(instants[-1]))
@@ -89,13 +96,13 @@ def periodic_motion(
                             f"size); start at another value of the parameter, or run it longer.")
     count = found.periods * _SAMPLES + 1
     return PeriodicMotion(fine.time[:count], fine.states[:count], found.periods * excitation,
-                          found.periods)
+                          found.periods, values)
 
 
 def _run(
-    system: ContactSystem, initial: Initial, end: float, outputs: Array, solver: Solver,
-    rtol: float, begin: float = 0.0,
-) -> Trajectory:
+    system: Moving, initial: Any, end: float, outputs: Array, solver: Solver, rtol: float,
+    begin: float = 0.0,
+) -> Trajectory | FieldRun:
     """Run with the requested outputs; the start is included only if requested."""
     extra = outputs[0] > begin
     times = np.append(begin, outputs) if extra else outputs
@@ -112,18 +119,19 @@ def _run(
     return run.between(float(outputs[0]))
 
 
-def _period(run: Trajectory, longest: float) -> float:
-    """Period [s] from repeated mean crossings of the largest modal displacement.
+def _period(run: Trajectory | FieldRun, longest: float) -> float:
+    """Period [s] from repeated mean crossings of the largest modal displacement, or state.
 
     Slip velocities hardly change during stick, so distances between states determine the period
     poorly.
     """
     t, states = run.time, run.states
     # Displacements, velocities and internal variables, each by the largest of them.
-    size, m = np.ptp(states, axis=0), run.system.basis.modes
-    for group in (slice(0, m), slice(m, 2 * m), slice(2 * m, None)):
-        size[group] = size[group].max(initial=0.0) or 1.0
-    fastest = int(np.argmax(np.ptp(run.modal_coordinates, axis=0)))
+    size, m = np.ptp(states, axis=0), _displacements(run)
+    if isinstance(run, Trajectory):
+        for group in (slice(0, m), slice(m, 2 * m), slice(2 * m, None)):
+            size[group] = size[group].max(initial=0.0) or 1.0
+    fastest = int(np.argmax(np.ptp(states[:, :m], axis=0)))
     x = states[:, fastest] - (states[:, fastest].max() + states[:, fastest].min()) / 2.0
     rising = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
     part = -x[rising] / (x[rising + 1] - x[rising])
@@ -140,6 +148,11 @@ def _period(run: Trajectory, longest: float) -> float:
                         f"parameter.")
 
 
-def _at_rest(run: Trajectory) -> bool:
-    size = float(np.ptp(run.modal_coordinates, axis=0).max())
-    return bool(size <= 1e-7 * np.abs(run.modal_coordinates).max())
+def _at_rest(run: Trajectory | FieldRun) -> bool:
+    moved = run.states[:, : _displacements(run)]
+    return bool(float(np.ptp(moved, axis=0).max()) <= 1e-7 * np.abs(moved).max())
+
+
+def _displacements(run: Trajectory | FieldRun) -> int:
+    """Number of the first states that are looked at: modal displacements, or all of a field."""
+    return run.states.shape[1] if isinstance(run, FieldRun) else run.system.basis.modes

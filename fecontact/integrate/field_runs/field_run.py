@@ -13,7 +13,6 @@ from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.integrate.events import AnyEvent, Events
-from fecontact.integrate.field_runs.stepper import start_field
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish
 from fecontact.integrate.trajectory import Status, output_part
@@ -104,6 +103,9 @@ def run_field(
     events: Sequence[AnyEvent], progress: Callable[[float], None] | None,
 ) -> FieldRun:
     """Integrate a field at its base values; see :func:`fecontact.simulate`."""
+    # Not before it is used: its kernels need not be there for contact systems.
+    from fecontact.integrate.field_runs.stepper import start_field
+
     begin = clock.perf_counter()
     run = start_field(moving, state, times, rtol=rtol, max_step=max_step, events=events)
     ended, result = None, step_loop.RUNNING

@@ -56,7 +56,7 @@ def plot_branches(
     branches: "Branch | Sequence[Branch]", y: Quantity = 0, *,
     x: Quantity = "parameter", x_label: str | None = None, y_label: str | None = None,
     names: Sequence[str] = (), beneath: "PoincareScan | None" = None,
-    observe: tuple[str | int, str] = ("B", "x"), insets: "Sequence[Inset]" = (),
+    observe: tuple[str | int, str] | str = ("B", "x"), insets: "Sequence[Inset]" = (),
     path: str | Path | None = None,
 ) -> "Figure":
     """Plot branches: stable parts solid, unstable ones dashed, special points marked and labelled.
@@ -79,8 +79,8 @@ def plot_branches(
     beneath : PoincareScan, optional
         Runs over the same parameter, drawn as dots beneath the branches, up and down apart; y
         should be 'observed_section'.
-    observe : (point, component)
-        The displacement of the runs that is drawn; see
+    observe : (point, component) or str
+        The displacement of the runs that is drawn, of a vector field a state; see
         :meth:`fecontact.bifurcation.PoincareScan.observed`.
     insets : sequence of Inset
         Phase planes of chosen points, drawn above the diagram; see

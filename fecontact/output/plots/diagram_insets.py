@@ -184,14 +184,14 @@ def _along(places: Array, joined: bool) -> Array:
 
 
 def draw_beneath(
-    axis: "Axes", runs: "PoincareScan | None", observe: tuple[str | int, str]
+    axis: "Axes", runs: "PoincareScan | None", observe: tuple[str | int, str] | str
 ) -> list[Any]:
-    """Dots of runs once per period, up and down; handles for the legend."""
+    """Dots of runs once per period or on a section, up and down; handles for the legend."""
     if runs is None:
         return []
     from matplotlib.lines import Line2D
 
-    point, component = observe
+    point, component = (observe, None) if isinstance(observe, str) else observe
     up, down = runs.observed(point, component)  # type: ignore[arg-type]
     handles = []
     for name, values, size in (("up", up, 2.6), ("down", down, 1.3)):
