@@ -24,7 +24,7 @@ LONG = {
     "test_changes_of_stability", "test_curves", "test_condensation", "test_diagrams",
     "test_bernstein", "test_harmonic_balance", "test_frequency_response",
     "test_nonlinear_modes", "test_resonances",
-    "test_compiled_steps", "test_responses_of_bodies", "test_response_bifurcations",
+    "test_compiled_steps", "test_compiled_bodies", "test_responses_of_bodies", "test_response_bifurcations",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
     "test_set_valued_beam", "test_friction_oscillator", "test_disc_and_pads",
     "test_friction_damper", "test_lap_joint", "test_tipping_pad", "test_disc_brake",
