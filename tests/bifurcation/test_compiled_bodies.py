@@ -1,6 +1,6 @@
 """Compiled steps of bodies with more modes than are solved for together; loads and parameters."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -14,10 +14,12 @@ from fecontact.bifurcation import (
     frequency_response,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import start_of
+from fecontact.bifurcation.harmonic.compiled import balance as compiled
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
-from fecontact.bifurcation.harmonic.problem import CompiledLinearisation
+from fecontact.bifurcation.harmonic.problem import CompiledLinearisation, HarmonicProblem
 from fecontact.bifurcation.harmonic.starts import problem_for, restored
+from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.laws import (
     ConstantFriction,
     JenkinsFriction,
@@ -159,13 +161,20 @@ def test_derivatives_are_those_of_the_residual(name, friction):
 
 @pytest.mark.parametrize("friction", [JenkinsFriction((0.5, 0.3), 0.5, 1e-2),
                                       ConstantFriction(0.3, smoothing_slope=3.0)])
-def test_residual_and_forces_are_those_of_plain_code(friction, monkeypatch):
-    """With a dashpot between the driven point and its moving end, whose pull grows with p."""
+@pytest.mark.parametrize("affine", [True, False])
+def test_residual_and_forces_are_those_of_plain_code(friction, affine, monkeypatch):
+    """With a dashpot between the driven point and its moving end, whose pull grows with p.
+
+    Loads that are not affine in the parameter are taken with the contact forces.
+    """
+    if not affine:
+        monkeypatch.setattr(compiled, "_AFFINE", -1.0)
     field = contact_field(masses(friction), ["drive.angular_frequency"])
     method, scales = HarmonicBalance(4, 64), np.ones(field.dimension + 2)
     fast = problem_for(field, field.values, 0, method, scales)
     u = np.append(np.random.default_rng(3).normal(size=fast.size), 0.7)
     one = fast.linearise(u)
+    assert fast.equations(0.7).body.any() == affine
     monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
     other = problem_for(field, field.values, 0, method, scales).linearise(u)
     assert isinstance(one, CompiledLinearisation)
@@ -174,3 +183,27 @@ def test_residual_and_forces_are_those_of_plain_code(friction, monkeypatch):
     assert one.condensed == pytest.approx(other.condensed, abs=1e-7)
     for mine, theirs in zip(one._samples(), other._samples(), strict=True):
         assert mine == pytest.approx(theirs, abs=1e-12)
+
+
+def test_problems_with_equations_of_their_own_are_evaluated_by_these():
+    class Other(HarmonicProblem):
+        def linearise(self, u):
+            return "its own"
+
+    field = contact_field(masses(ConstantFriction(0.3, smoothing_slope=3.0)),
+                          ["drive.angular_frequency"])
+    plain = problem_for(field, field.values, 0, HarmonicBalance(2), np.ones(field.dimension + 2))
+    other = Other(**{entry.name: getattr(plain, entry.name) for entry in fields(plain)})
+    u = np.append(np.zeros(plain.size), 0.9)
+    assert other.evaluate(u) == "its own"
+    assert isinstance(plain.evaluate(u), CompiledLinearisation)
+
+
+@pytest.mark.parametrize(("name", "product", "period"), [
+    ("drive.angular_frequency", 2.0 * np.pi, None), ("drive.amplitude_x", None, 2.0 * np.pi / 0.9),
+    ("drive.stiffness_x", None, 2.0 * np.pi / 0.9)])
+def test_how_the_period_depends_on_a_parameter(name, product, period):
+    field = contact_field(masses(ConstantFriction(0.3, smoothing_slope=3.0)), [name])
+    found = timing_of(field, 1.1 * field.values, 0)
+    for mine, known in zip(found, (product, period), strict=True):
+        assert mine == (None if known is None else pytest.approx(known, rel=1e-12))

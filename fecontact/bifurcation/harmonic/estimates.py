@@ -78,7 +78,7 @@ def extremes(whole: Array, z: Array) -> tuple[Array, Array]:
     x = series @ uniform_basis(fine, H).T
     found = []
     for sign in (-1.0, 1.0):
-        best, place = _peaks(sign * x)
+        best, place = _peaks(x, sign)
         # The series where the parabola has its peak: exact but for the square of its error.
         there = (basis_at(place / fine, H) * series).sum(axis=1)
         best = np.maximum(best, sign * there).reshape(count, b)
@@ -88,14 +88,13 @@ def extremes(whole: Array, z: Array) -> tuple[Array, Array]:
 
 def peaks(x: Array) -> tuple[Array, Array]:
     """Extremes (d,) of samples (d, N) around a period, on parabolas through three of them."""
-    return -_peaks(-x)[0], _peaks(x)[0]
+    return -_peaks(x, -1.0)[0], _peaks(x, 1.0)[0]
 
 
-def _peaks(x: Array) -> tuple[Array, Array]:
-    """Largest values (d,) of samples (d, N), and their places counted in samples."""
-    N = x.shape[1]
-    rows, place = np.arange(len(x)), x.argmax(axis=1)
-    here, left, right = x[rows, place], x[rows, place - 1], x[rows, (place + 1) % N]
+def _peaks(x: Array, sign: float) -> tuple[Array, Array]:
+    """Largest values (d,) of samples (d, N) times a sign, and their places counted in samples."""
+    rows, place = np.arange(len(x)), x.argmax(axis=1) if sign > 0.0 else x.argmin(axis=1)
+    here, left, right = (sign * x[rows, at % x.shape[1]] for at in (place, place - 1, place + 1))
     bend = left - 2.0 * here + right
     curved = bend < 0.0
     safe = np.where(curved, bend, -1.0)

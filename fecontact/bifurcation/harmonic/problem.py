@@ -181,7 +181,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def evaluate(self, u: Array) -> HarmonicLinearisation:
         """The same where the residual alone is sure to be asked for."""
-        return self._about(u, False)
+        return self._about(u, False) if type(self) is HarmonicProblem else self.linearise(u)
 
     def _about(self, u: Array, derivatives: bool) -> HarmonicLinearisation:
         if self.autonomous and not u[-2] > 0.0:
