@@ -18,8 +18,8 @@ _FREQUENCY = "angular_frequency"
 class ResponseSettings:
     """``[response]``: frequency responses by harmonic balance.
 
-    See :func:`fecontact.bifurcation.frequency_response`; harmonics, samples and what is observed
-    also hold for nonlinear modes.
+    See :func:`fecontact.bifurcation.frequency_response`; harmonics, samples, preload and what is
+    observed also hold for nonlinear modes.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ import pytest
 
 from fecontact import Material, simulate
 from fecontact.bifurcation import (
+    BranchStatus,
     ContinuationOptions,
     HarmonicBalance,
     contact_field,
@@ -79,6 +80,22 @@ def test_plate_rests_between_blades_in_opposition_and_follows_equal_ones():
     first, second, plate = moved[0.0].T
     assert second == pytest.approx(first, abs=1e-6 * np.abs(first).max())
     assert np.ptp(plate) > 0.9 * np.ptp(first)
+
+
+def test_blades_a_quarter_out_of_phase_are_followed_with_few_samples():
+    """The plate moves and tilts; from sample to sample its mean goes to and fro by corners."""
+    field = blades(0.5 * np.pi, hz=380.0)
+    response = frequency_response(
+        field, (TURN * 380.0, TURN * 430.0), observe=END, method=HarmonicBalance(
+            3, 128, stability=None), options=ContinuationOptions(points=80, largest_step=0.1))
+    branch = response.branches[0]
+    assert branch.status is BranchStatus.POINTS
+    assert (np.diff(branch.parameter) > 0.0).all()
+    # Several samples' corners.
+    assert branch.parameter[-1] > TURN * 383.0
+    fine = orbit(field, None, END, 382.0, HarmonicBalance(3, 512, stability=None))
+    assert np.interp(TURN * 382.0, branch.parameter, response.amplitude()) == pytest.approx(
+        fine.values["observed_amplitude"], rel=2e-3)
 
 
 @pytest.mark.slow

@@ -218,9 +218,10 @@ def _step(
     there = finished(problem, *found, row, options)
     short = step < _CORNER_STEP * options.step
     if not _believable(problem, here, there, options):
-        # A corner; past one that is sharper than a right angle the tangent would lead back.
-        sides = ([problem.orientation(at.linearisation, at.tangent) for at in (here, there)]
-                 if short else [-1.0, 1.0])
+        if not short:
+            return None
+        # A corner; past one that is sharper than a right angle the tangent leads back.
+        sides = [problem.orientation(at.linearisation, at.tangent) for at in (here, there)]
         if sides[0] * sides[1] < 0.0:
             return None
     reached = located_on(Step(problem, here, there, options, row), strict=not short)
