@@ -162,9 +162,9 @@ Friction has two directions here: across the load, where Cattaneo and Mindlin ha
 12 % of the largest. That accounts for the displacement, which stays 0.25 and 0.28 % short with both
 meshes. The picture shows what two directions change in a half-space of Cerruti's squares under
 Hertz's pressure, without any finite elements: nothing without Poisson's ratio, -0.30 % at nu = 0.49
-and Q = 0.9 mu P. Below about 0.7 mu P the ring that slips is narrower than two elements, and these
-err by more, up to 2.5 % at 0.18 mu P. That the plane keeps the face of this small body from tilting
-is worth 0.05 %.
+and Q = 0.9 mu P. At smaller Q the ring that slips is an element wide or less, and the mesh errs by
+more, up to 2.5 % at 0.18 mu P. That the plane keeps the face of this small body from tilting is
+worth 0.05 %.
 
 {comparisons(rows)}
 
