@@ -15,9 +15,12 @@ contact and of the circle that sticks follow from second moments,
 
     integral of p r^2 = 2/5 P a^2,    integral of q r^2 = 2/5 mu P (a^2 - c^5 / a^3)
 
-which feel where forces are, not the few elements at the edges. Cattaneo and Mindlin take friction
-as parallel everywhere; with Poisson's ratio some of it points across the load. The loss, a small
-difference of large works, needs elements that are small beside the ring that slips.
+which feel where forces are, not the few elements at the edges. The loss, a small difference of
+large works, needs elements that are small beside the ring that slips.
+
+Cattaneo and Mindlin take friction as parallel everywhere; with Poisson's ratio some of it points
+across the load. That makes the displacement 0.3 % smaller at Q = 0.9 mu P, nu = 0.49: squares of a
+half-space under Hertz's pressure, `half_space`, show it without finite elements.
 
 Usage: python examples/pressed_sphere.py [OUTPUT_FOLDER] [--quick]
 """
@@ -140,6 +143,14 @@ class PressedSphere:
         return found - self.beyond(0) * self.part * MU * self.exact.load
 
     @property
+    def first_loading(self) -> np.ndarray:
+        """Q / (mu P) and displacement [m] of a half-space (2, n) of the first increments."""
+        path, some = self.history.path, slice(1, STEPS + 1)
+        force = path.at_points(path.forces[0])[some]
+        moved = self.history.modal_coordinates[some] @ self.basis.T[1, 0]
+        return np.stack([force / (MU * self.exact.load), moved - self.beyond(0) * force])
+
+    @property
     def loss(self) -> float:
         """Of the cycle [J]."""
         return self.history.loop(1, 3).loss
@@ -158,6 +169,76 @@ def pressed(elements: int, part: float = PART) -> PressedSphere:
     history = fc.load_history(system, fc.LoadPath(forces=[(0.0, Q, -Q, Q)], steps=STEPS),
                               rtol=1e-3)
     return PressedSphere(history, exact, part)
+
+
+def half_space(cells: int, parts: np.ndarray, across: bool) -> np.ndarray:
+    """Displacement over that of Cattaneo and Mindlin under the same force, for parts of mu P.
+
+    Of a half-space under Hertz's pressure, with uniform friction on squares, so many across the
+    contact; parallel to the force or, ``across``, in both directions. Cerruti's displacement along
+    x under forces along x and y at the distance r is ((1 - nu) + nu x^2 / r^2) / r and nu x y /
+    r^3, over 2 pi G, here in units of the radius, mu P and 1 / (2 pi G a).
+    """
+    side = 2.0 / cells
+    line = (np.arange(cells) + 0.5) * side - 1.0
+    x, y = (grid[np.hypot(*np.meshgrid(line, line)) < 1.0] for grid in np.meshgrid(line, line))
+    # Integrals of 1 / r, x^2 / r^3 and x y / r^3 over each square.
+    plain, along, twist = np.zeros((3, len(x), len(x)))
+    for i, j in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
+        u, v = (np.subtract.outer(one, one) + 0.5 * sign * side for one, sign in ((x, i), (y, j)))
+        r = np.hypot(u, v)
+        plain += i * j * (u * np.log(v + r) + v * np.log(u + r))
+        along += i * j * v * np.log(u + r)
+        twist -= i * j * r
+    if across:
+        both = np.block([[along, twist], [twist, plain - along]])
+        compliance = (1.0 - RATIO) * np.kron(np.eye(2), plain) + RATIO * both
+    else:
+        compliance = (1.0 - 0.5 * RATIO) * plain
+    stiffness = np.linalg.inv(compliance / side**2)
+    limit = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
+    limit /= limit.sum()
+    shape = (2 if across else 1, len(x))
+    step = 1.0 / np.linalg.eigvalsh(stiffness)[-1]
+    slip, moved, found = np.zeros(shape), np.zeros(shape), []
+    for part in parts:
+        # Where the closed form is; 3 mu P S / (16 a) is 3 pi (2 - nu) / 4 of the unit for one body.
+        moved[0] = 0.375 * np.pi * (2.0 - RATIO) * (1.0 - (1.0 - part) ** (2.0 / 3.0))
+        before, guess, weight = slip.copy(), slip.copy(), 1.0
+        # The work of slip and the elastic energy are least; by accelerated proximal gradients.
+        for _ in range(20_000):
+            force = (stiffness @ (moved - guess).ravel()).reshape(shape)
+            way = guess + step * force - before
+            size = np.maximum(np.linalg.norm(way, axis=0), 1e-300)
+            new = before + way * np.maximum(1.0 - step * limit / size, 0.0)
+            last, weight = weight, 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * weight**2))
+            guess = new + (last - 1.0) / weight * (new - slip)
+            change, slip = np.abs(new - slip).max(), new
+            if change < 1e-10 * moved[0, 0]:
+                break
+        carried = (stiffness @ (moved - slip).ravel())[: len(x)].sum()
+        found.append((1.0 - (1.0 - part) ** (2.0 / 3.0)) / (1.0 - (1.0 - carried) ** (2.0 / 3.0)))
+    return np.array(found)
+
+
+def displacement_figure(found: PressedSphere, path: Path | None = None) -> "Figure":
+    """Displacement over that of the closed form, beside that of a half-space."""
+    from fecontact.plot import COLOURS, new_figure
+
+    parts = np.linspace(0.05, found.part, 18)
+    across, parallel = (half_space(20, parts, both) for both in (True, False))
+    force, moved = found.first_loading
+    exact = np.array([0.5 * found.exact.displacement(one) for one in force])
+    with new_figure(5.6, 4.0, path) as drawn:
+        axes = drawn.subplots()
+        axes.axhline(0.0, color=COLOURS[0], label="Cattaneo and Mindlin")
+        axes.plot(parts, 100.0 * (across / parallel - 1.0), color=COLOURS[1],
+                  label="half-space, friction in two directions")
+        axes.plot(force, 100.0 * (moved / exact - 1.0), "o", color=COLOURS[2],
+                  label="finite elements")
+        axes.set(xlabel="Q / (µ P)", ylabel="displacement, difference [%]")
+        axes.legend()
+    return drawn
 
 
 def figure(found: PressedSphere, path: Path | None = None) -> "Figure":
@@ -214,6 +295,7 @@ def main(folder: Path = Path("."), quick: bool = False) -> None:
               f"loss {1e3 * found.loss:.4f} mJ ({0.5e3 * exact.loss(PART):.4f})")
     folder.mkdir(parents=True, exist_ok=True)
     figure(found, folder / "pressed_sphere.png")
+    displacement_figure(found, folder / "pressed_sphere_displacement.png")
     plot_shear(found.history, 1, path=folder / "pressed_sphere_shear.png")
 
 

@@ -147,7 +147,8 @@ EXAMPLES = {
                                   (r"c / a = (\S+) ", 0.4642, 0.03),
                                   (r"displacement (\S+) um", 6.9687, 0.05),
                                   (r", loss (\S+) mJ", 6.3035, 0.5)],
-                       {"out/pressed_sphere.png", "out/pressed_sphere_shear.png"}),
+                       {"out/pressed_sphere.png", "out/pressed_sphere_displacement.png",
+                        "out/pressed_sphere_shear.png"}),
     "sweep_on_dask": ((), [(r"^(\d+) cases, 0 failed", 4.0, 0.0)], set()),
 }
 

@@ -48,10 +48,29 @@ def test_the_loop_is_closed_and_symmetric(coarse):
     assert last[:, 1] == pytest.approx(first[:, 1], abs=0.05 * first.max())
 
 
+def test_friction_across_the_load_makes_the_displacement_smaller(coarse, monkeypatch):
+    """By 0.3 % at 0.9 mu P, as that of the elements, whatever the squares; not without nu."""
+    parts = np.array([0.3, 0.6, 0.9])
+    for cells in (14, 20):
+        across, parallel = (ps.half_space(cells, parts, both) for both in (True, False))
+        assert across / parallel - 1.0 == pytest.approx([-7e-4, -1.6e-3, -3e-3], abs=5e-4)
+    # Squares themselves err less, the more slips.
+    assert np.abs(parallel - 1.0).max() < 5e-3
+    assert parallel[-1] == pytest.approx(1.0, abs=2.5e-3)
+    error = errors(coarse)[2]
+    assert error == pytest.approx(across[-1] / parallel[-1] - 1.0, abs=1e-3)
+    assert coarse.first_loading[:, -1] == pytest.approx([ps.PART, coarse.displacement], rel=1e-6)
+    monkeypatch.setattr(ps, "RATIO", 0.0)
+    across, parallel = (ps.half_space(14, parts, both) for both in (True, False))
+    assert across == pytest.approx(parallel, rel=1e-7)
+
+
 @pytest.mark.slow
 def test_four_elements_along_the_radius(fine, coarse):
     """All errors together fall with the mesh."""
     assert (np.abs(errors(fine)) < [1e-3, 1e-3, 5e-3, 0.015, 0.03]).all()
+    # Friction across the load, see above.
+    assert errors(fine)[2] == pytest.approx(-3e-3, abs=5e-4)
     assert np.linalg.norm(errors(fine)) < 0.4 * np.linalg.norm(errors(coarse))
     assert fine.clearance > 0.0
     inner = fine.radii < 0.9 * ps.WIDTH
