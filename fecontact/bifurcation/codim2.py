@@ -57,8 +57,8 @@ def codim2_curve(
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint, NeimarkSackerPoint, DiscontinuityPoint
-        A point of a branch over the first parameter; of orbits by collocation, or where set-valued
-        ones meet a border of their contact states. Or a point of a curve: 'Bautin', 'zero-Hopf', 'double Hopf', 'Bogdanov-Takens', for the other curve there.
+        A point of a branch over the first parameter, of orbits by collocation or between events.
+        Or of a curve: 'Bautin', 'zero-Hopf', 'double Hopf', 'Bogdanov-Takens', for the other there.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
