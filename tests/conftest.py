@@ -26,7 +26,7 @@ LONG = {
     "test_nonlinear_modes", "test_resonances",
     "test_compiled_steps", "test_responses_of_bodies", "test_response_bifurcations",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
-    "test_set_valued_beam", "test_friction_oscillator", "test_disc_and_pads",
+    "test_set_valued_beam", "test_sliding_bifurcations", "test_friction_oscillator", "test_disc_and_pads",
     "test_friction_damper", "test_lap_joint", "test_tipping_pad", "test_disc_brake",
     "test_bolted_plate", "test_friction_along_curves",
     "test_sweep", "test_sweep_command", "test_sweep_strobed", "test_sweep_summaries",

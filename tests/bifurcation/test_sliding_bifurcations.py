@@ -21,7 +21,6 @@ from fecontact.bifurcation import (
     periodic_motion,
 )
 from fecontact.bifurcation.events.branches import orbit_from
-from fecontact.bifurcation.orbits.from_run import PeriodicMotion
 from fecontact.integrate import ContactEvents, SetValued
 from fecontact.io import read_branch, write_branch
 from fecontact.laws import ConstantFriction, ExponentialFriction, LinearContact, PrescribedForce
@@ -42,11 +41,16 @@ def last_speed(dashpot):
 
     def misses(speed):
         start = np.array([0.5 - dashpot * speed, speed])
-        slope = (A @ A @ start, A @ start)
-        # The rate is greatest again where its own slope vanishes, a period after the last time.
-        passed = brentq(lambda t: (A @ expm(A * t) @ start)[1], 0.75 * np.pi / w,
-                        (2.0 * np.pi + np.arctan2(slope[1][1], 1.0)) / w)
-        return (expm(A * passed) @ start)[1] - speed
+
+        def slope(t):
+            return (A @ expm(A * t) @ start)[1]
+
+        # It falls at first, then grows to its next crest.
+        times = np.linspace(0.0, 2.2 * np.pi / w, 100)
+        slopes = np.array([slope(t) for t in times])
+        last = np.flatnonzero((slopes[:-1] > 0.0) & (slopes[1:] <= 0.0))[0]
+        crest = brentq(slope, times[last], times[last + 1], xtol=1e-15)
+        return (expm(A * crest) @ start)[1] - speed
 
     return brentq(misses, 0.12, 1.5, xtol=1e-13)
 
@@ -82,7 +86,7 @@ def events_of(system, solver, periods=60):
     run = fc.simulate(system, (periods + 2) * T, solver=solver, rtol=1e-11,
                       events=ContactEvents(), outputs=2)
     begins = run.events.only("stick").time
-    ends = run.events.only("slip begins").time if len(begins) else begins
+    ends = run.events.only("slip").time if len(begins) else begins
     begins = begins[(begins > periods * T) & (begins <= (periods + 1) * T)]
     return [float(ends[ends > begin][0] - begin) for begin in begins]
 
@@ -149,7 +153,7 @@ def test_only_slip_is_linear(over_speed):
     point = branch.points[-1]
     values = point.values
     assert (values["maximum"][0] - values["minimum"][0]) / 2.0 == pytest.approx(gain(1.5),
-                                                                                rel=2e-3)
+                                                                                rel=5e-4)
     period = 2.0 * np.pi / 1.5
     assert np.abs(values["multipliers"]) == pytest.approx(np.full(2, np.exp(-DAMPING * period)),
                                                           rel=1e-9)
@@ -219,7 +223,7 @@ def impact_orbit(w, amplitude, lift, e=0.8):
         after, before = speeds(p)
         return after + e * before
 
-    phases = np.linspace(0.0, 2.0 * np.pi, 2001)
+    phases = np.linspace(0.0, 2.0 * np.pi, 20001)
     found = []
     for one, other in zip(phases[:-1], phases[1:], strict=True):
         if off(one) * off(other) <= 0.0:
@@ -228,7 +232,7 @@ def impact_orbit(w, amplitude, lift, e=0.8):
             if before < 0.0:
                 force = lift + 0.5 * amplitude * np.exp(1j * p).real
                 rates = [force - 2.0 * DAMPING * v for v in (before, after)]
-                jump = np.array([[-e, 0.0], [-(rates[1] + e * rates[0]) / before, -e]])
+                jump = np.array([[-e, 0.0], [(rates[1] + e * rates[0]) / before, -e]])
                 found.append((-before, np.linalg.eigvals(jump @ whole)))
     return found
 
@@ -250,7 +254,7 @@ def test_grazing_of_a_stop_and_the_orbits_with_impacts():
         multipliers = np.sort_complex(point.values["multipliers"])
         orbits = impact_orbit(0.8, point.parameter, 2.0)
         misfits = [np.abs(np.sort_complex(known) - multipliers).max() for _, known in orbits]
-        assert min(misfits) < 1e-7 * (1.0 + np.abs(multipliers).max())
+        assert min(misfits) < 1e-6 * (1.0 + np.abs(multipliers).max())
         assert np.prod(multipliers).real == pytest.approx(
             0.64 * np.exp(-2.0 * DAMPING * 2.0 * np.pi / 0.8), rel=1e-7)
 
@@ -268,7 +272,7 @@ def test_grazing_of_a_stop_and_the_orbits_with_impacts():
         np.sqrt(1.0 - 2.0 * DAMPING**2), abs=1e-7)
 
 
-def two_blocks():
+def two_blocks(friction):
     """Two masses with falling friction on a belt, one of them driven."""
     rows = np.zeros((2, 3, 2))
     rows[:, 0] = np.eye(2)
@@ -277,26 +281,32 @@ def two_blocks():
         damping=[[0.1, 0.0], [0.0, 0.1]])
     return fc.ContactSystem(
         basis, normal=PrescribedForce((1.0, 1.0)), ground=fc.Ground(speed=0.2),
-        friction=ExponentialFriction(0.4, 0.25, 3.0),
+        friction=friction,
         drive=fc.Drive(stiffness_x=0.5, amplitude_x=1.5, angular_frequency=0.9))
 
 
-def test_derivatives_through_events():
-    """Saltation against differences of runs, and the equations against differences of these."""
-    system = two_blocks()
+def test_derivatives_of_the_equations():
+    system = two_blocks(ConstantFriction(0.3))
     field = contact_field(system, ["ground.speed"])
     motion = periodic_motion(system, solver=FILIPPOV, rtol=1e-10)
     problem, u = orbit_from(field, field.values, 0, motion.times[0], motion.states[0],
                             motion.times[-1] - motion.times[0], motion.periods,
                             np.append(motion.amplitudes, 1.0), 1e-10, FILIPPOV)
     assert problem.count >= 4
-    matrix, step = problem.linearise(u).matrix, 1e-5
+    matrix, step = problem.linearise(u).matrix, 1e-4
     for k in range(len(u)):
         away = np.zeros(len(u))
         away[k] = step
         slope = (problem.linearise(u + away).residual
                  - problem.linearise(u - away).residual) / (2.0 * step)
-        assert matrix[:, k] == pytest.approx(slope, abs=1e-6 * (1.0 + np.abs(slope).max()))
+        assert matrix[:, k] == pytest.approx(slope, abs=1e-5 * (1.0 + np.abs(slope).max()))
+
+
+def test_multipliers_against_differences_of_runs():
+    """Friction that falls with the speed of slip; two masses that stick and slip."""
+    system = two_blocks(ExponentialFriction(0.4, 0.25, 3.0))
+    field = contact_field(system, ["ground.speed"])
+    motion = periodic_motion(system, solver=FILIPPOV, rtol=1e-10)
     branch = orbit_branch(field, motion, method=Shooting(1, rtol=1e-10, solver=FILIPPOV),
                           bounds=(0.19, 0.21), options=ContinuationOptions(points=1))
     point = branch.points[0]
@@ -320,13 +330,11 @@ def test_derivatives_through_events():
     assert (np.abs(found) == 0.0).any()
 
 
-def test_an_orbit_that_cannot_be_taken_apart_is_differenced():
-    """Steady slip oscillations without any event have no phases: runs are differenced as before."""
+def test_orbits_without_events_have_their_multipliers():
     system = impacting()
     field = contact_field(system, ["drive.amplitude_y"])
     motion = periodic_motion(system, solver=STOPS, initial=[2.0, 0.0], rtol=1e-9)
-    assert isinstance(motion, PeriodicMotion)
     branch = orbit_branch(field, motion, method=Shooting(1, solver=STOPS), bounds=(1.1, 1.3),
-                          options=ContinuationOptions(step=0.1, points=3))
+                          options=ContinuationOptions(step=0.05, points=3))
     assert np.abs(branch.points[0].values["multipliers"]) == pytest.approx(
         np.full(2, np.exp(-DAMPING * 2.0 * np.pi / 0.8)), rel=1e-9)

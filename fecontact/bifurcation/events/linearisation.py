@@ -13,7 +13,7 @@ from fecontact.bifurcation.orbits.floquet import Floquet
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
-_SAMPLES = 33  # of a phase, for the extremes of the states
+_SAMPLES = 129  # of a phase, for the extremes of the states
 # Part of the period below which equations divided by a duration are interpolated over it.
 _BRIEF = 1e-5
 # Singular values of a jump below this part of the largest are zero.

@@ -40,6 +40,10 @@ SPECIAL = {
     "period doubling": ("PD", "^"), "Neimark-Sacker": ("NS", "v"), "cusp": ("CP", "P"),
     "Bogdanov-Takens": ("BT", "*"), "Bautin": ("GH", "X"), "zero-Hopf": ("ZH", "<"),
     "double Hopf": ("HH", ">"), "unresolved": ("?", "x"),
+    # Borders of contact states: one marker for all.
+    "grazing": ("G", "d"), "grazing-sliding": ("GS", "d"), "crossing-sliding": ("CS", "d"),
+    "switching-sliding": ("SS", "d"), "adding-sliding": ("AS", "d"), "lift-off": ("LO", "d"),
+    "corner": ("CC", "d"),
 }
 # Letters alone, for diagrams of other kinds.
 LETTERS = {kind: letters for kind, (letters, _) in SPECIAL.items()}
