@@ -333,6 +333,25 @@ def test_multipliers_against_differences_of_runs():
     assert (np.abs(found) == 0.0).any()
 
 
+def test_orbits_beyond_a_doubling_of_impacts():
+    """Runs settle on the orbits of twice the period, whose two impacts differ."""
+    system = impacting(amplitude=2.2)
+    field = contact_field(system, ["drive.amplitude_y"])
+    motion = periodic_motion(system, solver=STOPS, initial=[2.0, 0.0], rtol=1e-9)
+    branch = orbit_branch(field, motion, method=Shooting(1, solver=STOPS), bounds=(2.0, 2.3),
+                          direction=-1.0, options=ContinuationOptions(step=0.02))
+    doubling = branch.of_kind("period doubling")[0]
+    beyond = orbit_branch(field, doubling, bounds=(1.9, 2.3),
+                          options=ContinuationOptions(step=0.02, points=8)).points[-1]
+    assert beyond.values["period"] == pytest.approx(2.0 * doubling.values["period"], rel=1e-9)
+    assert beyond.values["stable"]
+    settled = periodic_motion(field.system(np.array([beyond.parameter])), solver=STOPS,
+                              initial=[2.0, 0.0], rtol=1e-9)
+    assert settled.periods == 2
+    assert settled.states[:, 1].min() == pytest.approx(beyond.orbit(field, 4001).states[:, 1].min(),
+                                                       rel=1e-4)
+
+
 def test_orbits_without_events_have_their_multipliers():
     system = impacting()
     field = contact_field(system, ["drive.amplitude_y"])

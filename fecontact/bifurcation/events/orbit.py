@@ -170,7 +170,8 @@ class EventOrbit(FloquetTests, Problem):
         off = float((np.abs(end - start) / self.scales[: self.dimension]).max())
         if off > _RETURNS * max(1.0, growth):
             raise AnalysisError("A run from the orbit does not come back: an event between its "
-                                "phases was not seen.")
+                                "phases was not seen, or an impact with friction begins or ceases "
+                                "to stick.")
 
     def runs_from(self, u: Array) -> Array:
         """The state (d,) from which runs of the orbit start; see :func:`anchor`."""
