@@ -29,6 +29,11 @@ EXAMPLES = {
     # Hertz: 0.8571 GPa; Cattaneo: sqrt(1/2).
     "two_bodies": (("out",), [(r"^steel on steel: p_0 = (\S+) GPa", 0.85707, 1e-3),
                               (r"c / b = (\S+) ", 0.70711, 0.01)], {"out/two_bodies.png"}),
+    # The closed form of examples/sliding_borders.py at a dashpot of 0.1; the linear response.
+    "sliding_borders": (("out",), [(r"^stick-slip ends at V = (\S+),", 0.5490463, 1e-6),
+                                   (r"largest difference (\S+)$", 0.0, 1e-7),
+                                   (r"^grazing-sliding at V = (\S+)", 1.191452, 1e-5)],
+                        {"out/sliding_borders.png"}),
     "stacked_blocks": ((), [(r"^matching meshes: stress to (\S+) of", 0.0, 1e-11),
                             (r"5 segments: stress to (\S+) of", 0.0, 1e-11)], set()),
     "colliding_bars": ((), [(r"^1 m on 1 m: restitution (\S+) ", 0.99793, 2e-3),

@@ -13,7 +13,7 @@ DOCS = ROOT / "docs"
 GROUPS = {
     "Squeal and stick-slip": (
         "squeal", "disc_and_pads", "disc_brake", "beam_stick_slip", "friction_oscillator",
-        "two_mass_friction", "sliding_beam"),
+        "two_mass_friction", "sliding_beam", "sliding_borders"),
     "Impacts": ("impact_oscillator", "impact_figures", "impact_map", "impact_orbits",
                 "impact_calibration", "colliding_bars"),
     "Contact pressure and partial slip": (

@@ -59,9 +59,8 @@ def codim2_curve(
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint, NeimarkSackerPoint, DiscontinuityPoint
-        A point of a branch over the first parameter; of orbits by collocation, or where set-valued
-        ones meet a border of their contact states. Or a point of codimension two of a curve, such
-        as 'zero-Hopf', for others that pass or begin there.
+        A point of a branch over the first parameter, of orbits by collocation or between events.
+        Or a point of codimension two of a curve, such as 'zero-Hopf', for others there.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional

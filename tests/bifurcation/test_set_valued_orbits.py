@@ -38,9 +38,10 @@ def test_stick_slip_period_over_the_speed():
     for point in branch.points:
         V = point.parameter
         wanted = 1.0 / V + 2.0 * np.pi - 2.0 * np.arctan(0.5 / V)
-        assert point.values["period"] == pytest.approx(wanted, rel=1e-7)
+        assert point.values["period"] == pytest.approx(wanted, rel=1e-10)
         multipliers = np.sort(np.abs(point.values["multipliers"]))
-        assert multipliers == pytest.approx([0.0, 1.0], abs=1e-5)
+        assert multipliers == pytest.approx([0.0, 1.0], abs=1e-9)
+        assert multipliers[0] == 0.0
     assert branch.points[0].values["stable"]
 
 
@@ -52,9 +53,9 @@ def test_stick_slip_ends_where_slip_ends_no_more(tmp_path):
     field = contact_field(system, "ground.speed")
     branch = orbit_branch(field, motion(system), method=METHOD, bounds=(0.9 * last, 1.2 * last),
                           options=ContinuationOptions(step=0.02))
-    assert branch.status is BranchStatus.STALLED
-    assert "event appears or vanishes" in branch.message
-    assert branch.points[-1].parameter == pytest.approx(last, rel=1e-4)
+    assert branch.status is BranchStatus.DISCONTINUITY
+    assert branch.points[-1].kind == "grazing-sliding"
+    assert branch.points[-1].parameter == pytest.approx(last, rel=1e-7)
     assert max(point.parameter for point in branch.points) < (1.0 + 1e-7) * last
     # A branch from a file goes on with the same solver.
     write_branch(tmp_path / "branch.h5", branch)

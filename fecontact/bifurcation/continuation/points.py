@@ -389,16 +389,11 @@ class UnresolvedPoint(BranchPoint):
 
 
 class DiscontinuityPoint(BranchPoint):
-    """Where an orbit with set-valued friction or rigid stops meets a border of its contact states.
-
-    Kinds are 'grazing' of a stop, 'grazing-sliding', 'crossing-sliding', 'switching-sliding' and
-    'adding-sliding' of a cluster of nodes with one slip velocity, 'lift-off' from a closed stop, and
-    'corner', where events of two contacts coincide; see docs/orbits.md.
-    """
+    """Where a set-valued orbit meets a border of its contact states; see docs/set-valued.md."""
 
     @property
     def time(self) -> float:
-        """When the orbit meets it, from the begin of its first phase [s]."""
+        """When the orbit meets it, from its first event on [s]."""
         return float(self._detail("time"))
 
     @property
@@ -436,11 +431,10 @@ class DoubleHopfPoint(BranchPoint):
         return float(self._detail("second_frequency_hz"))
 
 
-# Kinds of points at which orbits meet a border of their contact states.
-BORDERS = ("grazing", "grazing-sliding", "crossing-sliding", "switching-sliding", "adding-sliding",
-           "lift-off", "corner")
+_BORDERS = ("grazing", "grazing-sliding", "crossing-sliding", "switching-sliding",
+            "adding-sliding", "lift-off", "corner")
 _KINDS: Mapping[str | None, type[BranchPoint]] = {
-    **dict.fromkeys(BORDERS, DiscontinuityPoint),
+    **dict.fromkeys(_BORDERS, DiscontinuityPoint),
     "fold": FoldPoint, "Hopf": HopfPoint, "period doubling": PeriodDoublingPoint,
     "Neimark-Sacker": NeimarkSackerPoint, "branch point": CrossingPoint,
     UNRESOLVED: UnresolvedPoint, "zero-Hopf": ZeroHopfPoint, "double Hopf": DoubleHopfPoint}

@@ -99,7 +99,7 @@ class Successor:
         if i == 0:
             self.first += self.durations[0]
         for each in (self.phases, self.starts, self.durations):
-            del each[i]  # type: ignore[attr-defined]
+            del each[i]
 
     def join(self, i: int) -> None:
         """Join a phase with the next one, which has the same contact state."""
@@ -115,7 +115,7 @@ class Successor:
             # The orbit now begins behind what was its second event.
             self.first += self.durations[0]
         for each in (self.phases, self.starts, self.durations):
-            del each[behind]  # type: ignore[attr-defined]
+            del each[behind]
 
     def _without_events(self) -> None:
         """One phase without any event, from a multiple of the period on."""

@@ -24,7 +24,7 @@ from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.integrate.solvers import SetValued
 
 # First steps beyond a border, in those of the branch, and the largest residual there.
-_BEYOND, _FITS = (0.1, 0.01, 1e-3), 1e-5
+_BEYOND, FITS = (0.1, 0.01, 1e-3), 1e-5
 # What is left of a condition at a border counts as nothing below this; at most so many borders are
 # met at once.
 _NOTHING, _DEPTH = 1e-5, 4
@@ -79,8 +79,8 @@ def _margins(motion: Motion, found: Traced) -> Array:
         for j in range(2 * k, 2 * k + motion.nodes):
             row = int(phase.closed[j - 2 * k])
             scales[row, j] = max(scales[row, j], largest[j])
-    for row in scales:
-        row[row == 0.0] = row.max() or 1.0
+    for kinds in scales:
+        kinds[kinds == 0.0] = kinds.max() or 1.0
     return scales
 
 
@@ -138,7 +138,7 @@ def _side(
         stored = [reduced(problem, point) for point in found]
         if not ended:
             return Going([*points, *stored], piece.status, piece.message)
-        condition = _nothing_left(problem, last.u)[0]
+        condition = nothing_left(problem, last.u)[0]
         kind = border_of(problem, last.u, condition)
         following = None if kind in stops else _following(problem, last, options)
         stored[-1] = _border(problem, last, stored[-1], condition, kind, following is not None)
@@ -191,7 +191,7 @@ def _following(
     while ahead:
         here, at, depth = ahead.pop(0)
         try:
-            made = [successor.made() for condition in _nothing_left(here, at)
+            made = [successor.made() for condition in nothing_left(here, at)
                     for successor in beyond(here, at, condition)]
         except FecontactError:
             continue
@@ -201,7 +201,7 @@ def _following(
             known.add(candidate.phases)
             try:
                 linearised = candidate.linearise(u)
-                if np.abs(linearised.residual).max() > _FITS:
+                if np.abs(linearised.residual).max() > FITS:
                     continue
                 tangent = _null_vector(candidate, linearised.matrix)
             except FecontactError:
@@ -213,7 +213,7 @@ def _following(
     return None
 
 
-def _nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
+def nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
     """The conditions that have nothing left at a border, those of durations first."""
     found = problem.linearise(u).conditions
     least = min(abs(condition.left) for condition in found)

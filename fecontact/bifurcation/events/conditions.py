@@ -21,7 +21,7 @@ DURATION, RATE, WITHIN, BEGIN, CROSSING = range(5)
 # polynomial about a minimum.
 _NEAR = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 _PARTS = np.concatenate([[0.0], _NEAR, np.linspace(0.02, 0.98, 49), 1.0 - _NEAR[::-1], [1.0]])
-_PLACES = 9
+_PLACES, _ONCE_MORE = 9, 1.0 + 0.02 * np.arange(5)
 # Parts of the period below which a phase has no rate at its end, and what vanishes at both of its
 # ends has no minimum between them.
 _BRIEF, _SHORT = 1e-6, 1e-2
@@ -47,7 +47,8 @@ class Condition(NamedTuple):
 class Course:
     """Phases with their begins (K + 1,), states (K, d) and durations (K,).
 
-    ``margins`` (2, 2 k + n) are the scales of :func:`fecontact.bifurcation.events.phases.scales_of`.
+    ``margins`` (2, 2 k + n) are those of
+    :func:`fecontact.bifurcation.events.phases.scales_of`.
     """
 
     motion: Motion
@@ -96,7 +97,9 @@ def sampled(course: Course, i: int, after: Array) -> Array:
 def _within(course: Course, i: int) -> Iterator[Condition]:
     """The least value within a phase of each margin that has a minimum there."""
     duration = float(course.durations[i])
-    times = duration * _PARTS
+    # Without an event, what is at the end is at the begin again.
+    parts = _PARTS if course.phases[i].event != PERIOD else np.append(_PARTS[:-1], _ONCE_MORE)
+    times = duration * parts
     found = sampled(course, i, times)
     phase = course.phases[i]
     for event in range(found.shape[1]):
@@ -134,13 +137,13 @@ def _at_begin(course: Course, i: int) -> Iterator[Condition]:
     k, event = course.motion.clusters, before.event
     margins = sampled(course, i, np.zeros(1))[0]
     cluster = before.cluster()
-    for place in np.flatnonzero(np.isfinite(margins)):
-        if cluster is not None and phase.cluster(int(place)) == cluster:
+    for place in np.flatnonzero(np.isfinite(margins)).tolist():
+        if cluster is not None and phase.cluster(place) == cluster:
             if phase.status[cluster] != STICK or before.status[cluster] == STICK:
                 continue
         elif cluster is None and place == event and not phase.closed[event - 2 * k]:
             continue
-        yield Condition(float(margins[place]), BEGIN, i, int(place))
+        yield Condition(float(margins[place]), BEGIN, i, place)
     if cluster is not None and crosses(before, phase):
         held = Phase((*phase.status[:cluster], STICK, *phase.status[cluster + 1 :]), phase.closed,
                      PERIOD)

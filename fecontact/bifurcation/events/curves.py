@@ -9,8 +9,11 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.points import DiscontinuityPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.events.borders import beyond
+from fecontact.bifurcation.events.branches import FITS, nothing_left
 from fecontact.bifurcation.events.conditions import Condition, Course, of_phase
-from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventLinearisation, EventOrbit
+from fecontact.bifurcation.events.linearisation import EventLinearisation
+from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventOrbit
 from fecontact.bifurcation.events.phases import PERIOD, Phase, Strike
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.motions import solver_of
@@ -53,6 +56,7 @@ class BorderCurve(Problem):
     phase: int
     event: int
     beside: frozenset[tuple[int, int, int]] = frozenset()
+    precision: float = 1e-8
 
     ends: ClassVar[Mapping[str, BranchStatus]] = {ADMISSIBLE: BranchStatus.DISCONTINUITY}
 
@@ -102,13 +106,19 @@ class BorderCurve(Problem):
         return min(found)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
-        """Both parameters, and what is stored of orbits."""
+        """Both parameters, the period, and the extremes of the states."""
         names = list(self.orbit.field.parameters)
         orbit = linearisation.orbit
-        found = orbit.problem.point(orbit.u, orbit, tangent)
-        del found["mesh"]
-        return {names[self.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]), **found,
-                "unstable": 0}
+        states = orbit.samples
+        return {names[self.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
+                "period": orbit.problem.period(orbit.u), "minimum": states.min(axis=0),
+                "maximum": states.max(axis=0)}
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """A fold of the curve is where its first parameter turns."""
+        return {"kind": "turning point"}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """What the other conditions have left."""
@@ -180,7 +190,7 @@ class BorderLinearisation:
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
         try:
-            return np.linalg.solve(np.vstack([self.matrix, row]), rhs)
+            return np.asarray(np.linalg.solve(np.vstack([self.matrix, row]), rhs), dtype=float)
         except np.linalg.LinAlgError:
             return np.full(len(rhs), np.nan)
 
@@ -207,12 +217,29 @@ def border_curve(
     value = float(orbit.values[second])
     width = widths.get(parameter, abs(value) or 1.0)
     what, phase, event = (int(each) for each in np.asarray(point._detail("condition")))
+    if orbit.phases[0].event == PERIOD:
+        orbit, u, (what, phase, event) = _with_event(orbit, u, (what, phase, event))
     beside = frozenset(named(each) for each in orbit.linearise(u).conditions
                        if abs(each.left) < _SAME) | {(what, phase, event)}
     problem = BorderCurve(orbit, second, width, what, phase, event, beside)
     return problem, np.concatenate([u[:-1], [value], u[-1:]]), {
         "parameter_names": list(field.parameters), "parameter_values": orbit.values,
         "scales": scales}
+
+
+def _with_event(
+    orbit: EventOrbit, u: Array, condition: tuple[int, int, int]
+) -> tuple[EventOrbit, Array, tuple[int, int, int]]:
+    """An orbit without events at a border, begun where it meets that, and the condition there.
+
+    The border may come to any time of the period, also to the begin of the orbit.
+    """
+    for each in nothing_left(orbit, u):
+        for successor in beyond(orbit, u, each):
+            made = successor.made()
+            if made is not None and np.abs(made[0].linearise(made[1]).residual).max() < FITS:
+                return *made, named(nothing_left(*made)[0])
+    return orbit, u, condition
 
 
 def _restored(field: ContactField, point: DiscontinuityPoint) -> tuple[EventOrbit, Array]:

@@ -5,6 +5,7 @@ from functools import cached_property
 from itertools import combinations, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.bifurcation.events.flow import (
     PART,
@@ -141,7 +142,7 @@ class Motion:
         kinetic_coefficients(self.problem, found)
         return found
 
-    def _problem(self, values: Array) -> tuple[NonsmoothProblem, Array]:
+    def _problem(self, values: Array) -> tuple[NonsmoothProblem, NDArray[np.bool_]]:
         solver = self.solver
         found, rubbing = nonsmooth_problem(
             self._field.system(values), solver.restitution, solver.static_coefficient,

@@ -97,7 +97,8 @@ class Shooting:
         their small multipliers; with impacts it makes all multipliers inaccurate.
     solver : Rodas5P or SetValued
         What runs the segments. With SetValued orbits have friction without smoothing, from a motion
-        of the same solver; derivatives are differences of its runs, relative accuracy 1e-6.
+        of the same solver; they go from event to event, whatever ``segments`` says, where their
+        events are known (docs/set-valued.md), else derivatives are differences of its runs.
 
     Raises
     ------

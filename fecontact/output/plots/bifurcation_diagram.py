@@ -48,6 +48,10 @@ SPECIAL = {
     "stable double eigenvalue": ("DRS", "d"), "unstable double eigenvalue": ("DRU", "d"),
     "stable orbit flip": ("OFS", "d"), "unstable orbit flip": ("OFU", "d"),
     "stable inclination flip": ("IFS", "d"), "unstable inclination flip": ("IFU", "d"),
+    # Borders of contact states: one marker for all.
+    "grazing": ("G", "d"), "grazing-sliding": ("GS", "d"), "crossing-sliding": ("CS", "d"),
+    "switching-sliding": ("SS", "d"), "adding-sliding": ("AS", "d"), "lift-off": ("LO", "d"),
+    "corner": ("CC", "d"),
 }
 # Letters alone, for diagrams of other kinds.
 LETTERS = {kind: letters for kind, (letters, _) in SPECIAL.items()}
