@@ -1,4 +1,4 @@
-"""Runs by power series: closed forms, the implicit integrator, and touch-downs that none may miss."""
+"""Runs by power series: closed forms, the implicit integrator, and no touch-down missed."""
 
 from math import factorial
 
@@ -235,7 +235,7 @@ def test_random_systems_move_as_by_steps(seed):
 
 @pytest.mark.slow
 def test_many_random_systems_move_as_by_steps():
-    for seed in range(1000, 1600):
+    for seed in range(1000, 1300):
         assert_as_by_steps(seed)
 
 
@@ -248,7 +248,7 @@ def test_no_contact_is_missed():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_no_contact_of_very_many_is_missed():
-    for seed in range(10_000, 30_000):
+    for seed in range(10_000, 14_000):
         assert_no_contact_missed(seed)
 
 
@@ -295,7 +295,7 @@ def test_grazing_contacts_are_found():
 
 @pytest.mark.slow
 def test_very_many_grazing_contacts_are_found():
-    assert_grazing_found(range(1000, 26_000))
+    assert_grazing_found(range(1000, 7000))
 
 
 def test_rebounds_that_accumulate():
