@@ -432,8 +432,9 @@ def test_when_they_are_taken():
     count = MOST_MODES + 1
     assert not takes(oscillator(np.linspace(10.0, 90.0, count), np.zeros(count), np.ones(count)))
     # A mode that need not be resolved is left to implicit steps.
-    assert not takes(oscillator((1.0, 1e4), (0.0, 0.9)))
-    assert takes(oscillator((1.0, 1e4), (0.0, 0.01)))
+    assert not takes(oscillator((10.0, 3e3), (0.0, 0.9)))
+    assert takes(oscillator((10.0, 3e3), (0.0, 0.01)))
+    assert not takes(oscillator((10.0, 1e4), (0.0, 0.01)))
     with pytest.raises(InputError, match="Rodas5P: series = 'allways' must be one of 'always'"):
         Rodas5P(series="allways")
 

@@ -19,9 +19,9 @@ from fecontact.system.contact_system import ContactSystem
 
 # Sizes up to which series are taken unasked; their cost grows with the square of the modes.
 MOST_MODES, MOST_NODES = 4, 4
-# Modes so much faster than the slowest motion are left to implicit steps if their damping ratio is
-# larger: they need not be resolved.
-_FAST, _DAMPED = 100.0, 0.3
+# Modes so much faster than the slowest motion are left to implicit steps, which need not resolve
+# them once they have decayed; less fast ones if their damping ratio is larger.
+_FASTEST, _FAST, _DAMPED = 500.0, 100.0, 0.3
 # Errors of a step, in parts of the tolerance of the run, and at least.
 _PART, _ROUNDING = 1e-4, 2e-16
 
@@ -241,5 +241,7 @@ def worthwhile(system: ContactSystem, pieces: Array) -> bool:
             continue
         fast = size > _FAST * min(slow)
         if (-rates.real[fast] > _DAMPED * size[fast]).any():
+            return False
+        if not closed and size.max() > _FASTEST * min(slow):
             return False
     return True
