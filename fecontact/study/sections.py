@@ -222,6 +222,9 @@ class SimulationSettings:
         For 'set-valued': limit of R/F in stick [-]; default that of the law.
     scheme : str, optional
         For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
+    series : str, optional
+        For 'rodas5p': 'auto', 'always' or 'never'; whether the motion is expanded in power series
+        where forces are polynomials between switches of contacts.
     events : bool
         For 'rodas5p' and 'set-valued': locate touch-down, lift-off, stick and slip of every
         contact node and store them with the run.
@@ -244,6 +247,7 @@ class SimulationSettings:
     tangential_restitution: float | None = None
     static_coefficient: float | None = None
     scheme: str | None = None
+    series: str | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding", "preload"] | RigidStart = "rest"
@@ -259,7 +263,7 @@ class SimulationSettings:
         require_positive("SimulationSettings", rtol=self.rtol)
         if self.max_step is not None:
             require_positive("SimulationSettings", max_step=self.max_step)
-        with located("SimulationSettings:", "SetValued"):
+        with located("SimulationSettings:", "SetValued", "Rodas5P"):
             solver = self.chosen_solver()
         if (self.events or self.stop) and not solver.locates_events:
             raise InputError(f"SimulationSettings: events and stop are for solver = 'rodas5p' "
@@ -270,7 +274,8 @@ class SimulationSettings:
         return solver_by_name(self.solver, {
             "restitution": self.restitution, "impact_law": self.impact_law,
             "tangential_restitution": self.tangential_restitution,
-            "static_coefficient": self.static_coefficient, "scheme": self.scheme})
+            "static_coefficient": self.static_coefficient, "scheme": self.scheme,
+            "series": self.series})
 
 
 @dataclass(frozen=True)

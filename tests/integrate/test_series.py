@@ -1,4 +1,4 @@
-"""Runs by power series: closed forms, the implicit integrator, and touch-downs that none may miss."""
+"""Runs by power series: closed forms, the implicit integrator, and no touch-down missed."""
 
 from math import factorial
 
@@ -235,7 +235,7 @@ def test_random_systems_move_as_by_steps(seed):
 
 @pytest.mark.slow
 def test_many_random_systems_move_as_by_steps():
-    for seed in range(1000, 1600):
+    for seed in range(1000, 1300):
         assert_as_by_steps(seed)
 
 
@@ -248,7 +248,7 @@ def test_no_contact_is_missed():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_no_contact_of_very_many_is_missed():
-    for seed in range(10_000, 30_000):
+    for seed in range(10_000, 14_000):
         assert_no_contact_missed(seed)
 
 
@@ -295,7 +295,7 @@ def test_grazing_contacts_are_found():
 
 @pytest.mark.slow
 def test_very_many_grazing_contacts_are_found():
-    assert_grazing_found(range(1000, 26_000))
+    assert_grazing_found(range(1000, 7000))
 
 
 def test_rebounds_that_accumulate():
@@ -432,8 +432,9 @@ def test_when_they_are_taken():
     count = MOST_MODES + 1
     assert not takes(oscillator(np.linspace(10.0, 90.0, count), np.zeros(count), np.ones(count)))
     # A mode that need not be resolved is left to implicit steps.
-    assert not takes(oscillator((1.0, 1e4), (0.0, 0.9)))
-    assert takes(oscillator((1.0, 1e4), (0.0, 0.01)))
+    assert not takes(oscillator((10.0, 3e3), (0.0, 0.9)))
+    assert takes(oscillator((10.0, 3e3), (0.0, 0.01)))
+    assert not takes(oscillator((10.0, 1e4), (0.0, 0.01)))
     with pytest.raises(InputError, match="Rodas5P: series = 'allways' must be one of 'always'"):
         Rodas5P(series="allways")
 

@@ -273,6 +273,7 @@ simulation.rtol 1
 simulation.rtol nan
 simulation.restitution 0.5
 simulation.scheme "events"
+simulation.series "allways"
 simulation.events 1
 simulation.stop ["x"]
 simulation.stop "stick"

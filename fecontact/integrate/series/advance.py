@@ -15,12 +15,12 @@ from fecontact.core.compiled import helper, i8, kernel, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import state
 from fecontact.integrate.rodas5p.event_kernels import (
+    FOUND,
     LIFT_OFF,
     NODES,
     STICK,
     TOUCH_DOWN,
     WATCH,
-    FOUND,
 )
 from fecontact.integrate.rodas5p.state import (
     ENERGY,
@@ -52,11 +52,6 @@ from fecontact.integrate.series.branches import (
     SERIES,
 )
 from fecontact.integrate.series.expansion import (
-    CONTACT_LOSS,
-    DASHPOT_LOSS,
-    DRIVE_POWER,
-    LOAD_POWER,
-    MODAL_LOSS,
     expand,
     expand_powers,
     integrate_powers,

@@ -1,8 +1,7 @@
 """Systems whose forces are polynomials of the state between switches, and their tables."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -20,9 +19,9 @@ from fecontact.system.contact_system import ContactSystem
 
 # Sizes up to which series are taken unasked; their cost grows with the square of the modes.
 MOST_MODES, MOST_NODES = 4, 4
-# Modes so much faster than the slowest motion are left to implicit steps if their damping ratio is
-# larger: they need not be resolved.
-_FAST, _DAMPED = 100.0, 0.3
+# Modes so much faster than the slowest motion are left to implicit steps, which need not resolve
+# them once they have decayed; less fast ones if their damping ratio is larger.
+_FASTEST, _FAST, _DAMPED = 500.0, 100.0, 0.3
 # Errors of a step, in parts of the tolerance of the run, and at least.
 _PART, _ROUNDING = 1e-4, 2e-16
 
@@ -49,8 +48,6 @@ class Series(NamedTuple):
         Modal forces of all that is constant, and of each sine and its cosine.
     longest, tolerance : float
         Longest step [s]; error of a step as a part of the scales of the run.
-    drives, sticks : int
-        Number of the drive's motions; whether nodes in contact count as sticking.
     states : (n, 3) integer array
         State of each node.
     q, v : (m, n + 1) arrays
@@ -75,8 +72,6 @@ class Series(NamedTuple):
     cosine_force: Array
     longest: float
     tolerance: float
-    drives: int
-    sticks: int
     states: Integers
     q: Array
     v: Array
@@ -92,50 +87,8 @@ class Series(NamedTuple):
 
 
 SERIES = types.NamedTuple(
-    [block, vector, matrix, vector, matrix, matrix, f8, f8, i8, i8, types.Array(i8, 2, "C"),
+    [block, vector, matrix, vector, matrix, matrix, f8, f8, types.Array(i8, 2, "C"),
      *[matrix] * 11], Series)
-
-
-@dataclass(frozen=True)
-class Obstacle:
-    """Why a system cannot be expanded in time."""
-
-    reason: str
-
-
-def series_for(
-    system: ContactSystem, state: Array, rtol: float, max_step: float | None,
-    events: tuple[AnyEvent, ...], work: bool,
-) -> Series | Obstacle:
-    """Tables of a system at the start of a run, or what stands in the way."""
-    why = _obstacle(system, events)
-    if why is not None:
-        return Obstacle(why)
-    pieces = law_pieces(system)
-    signals = [*system.drive.motions[:2], *system.load.signals.values()]
-    parts = [sines_of(signal) for signal in signals]
-    if pieces is None or any(part is None for part in parts):
-        raise RuntimeError("An obstacle was not seen.")
-    sines = np.array([(g, *row) for g, part in enumerate(parts) if part is not None
-                      for row in part[1] if row[0] != 0.0]).reshape(-1, 4)
-    constants = np.array([part[0] for part in parts if part is not None])
-    arrays = system.arrays
-    # Modal forces (g, m) of a signal and of its rate.
-    of_value = np.vstack([arrays.drive_stiffness[:, None] * arrays.drive_shapes,
-                          arrays.load_shapes])
-    of_rate = np.vstack([arrays.drive_damping[:, None] * arrays.drive_shapes,
-                         0.0 * arrays.load_shapes])
-    number, amplitude, w = sines[:, 0].astype(int), sines[:, 1:2], sines[:, 2:3]
-    m, n = system.basis.modes, system.basis.contact_nodes
-    own = np.zeros((n, COEFFICIENTS))
-    return Series(
-        pieces, constants, sines, arrays.constant_load + constants @ of_value,
-        amplitude * of_value[number], amplitude * w * of_rate[number],
-        np.inf if max_step is None else float(max_step), max(_PART * rtol, _ROUNDING),
-        2, 1, _first_states(system, pieces, state),
-        *np.zeros((3, m, COEFFICIENTS)), np.zeros((len(signals) if work else 0, COEFFICIENTS)), own, own.copy(), own.copy(), own.copy(),
-        np.zeros((SERIES_POWERS, COEFFICIENTS)), np.zeros((3, COEFFICIENTS)),
-        np.zeros((DEPTH + 3, COEFFICIENTS)))
 
 
 def chosen_series(
@@ -145,31 +98,65 @@ def chosen_series(
     """Tables of a system for which series are used; InputError where they cannot 'always' be."""
     if use == "never":
         return None
-    found = series_for(system, state, rtol, max_step, tuple(events), work)
-    if isinstance(found, Obstacle):
+    found = obstacle(system, events)
+    if found is not None:
         if use == "always":
             raise InputError(f"Rodas5P: series = 'always' is for systems whose forces are "
-                             f"polynomials between switches of contacts, but {found.reason}; "
-                             f"leave it out.")
+                             f"polynomials between switches of contacts, but {found}; leave it "
+                             f"out.")
         return None
-    return found if use == "always" or worthwhile(system, found.pieces) else None
+    pieces = law_pieces(system)
+    if use == "auto" and not worthwhile(system, pieces):
+        return None
+    return _tables(system, pieces, state, rtol, max_step, work)
 
 
-def law_pieces(system: ContactSystem) -> Array | None:
-    """Pieces (n, p, 11) of the normal laws of all nodes, or None."""
+def _tables(
+    system: ContactSystem, pieces: Array, state: Array, rtol: float, max_step: float | None,
+    work: bool,
+) -> Series:
+    """Tables of a system at the start of a run."""
+    parts = [sines_of(signal) or (0.0, []) for signal in _signals(system)]
+    sines = np.array([(g, *row) for g, (_, rows) in enumerate(parts) for row in rows
+                      if row[0] != 0.0]).reshape(-1, 4)
+    constants = np.array([constant for constant, _ in parts])
+    arrays = system.arrays
+    # Modal forces (g, m) of a signal and of its rate.
+    of_value = np.vstack([arrays.drive_stiffness[:, None] * arrays.drive_shapes,
+                          arrays.load_shapes])
+    of_rate = np.vstack([arrays.drive_damping[:, None] * arrays.drive_shapes,
+                         0.0 * arrays.load_shapes])
+    number, amplitude, w = sines[:, 0].astype(int), sines[:, 1:2], sines[:, 2:3]
+    m, n = system.basis.modes, system.basis.contact_nodes
+    q, v, forcing = np.zeros((3, m, COEFFICIENTS))
+    u, F, square, cube = np.zeros((4, n, COEFFICIENTS))
+    return Series(
+        pieces, constants, sines, arrays.constant_load + constants @ of_value,
+        amplitude * of_value[number], amplitude * w * of_rate[number],
+        np.inf if max_step is None else float(max_step), max(_PART * rtol, _ROUNDING),
+        _first_states(system, pieces, state), q, v, forcing,
+        np.zeros((len(parts) if work else 0, COEFFICIENTS)), u, F, square, cube,
+        np.zeros((SERIES_POWERS, COEFFICIENTS)), np.zeros((3, COEFFICIENTS)),
+        np.zeros((DEPTH + 3, COEFFICIENTS)))
+
+
+def law_pieces(system: ContactSystem) -> Array:
+    """Pieces (n, p, 11) of the normal laws of all nodes, which must have some."""
     found = [law.pieces(share) for _, share, law in system.law_groups("normal")]
-    given = [table for table in found if table is not None]
-    if len(given) < len(found):
-        return None
-    most = max(table.shape[1] for table in given)
+    most = max(table.shape[1] for table in found)
     rows = []
-    for table in given:
+    for table in found:
         # What a law has less of begins and ends at infinity.
         full = np.zeros((len(table), most, PIECE))
         full[..., : UPPER + 1] = np.inf
         full[:, : table.shape[1]] = table
         rows.append(full)
     return np.concatenate(rows)
+
+
+def _signals(system: ContactSystem) -> list[Signal]:
+    """Motions of the drive, then loads."""
+    return [*system.drive.motions[:2], *system.load.signals.values()]
 
 
 def sines_of(signal: Signal) -> tuple[float, list[tuple[float, float, float]]] | None:
@@ -179,7 +166,8 @@ def sines_of(signal: Signal) -> tuple[float, list[tuple[float, float, float]]] |
     if type(signal) is Harmonic:
         return 0.0, [(signal.amplitude, signal.angular_frequency, signal.phase)]
     if type(signal) is Harmonics:
-        return 0.0, [tuple(row) for row in signal.parameters()[1:].reshape(-1, 3).tolist()]
+        rows = signal.parameters()[1:].reshape(-1, 3)
+        return 0.0, [(float(a), float(w), float(phase)) for a, w, phase in rows]
     return None
 
 
@@ -203,7 +191,8 @@ def acts(piece: Array, u: float, v: float) -> bool:
     return bool(release[2] == 0.0 or release @ [1.0, u, v] > 0.0)
 
 
-def _obstacle(system: ContactSystem, events: tuple[AnyEvent, ...]) -> str | None:
+def obstacle(system: ContactSystem, events: Sequence[AnyEvent]) -> str | None:
+    """Why series cannot be used for a system and such events, or None."""
     basis, arrays, ground = system.basis, system.arrays, system.ground
     if basis.dimension == 3:
         return "bodies in space are not among them"
@@ -216,7 +205,7 @@ def _obstacle(system: ContactSystem, events: tuple[AnyEvent, ...]) -> str | None
     for _, share, law in system.law_groups("normal"):
         if law.pieces(share) is None:
             return f"{type(law).__name__} is not piecewise polynomial"
-    for signal in (*system.drive.motions, *system.load.signals.values()):
+    for signal in _signals(system):
         if sines_of(signal) is None:
             return f"{type(signal).__name__} is neither constant nor harmonic"
     if not np.array_equal(arrays.stiffness, arrays.stiffness.T):
@@ -234,8 +223,8 @@ def worthwhile(system: ContactSystem, pieces: Array) -> bool:
     m, n = system.basis.modes, system.basis.contact_nodes
     if m > MOST_MODES or n > MOST_NODES:
         return False
-    slow = [w for signal in (*system.drive.motions, *system.load.signals.values())
-            for _, w, _ in (sines_of(signal) or (0.0, []))[1] if w > 0.0]
+    slow = [w for signal in _signals(system) for _, w, _ in (sines_of(signal) or (0.0, []))[1]
+            if w > 0.0]
     for closed in (False, True):
         stiffness, damping = system.arrays.stiffness, system.arrays.damping
         if closed:
@@ -252,5 +241,7 @@ def worthwhile(system: ContactSystem, pieces: Array) -> bool:
             continue
         fast = size > _FAST * min(slow)
         if (-rates.real[fast] > _DAMPED * size[fast]).any():
+            return False
+        if not closed and size.max() > _FASTEST * min(slow):
             return False
     return True

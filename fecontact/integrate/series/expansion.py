@@ -148,7 +148,7 @@ def expand_powers(h, s, series):
     m = len(q)
     first, second, third = series.line[0], series.line[1], series.line[2]
     powers[:] = 0.0
-    for axis in range(series.drives):
+    for axis in range(len(s.drive)):
         c, b = s.drive_stiffness[axis], s.drive_damping[axis]
         if c == 0.0 and b == 0.0:
             continue
@@ -178,7 +178,7 @@ def expand_powers(h, s, series):
             first[k] = 0.0
             for i in range(m):
                 first[k] += s.load_shapes[load, i] * v[i, k]
-        _add_product(signal[series.drives + load], first, 1.0, powers[LOAD_POWER])
+        _add_product(signal[len(s.drive) + load], first, 1.0, powers[LOAD_POWER])
     for j in range(len(s.gap)):
         piece = series.pieces[j, series.states[j, PLACE]]
         if piece[ELASTIC] == 0.0 and piece[ELASTIC + 1] == 0.0 and piece[ELASTIC + 2] == 0.0:

@@ -1,7 +1,7 @@
 """Steps by power series for systems of one or two nodes that few modes move.
 
-As in :mod:`fecontact.integrate.rodas5p.small_systems`, loops over one or two numbers are written out
-for arrays of a known size. Those over coefficients are not, so that they are vectorised.
+As in :mod:`fecontact.integrate.rodas5p.small_systems`, loops over one or two numbers are written
+out for arrays of a known size. Those over coefficients are not, so that they are vectorised.
 """
 
 from functools import cache
@@ -39,7 +39,7 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     m, n = modes, nodes
     return small_systems.fixed_values(m, n) | {SERIES: {
         "pieces": (n, None, PIECE), "sines": (None, 4), "constant_force": (m,),
-        "sine_force": (None, m), "cosine_force": (None, m), "states": (n, 3), "drives": 2,
+        "sine_force": (None, m), "cosine_force": (None, m), "states": (n, 3),
         **dict.fromkeys(("q", "v", "forcing"), (m, COEFFICIENTS)),
         **dict.fromkeys(("u", "F", "square", "cube"), (n, COEFFICIENTS)),
         "signal": (None, COEFFICIENTS), "powers": (SERIES_POWERS, COEFFICIENTS),
