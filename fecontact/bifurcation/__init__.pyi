@@ -3,9 +3,8 @@ from .attractors.lyapunov import LyapunovExponents, lyapunov_exponents
 from .attractors.poincare_scan import PoincareScan, poincare_scan
 from .codim2 import codim2_curve
 from .continuation.branch import Branch
+from .continuation.point import BranchHeader, BranchPoint
 from .continuation.points import (
-    BranchHeader,
-    BranchPoint,
     CrossingPoint,
     DiscontinuityPoint,
     DoubleHopfPoint,

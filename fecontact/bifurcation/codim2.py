@@ -10,8 +10,8 @@ from fecontact.bifurcation.codim2_beside import begun
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
-    BranchPoint,
     DiscontinuityPoint,
     FoldPoint,
     HopfPoint,

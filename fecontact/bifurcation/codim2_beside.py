@@ -14,9 +14,8 @@ from fecontact.bifurcation.codim2_switch import (
 )
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import (
-    BranchHeader,
-    BranchPoint,
     DoubleHopfPoint,
     FoldPoint,
     HopfPoint,

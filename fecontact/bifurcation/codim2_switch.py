@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint, DoubleHopfPoint, ZeroHopfPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import DoubleHopfPoint, ZeroHopfPoint
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
 from fecontact.core.errors import AnalysisError, FecontactError, InputError

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
-    BranchPoint,
     NeimarkSackerPoint,
     PeriodDoublingPoint,
     with_details,

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint, UnresolvedPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import HopfPoint, UnresolvedPoint
 from fecontact.core.files.atomic_write import write_text
 from fecontact.output.files.branches import write_branches
 

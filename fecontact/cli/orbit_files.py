@@ -13,7 +13,7 @@ from fecontact.core.errors import FecontactError, InputError, choices
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.branch import Branch
-    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.bifurcation.continuation.point import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
     from fecontact.integrate.trajectory import Trajectory
     from fecontact.output.files.stored_system import StoredModel

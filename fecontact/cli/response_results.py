@@ -13,7 +13,7 @@ from fecontact.core.files.atomic_write import write_text
 from fecontact.output.files.branches import write_response
 
 if TYPE_CHECKING:
-    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.bifurcation.continuation.point import BranchPoint
     from fecontact.study.study import Study
 
 _COLUMNS = ("level", "kind", "parameter", "frequency_hz", "stable", "amplitude", "minimum",

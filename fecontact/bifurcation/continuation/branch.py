@@ -8,9 +8,8 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import (
-    BranchHeader,
-    BranchPoint,
     CrossingPoint,
     FoldPoint,
     HopfPoint,

@@ -8,7 +8,7 @@ from collections.abc import Container, Iterable
 from dataclasses import replace
 
 from fecontact.bifurcation.continuation.newton import Solution
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem
 
 _CHANGES_AT = {"fold": (-1, 1), "branch point": (-1, 0, 1), "period doubling": (-1, 1),

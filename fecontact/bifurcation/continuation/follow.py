@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import End, continuation, start_of
 from fecontact.core.errors import require_finite

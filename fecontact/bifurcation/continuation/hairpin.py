@@ -9,7 +9,7 @@ the whole hairpin, and the branch is nearly a parabola over it.
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.special_points import located_on
 from fecontact.bifurcation.continuation.step import Step

@@ -13,7 +13,8 @@ import numpy as np
 from fecontact.bifurcation.continuation.corner import round_corner
 from fecontact.bifurcation.continuation.hairpin import round_hairpin
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
-from fecontact.bifurcation.continuation.points import UNRESOLVED, BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import UNRESOLVED
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,

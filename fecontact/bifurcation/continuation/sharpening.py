@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import corrected, finished, norm
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
-    BranchPoint,
     NeimarkSackerPoint,
     PeriodDoublingPoint,
     unresolved,

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from fecontact.bifurcation.continuation.crossings import counted, with_count
 from fecontact.bifurcation.continuation.newton import Solution, norm
-from fecontact.bifurcation.continuation.points import UNRESOLVED, BranchPoint, special_point
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import UNRESOLVED, special_point
 from fecontact.bifurcation.continuation.step import Step
 
 # Largest distance of a solution from the cubic through both ends of a step: part of the distance

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.equilibria.codim2_problems import (
     FoldCurve,

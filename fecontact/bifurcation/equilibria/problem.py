@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,

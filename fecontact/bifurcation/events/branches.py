@@ -9,7 +9,8 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch, regular
 from fecontact.bifurcation.continuation.newton import corrected, norm
-from fecontact.bifurcation.continuation.points import BranchPoint, special_point
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import special_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
 from fecontact.bifurcation.events.conditions import DURATION, Condition

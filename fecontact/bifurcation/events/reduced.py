@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.events.orbit import EventOrbit, anchor
 
 

@@ -7,12 +7,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import (
-    BranchHeader,
-    BranchPoint,
-    details_of,
-    special_point,
-)
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
+from fecontact.bifurcation.continuation.points import details_of, special_point
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,

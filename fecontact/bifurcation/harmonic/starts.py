@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance

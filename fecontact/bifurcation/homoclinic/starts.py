@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.equilibria.equilibrium import newton
 from fecontact.bifurcation.homoclinic import open_mesh

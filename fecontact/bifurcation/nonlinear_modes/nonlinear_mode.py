@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,

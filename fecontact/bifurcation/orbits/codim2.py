@@ -11,12 +11,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.criticality import (
-    Criticality,
     ContinuedSign,
+    Criticality,
     Term,
     along_parameter,
     gradient,

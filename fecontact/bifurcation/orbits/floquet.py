@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions

@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.collocation import CollocationProblem

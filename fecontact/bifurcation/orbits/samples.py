@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate

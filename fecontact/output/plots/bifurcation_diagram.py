@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
     from fecontact.bifurcation.continuation.branch import Branch
-    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.bifurcation.continuation.point import BranchPoint
     from fecontact.output.plots.diagram_insets import Inset
 
 Quantity = str | int | Callable[["BranchPoint"], float]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
-    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.bifurcation.continuation.point import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
 
 
@@ -74,7 +74,7 @@ def phase_inset(
     InputError
         If the point is no orbit or on no branch, or there is no such displacement.
     """
-    from fecontact.bifurcation.continuation.points import BranchPoint
+    from fecontact.bifurcation.continuation.point import BranchPoint
     from fecontact.bifurcation.fields.contact_field import ContactField
 
     require_kind("phase_inset", ContactField, field=field)

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.points import BranchPoint, HopfPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import UNITS, count, round_125, suitable_unit

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.points import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.checks import as_path, require_kind

@@ -1,0 +1,258 @@
+"""Points of branches.
+
+A point knows the parameter and the attributes of its branch, so that other branches can start from
+it alone. What a method finds at a special point is kept by name in private; each class of
+:mod:`fecontact.bifurcation.continuation.points` reads its own names as attributes, and files store
+them all.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, choices
+from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField, require_field
+
+if TYPE_CHECKING:
+    from fecontact.bifurcation.orbits.motions import PeriodicMotion
+    from fecontact.integrate.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class BranchHeader:
+    """Parameter and attributes of a branch, known to all its points.
+
+    Attributes
+    ----------
+    parameter_name : str
+        Name of the parameter.
+    attributes : mapping
+        Numbers, texts, arrays.
+    """
+
+    parameter_name: str
+    attributes: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """One solution on a branch.
+
+    Attributes
+    ----------
+    u : (N + 1,) array
+        Unknowns, the parameter last.
+    tangent : (N + 1,) array
+        Direction of the branch.
+    values : mapping
+        Stored values of the solution, such as state and stability.
+    kind : str or None
+        What is special about the point: 'fold', 'Hopf', ...; None for the others. On a branch a
+        special point has the class of its kind, such as :class:`HopfPoint`.
+    header : BranchHeader or None
+        Parameter and attributes of its branch; None while the point is on no branch.
+    """
+
+    u: Array
+    tangent: Array
+    values: Mapping[str, Any] = field(default_factory=dict)
+    kind: str | None = None
+    _details: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    header: BranchHeader | None = field(default=None, repr=False)
+
+    @property
+    def parameter(self) -> float:
+        """Value of the parameter."""
+        return float(self.u[-1])
+
+    @property
+    def place(self) -> str:
+        """Where and what the point is, for messages: 'The point at B = 0.5 (fold)'."""
+        name = "the parameter" if self.header is None else self.header.parameter_name
+        return f"The point at {name} = {self.parameter:.6g} ({self.kind or 'a regular point'})"
+
+    @property
+    def is_orbit(self) -> bool:
+        """Whether the point is a periodic orbit."""
+        return "period" in self.values and ("mesh" in self.values or self.by_harmonics)
+
+    @property
+    def is_homoclinic(self) -> bool:
+        """Whether the point is an orbit homoclinic to a saddle."""
+        return "saddle" in self.values and "time" in self.values
+
+    @property
+    def by_shooting(self) -> bool:
+        """Whether the point is an orbit found by shooting."""
+        return self.header is not None and "segments" in self.header.attributes
+
+    @property
+    def by_harmonics(self) -> bool:
+        """Whether the point is an orbit found by harmonic balance."""
+        return self.header is not None and "harmonics" in self.header.attributes
+
+    @property
+    def branch(self) -> BranchHeader:
+        """Parameter and attributes of the branch.
+
+        Raises
+        ------
+        InputError
+            If the point is on no branch.
+        """
+        if self.header is None:
+            raise InputError(f"{self.place} belongs to no branch; take one from a branch, such as "
+                             f"branch.points[-1].")
+        return self.header
+
+    def parameter_values(self, field: VectorField) -> Array:
+        """Values (k,) of all parameters of a field at the point.
+
+        Those that the branch does not know have the field's base values.
+
+        Raises
+        ------
+        InputError
+            If the point is on no branch over one parameter, or the field has other parameters or
+            another number of states.
+        """
+        require_field(field)
+        known, values = self.branch.attributes, field.values
+        if "parameters" in known or "parameter_values" not in known:
+            raise InputError(f"{self.place} is on no branch of equilibria or orbits over one "
+                             f"parameter.")
+        names = known.get("parameter_names", list(field.parameters))
+        for name, value in zip(names, np.asarray(known["parameter_values"]), strict=True):
+            values[field.index(str(name))] = value
+        values[field.index(self.branch.parameter_name)] = self.parameter
+        states = len(known.get("state_names", field.state_names))
+        if states != field.dimension:
+            raise InputError(f"{self.place} has {states} states, but the field {field.dimension}.")
+        return values
+
+    def orbit(self, field: VectorField | None = None, samples: int = 1000) -> "PeriodicMotion":
+        """The orbit over one period, both ends included; a homoclinic one over its interval.
+
+        Parameters
+        ----------
+        field : VectorField, optional
+            That of the branch; orbits found by shooting are run again and need it. With it the
+            motion knows its parameter values, and can start a branch over another parameter.
+        samples : int
+            Number of times; orbits by shooting may have some more.
+
+        Raises
+        ------
+        InputError
+            If the point is no orbit, or was found by shooting and there is no field.
+        """
+        from fecontact.bifurcation.harmonic.layout import balanced
+        from fecontact.bifurcation.homoclinic.open_mesh import sampled
+        from fecontact.bifurcation.orbits.motions import collocated, of_runs
+
+        self._require_orbit("orbit: samples", samples)
+        if self.is_homoclinic:
+            return sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
+                           len(self.values["saddle"]), float(self.values["time"]), samples)
+        values = None if field is None else self.parameter_values(field)
+        period = float(self.values["period"])
+        mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
+        if self.by_harmonics:
+            found = balanced(self.u, self.values, self.branch.attributes, samples)
+        elif not self.by_shooting:
+            found = collocated(self.u, mesh, len(self.values["minimum"]), period, samples)
+        elif field is None:
+            raise InputError(f"{self.place} was found by shooting, whose orbits are run again; "
+                             f"give the field: point.orbit(field).")
+        else:
+            found = of_runs(self._runs(field, samples), period)
+        periods = int(self.branch.attributes["periods"]) if self.header is not None else 1
+        return replace(found, periods=periods, parameter_values=values)
+
+    def trajectory(self, field: VectorField, outputs: int = 1001) -> "Trajectory":
+        """The orbit over one period as a trajectory, which can be plotted, stored and rendered.
+
+        Orbits by shooting are run again. Of others the work is integrated over the outputs by the
+        trapezoidal rule, so that the error of energies falls with the square of their distance.
+
+        Parameters
+        ----------
+        field : ContactField
+            That of the branch.
+        outputs : int
+            Number of times; orbits by shooting may have some more.
+
+        Raises
+        ------
+        InputError
+            If the point is no orbit, or the field is not that of a contact system.
+        """
+        from fecontact.bifurcation.fields.contact_field import ContactField
+        from fecontact.bifurcation.orbits.motions import joined, sampled_run
+
+        require_kind("trajectory", ContactField, field=field)
+        self._require_orbit("trajectory: outputs", outputs)
+        if self.by_shooting:
+            return joined(self._runs(field, outputs))
+        system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]
+        return sampled_run(system, self.orbit(field, outputs))
+
+    def _require_orbit(self, name: str, samples: int) -> None:
+        if not (isinstance(samples, int | np.integer) and samples >= 2):
+            raise InputError(f"{name} = {samples!r} must be a whole number from 2 on.")
+        if not (self.is_orbit or self.is_homoclinic):
+            raise InputError(f"{self.place} is no periodic orbit.")
+
+    def _runs(self, field: VectorField, samples: int) -> "list[Trajectory]":
+        """Runs of the segments of an orbit by shooting."""
+        from fecontact.bifurcation.orbits.motions import run_again, solver_of
+
+        # Shooting is for contact fields alone, the only ones with a system.
+        system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]
+        return run_again(system, self.u, np.asarray(self.values["mesh"], dtype=float),
+                         float(self.values["period"]), samples, solver_of(self.branch.attributes))
+
+    @property
+    def located(self) -> bool:
+        """Whether a special point was located to the precision of its method.
+
+        If not, :attr:`parameter_error` says how far it may be off.
+        """
+        return bool(self._details.get("located", True))
+
+    @property
+    def parameter_error(self) -> float:
+        """Error of a special point's parameter; NaN where it is not estimated.
+
+        On branches of orbits by collocation it is the change of the parameter on a finer mesh.
+        """
+        return float(self._details.get("parameter_error", np.nan))
+
+    def parameter_text(self, digits: int = 7) -> str:
+        """The parameter; with its error where that is estimated, and the digits that it leaves."""
+        error, value = self.parameter_error, self.parameter
+        if not error > 0.0:
+            return f"{value:.{digits}g}"
+        known = int(np.ceil(np.log10(max(abs(value), error) / error))) + 1
+        return f"{value:.{min(max(known, 3), 12)}g} +- {error:.1g}"
+
+    @property
+    def criticality(self) -> str | None:
+        """'supercritical', 'subcritical' or 'undecided'; None where no normal form tells it.
+
+        It is known at Hopf points, at forks of equilibria, and of orbits by collocation at period
+        doublings and Neimark-Sacker points; of others
+        :func:`fecontact.bifurcation.with_normal_form` finds it.
+        """
+        found = self._details.get("criticality")
+        return None if found is None else str(found)
+
+    def _detail(self, name: str) -> Any:
+        if name not in self._details:
+            known = f"; known are {choices(self._details)}" if self._details else ""
+            raise InputError(f"{self.place} has no {name}{known}.")
+        return self._details[name]
