@@ -72,6 +72,9 @@ class _KernelLibrary(JITCodeLibrary):
                 inlined = b"alwaysinline" in b" ".join(function.attributes)
                 if not (self.constants or inlined) and function.name.startswith("_ZN9fecontact"):
                     function.add_function_attribute("noinline")
+                # Compiled laws hold functions of the same names that may be shared. The loader
+                # would give them these, which may have lost arguments.
+                function.name += ".inner"
         super()._optimize_final_module()
 
 
