@@ -1,5 +1,8 @@
 """References to named tuples in kernels, and parts of kernels."""
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -144,3 +147,17 @@ def test_constants_stand_for_what_a_tuple_says():
     narrow = constants({INNER: {"rows": (None, 2)}})
     assert kernel(_SUM, constants=narrow)(weighted.py_func)(p) == 2.0 * (111.0 + 1.0 + 3.0 + 5.0)
     assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)
+
+
+def test_a_law_keeps_its_functions_whatever_kernel_was_loaded_before():
+    # The step loop holds functions of the same names as the law that changes contacts.
+    script = """
+import fecontact.integrate.nonsmooth.event_driven
+import fecontact as fc
+from systems import impact_oscillator
+run = fc.simulate(impact_oscillator(1), 0.2, solver=fc.integrate.SetValued(restitution=0.5))
+assert run.statistics["impacts"] > 0
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                          cwd=Path(__file__).parent.parent)
+    assert done.returncode == 0, done.stderr

@@ -19,7 +19,6 @@ from fecontact.core.compiled import f8, helper, i8, integers, kernel, matrix, ve
 from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import ERROR_3, ERROR_5, STAGES, A, B, C
 from fecontact.integrate.nonsmooth.equations import (
-    compiled_derivative,
     derivative,
     held_row,
     pushing_row,
@@ -38,11 +37,8 @@ from fecontact.integrate.nonsmooth.problem import (
     STICK,
     WORKSPACE,
 )
-from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at, compiled_change
+from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at
 from fecontact.integrate.nonsmooth.transitions import decide_clusters
-
-# Loaded before kernels of this module, whose functions have the same names.
-LOADED = compiled_derivative.address, compiled_change.address
 
 # Step of differences, in sizes of the states or in the longest step, and their weights: to both
 # sides from -2 to 2, to one from 0 to 4.
