@@ -13,7 +13,11 @@ from fecontact.reduction.eigenmodes import FreeSystem, free_modes
 from fecontact.reduction.reduce_body import displacement_rows
 from fecontact.reduction.solvers.near_solver import NearSolver
 from fecontact.reduction.static_modes.flexibility import Flexibility
-from fecontact.reduction.static_modes.iterated_flexibility import Answers, TrialSpace
+from fecontact.reduction.static_modes.iterated_flexibility import (
+    Answers,
+    IteratedFlexibility,
+    TrialSpace,
+)
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 
@@ -105,3 +109,25 @@ def test_no_row_lacks_more_than_the_tolerance(room, layers, fixed, monkeypatch):
         answered = (other.inertia_rows[:, elastic] / w**2) @ other.inertia_rows[:, elastic].T
         assert np.diag(answered) == pytest.approx(
             other.quality.load_compliance[0], rel=tolerance, abs=1e-20)
+
+
+def test_rows_that_lack_too_much_are_answered_by_all_displacements(monkeypatch):
+    """Where a sample of the rows was satisfied with fewer than all of them need."""
+    body = column()
+    system, rows = FreeSystem.of(body, "iterative"), loaded_rows(body)
+    modes = free_modes(FreeSystem.of(body, "direct"), 12)
+    nodes = np.unique((rows @ body.expansion.T).tocsr().indices // 3)
+    near = NearSolver.of(body, system.iterative, nodes, 1)
+    monkeypatch.setattr(TrialSpace, "suited",
+                        lambda *given: TrialSpace(system, near.solver, near))
+    found = [IteratedFlexibility(system, rows, modes, 1e-3, tolerance)
+             for tolerance in (0.9, 0.1)]
+    assert [one.space.near is near for one in found] == [True, False]
+    exact = residual_compliance(body, rows, modes) + found[1].compliance - found[1]._solved[
+        1].compliance
+    assert np.diag(found[1].compliance) == pytest.approx(np.diag(exact), rel=1e-5)
+    assert (found[1].missing == 1e-6).all()
+    # Few displacements say how much they may lack.
+    lacking = 1.0 - np.diag(found[0].compliance) / np.diag(exact)
+    assert (lacking < found[0].missing).all()
+    assert lacking.max() > 0.03
