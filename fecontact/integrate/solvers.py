@@ -83,8 +83,8 @@ class Rodas5P(Solver):
     Parameters
     ----------
     series : 'auto', 'always' or 'never'
-        Whether to use power series: by default for up to four modes and nodes, none of whose modes
-        is much faster than the others and strongly damped. They need flat ground, no friction,
+        Whether to use power series: by default for up to four modes and nodes, where no mode is
+        several hundred times faster than the slowest motion. They need flat ground, no friction,
         :class:`~fecontact.laws.RoughSurface` or
         :class:`~fecontact.laws.LinearContact`, or :class:`~fecontact.laws.PowerContact` or
         :class:`~fecontact.laws.TwoSidedStop` with exponents 1 or 2, constant or harmonic drives

@@ -262,11 +262,17 @@ def graze(rng, depth):
         return -a @ np.sin(np.multiply.outer(w, t) + phases[:, None])
 
     times = np.linspace(0.0, end, 4001)
-    at = times[int(u(times).argmax())]
-    if not 0.02 * end < at < 0.98 * end:
+    values = u(times)
+    inner = 1 + np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:]))
+    # Peaks are compared as they are, not at the times around them.
+    tops = [minimize_scalar(lambda t: -u(np.array([t]))[0], method="bounded",
+                            bounds=(times[k - 1], times[k + 1]), options={"xatol": 1e-15})
+            for k in inner if values[k] > values.max() - 0.05]
+    if not tops:
         return None
-    top = minimize_scalar(lambda t: -u(np.array([t]))[0], bounds=(at - times[1], at + times[1]),
-                          method="bounded", options={"xatol": 1e-15})
+    top = min(tops, key=lambda found: found.fun)
+    if not 0.02 * end < top.x < 0.98 * end or values[[0, -1]].max() > -top.fun - 0.01:
+        return None
     system = oscillator(w, (0.0, 0.0), ((1.0, 1.0),), normal=LinearContact(1e3),
                         gap=-top.fun * (1.0 - depth))
     state = np.concatenate([a * np.sin(phases), w * a * np.cos(phases)])
