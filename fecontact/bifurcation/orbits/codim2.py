@@ -209,11 +209,15 @@ class CurveLinearised:
 
     @property
     def bend(self) -> float:
-        """Curvature -w G_uu v v / w G_p of the first parameter over the orbits, at folds."""
+        """-w G_uu v v, at folds, with the sign of the curvature of the first parameter over orbits.
+
+        That is this by w G_p, which is zero where a curve of doubled orbits begins.
+        """
         v = self._critical.v
         assert v is not None
         slope = along_parameter(self.orbit, self.terms[0])
-        return float(self.gradient @ v / slope / (self.problem.weights() @ v**2))
+        return float(np.copysign(1.0, slope) * (self.gradient @ v)
+                     / (self.problem.weights() @ v**2))
 
     @cached_property
     def gradient(self) -> Array:
