@@ -67,5 +67,5 @@ def test_driven_fields_have_no_equilibrium():
 
 @pytest.mark.parametrize("period", [0.0, -1.0, np.inf, "2 pi"])
 def test_periods_of_fields_are_times(period):
-    with pytest.raises(InputError, match="period = .* must be a number above zero"):
+    with pytest.raises(InputError, match=r"period = .* must be a number above zero"):
         vector_field(circle, {"mu": 0.5}, ["a", "b"], period=period)
