@@ -41,7 +41,7 @@ from fecontact.system.fields.vector_field import VectorField
 
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
 _AT_RESONANCE = 1e-6  # distance of the cosine of the angle from 1 or -1 at these resonances
-_LEAST = 1e-200
+_LEAST = 1e-200  # in place of zero
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
 # Points at which a pair beside the critical multipliers passes the unit circle, by the curve.
 _PAIRS = {"fold": "fold-Neimark-Sacker", "period doubling": "flip-Neimark-Sacker",
