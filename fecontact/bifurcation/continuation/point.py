@@ -153,12 +153,15 @@ class BranchPoint:
         """
         from fecontact.bifurcation.harmonic.layout import balanced
         from fecontact.bifurcation.homoclinic.open_mesh import sampled
+        from fecontact.bifurcation.homoclinic.starts import restored_values
         from fecontact.bifurcation.orbits.motions import collocated, of_runs
 
         self._require_orbit("orbit: samples", samples)
         if self.is_homoclinic:
-            return sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
-                           len(self.values["saddle"]), float(self.values["time"]), samples)
+            found = sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
+                            len(self.values["saddle"]), float(self.values["time"]), samples)
+            return found if field is None else replace(
+                found, parameter_values=restored_values(field, self))
         values = None if field is None else self.parameter_values(field)
         period = float(self.values["period"])
         mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
