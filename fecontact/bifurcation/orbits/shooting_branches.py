@@ -120,8 +120,9 @@ def _from_event_to_event(
     from fecontact.bifurcation.events.branches import followed, orbit_from
     from fecontact.integrate.nonsmooth.driver import by_events
 
-    values, d = problem.parameters(u), problem.field.dimension
-    if not by_events(problem.field.system(values), problem.solver):
+    values, d, solver = problem.parameters(u), problem.field.dimension, problem.solver
+    if not by_events(problem.field.system(values), solver.scheme, solver.restitution,
+                     solver.impact_law, solver.static_coefficient):
         return None, ""
     try:
         found = orbit_from(problem.field, values, problem.free, 0.0, problem.starts(u)[0].copy(),

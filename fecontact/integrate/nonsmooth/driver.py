@@ -19,7 +19,6 @@ from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.event_kernels import FOUND
-from fecontact.integrate.solvers import SetValued
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
@@ -253,11 +252,14 @@ def nonsmooth_problem(
     return problem, rubbing
 
 
-def by_events(system: ContactSystem, solver: SetValued) -> bool:
-    """Whether a solver runs a system from event to event, with impacts of Newton's law if any."""
-    problem, _ = nonsmooth_problem(system, solver.restitution, solver.static_coefficient, 1.0)
-    newton = solver.restitution is None or solver.impact_law == "newton"
-    return newton and _chosen(problem, solver.scheme) == "events"
+def by_events(
+    system: ContactSystem, scheme: str, restitution: float | None, impact_law: str,
+    static_coefficient: float | Sequence[float] | None,
+) -> bool:
+    """Whether a system runs from event to event, with impacts of Newton's law if any."""
+    problem, _ = nonsmooth_problem(system, restitution, static_coefficient, 1.0)
+    newton = restitution is None or impact_law == "newton"
+    return newton and _chosen(problem, scheme) == "events"
 
 
 def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
