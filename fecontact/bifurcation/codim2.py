@@ -17,6 +17,7 @@ from fecontact.bifurcation.continuation.points import (
     HopfPoint,
     NeimarkSackerPoint,
     PeriodDoublingPoint,
+    require_no_family,
 )
 from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
@@ -101,6 +102,10 @@ def codim2_curve(
     require_kind("codim2_curve", (str, type(None)), to=to)
     if keep not in ("kind", "period"):
         raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
+    if keep == "period" and to is not None:
+        raise InputError(f"codim2_curve: keep = 'period' takes the orbit itself, and to = {to!r} "
+                         f"another curve; leave one of them out.")
+    require_no_family(point)
     given = point
     if keep == "kind":
         point = begun(field, point, parameter, to)
@@ -114,6 +119,9 @@ def codim2_curve(
                          f"set-valued orbits meet, or an orbit with keep='period'.")
     if keep == "period" and not point.is_orbit:
         raise InputError(f"{point.place} is no orbit, whose period keep='period' could keep.")
+    if keep == "period" and isinstance(point, DiscontinuityPoint):
+        raise InputError(f"{point.place} is a border of set-valued orbits, which keep='period' "
+                         f"cannot leave; leave keep out to follow the border.")
     names = (point.branch.parameter_name, parameter)
     field.index(parameter)
     if names[0] == parameter:
@@ -131,7 +139,7 @@ def codim2_curve(
         kind = "homoclinic"
         problem, u, attributes = homoclinic_curve(field, point, parameter, widths, scales)
     elif isinstance(point, DiscontinuityPoint):
-        problem, u, attributes = border_curve(field, point, parameter, widths)
+        problem, u, attributes = border_curve(field, point, parameter, widths, scales)
     elif point.is_orbit:
         problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
     else:

@@ -60,18 +60,19 @@ def fold_at_bautin(field: VectorField, point: BranchPoint, parameter: str) -> Fo
         If no fold is found on either side.
     """
     values, index = values_at(field, point, parameter), field.index(parameter)
-    width = widths_of(point)
+    width, last = widths_of(point), None
     for away in _AWAY:
         for side in (1.0, -1.0):
             values[index] = point.u[-2] + side * away * width[parameter]
             try:
                 found = _fold(field, point, values.copy(), width[point.branch.parameter_name])
-            except FecontactError:
+            except FecontactError as error:
+                last = error
                 continue
             if found is not None:
                 return found
     raise AnalysisError(f"{point.place}: no fold of orbits was found beside it; follow orbits from "
-                        f"a Hopf point near it to their fold, and start from there.")
+                        f"a Hopf point near it to their fold, and start from there.") from last
 
 
 def _fold(
@@ -119,12 +120,10 @@ def torus_beside(field: VectorField, point: BranchPoint, parameter: str) -> Bran
     """
     assert isinstance(point, ZeroHopfPoint | DoubleHopfPoint)
     square = (2.0 * np.pi * point.frequency_hz) ** 2
-    found = _first(field, point, parameter, square, _TORI,
-                   lambda branch: branch.points[-1].kind == "Neimark-Sacker")
-    if found is None:
-        raise AnalysisError(f"{point.place}: no torus was found beside it; follow orbits from a "
-                            f"Hopf point near it, and start from their Neimark-Sacker point.")
-    return found
+    return _first(field, point, parameter, square, _TORI,
+                  lambda branch: branch.points[-1].kind == "Neimark-Sacker",
+                  "no torus was found beside it; follow orbits from a Hopf point near it, and "
+                  "start from their Neimark-Sacker point.")
 
 
 def homoclinic_beside(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
@@ -137,19 +136,24 @@ def homoclinic_beside(field: VectorField, point: BranchPoint, parameter: str) ->
     AnalysisError
         If none is found.
     """
-    found = _first(field, point, parameter, 0.0, _LONG,
-                   lambda branch: branch.status is BranchStatus.HOMOCLINIC)
-    if found is None:
-        raise AnalysisError(f"{point.place}: no homoclinic orbit was found beside it; follow "
-                            f"orbits from a Hopf point near it, and start from their end.")
-    return found
+    return _first(field, point, parameter, 0.0, _LONG,
+                  lambda branch: branch.status is BranchStatus.HOMOCLINIC,
+                  "no homoclinic orbit was found beside it; follow orbits from a Hopf point near "
+                  "it, and start from their end.")
 
 
 def _first(
     field: VectorField, point: BranchPoint, parameter: str, square: float,
-    options: ContinuationOptions, wanted: Callable[[Branch], bool],
-) -> BranchPoint | None:
-    """The end of the first branch of orbits that is wanted, from Hopf points beside a point."""
+    options: ContinuationOptions, wanted: Callable[[Branch], bool], missing: str,
+) -> BranchPoint:
+    """The end of the first branch of orbits that is wanted, from Hopf points beside a point.
+
+    Raises
+    ------
+    AnalysisError
+        If there is none; ``missing`` says so.
+    """
+    last: FecontactError | None = None
     begin = other_curve(field, point, parameter)[0]
     width, first = widths_of(point), point.branch.parameter_name
     problem, u, _ = equilibrium_curve(begin, (first, parameter), square, width, None)
@@ -169,11 +173,12 @@ def _first(
                 field, hopf_point, method=Collocation(_INTERVALS), options=options,
                 bounds=(hopf_point.parameter - reach, hopf_point.parameter + reach),
                 width=width[over])
-        except FecontactError:
+        except FecontactError as error:
+            last = error
             continue
         if wanted(branch):
             return _over(field, branch.points[-1], first, width[first])
-    return None
+    raise AnalysisError(f"{point.place}: {missing}") from last
 
 
 def _across(tangent: Array, first: str, second: str, width: Mapping[str, float]) -> str:
@@ -266,18 +271,19 @@ def of_doubled(
     attributes |= {"parameters": [first, second]}
     tangent = tangent_at(problem, u, 1.0)
     over = _across(tangent, first, second, width)
-    reach = _ABOUT * width[over]
+    reach, last = _ABOUT * width[over], None
     for at in _along(problem, u, tangent, first, attributes=attributes):
         begin = _over(field, over_first(at, "period doubling"), over, width[over])
         try:
             branch = orbit_branch(field, begin, options=replace(_TORI, stop_at=(kind,)),
                                   bounds=(begin.parameter - reach, begin.parameter + reach))
-        except FecontactError:
+        except FecontactError as error:
+            last = error
             continue
         if branch.points[-1].kind == kind:
             return _over(field, branch.points[-1], first, width[first])
     raise AnalysisError(f"{point.place}: no {kind} of doubled orbits was found beside it; follow "
-                        f"these from a period doubling near it.")
+                        f"these from a period doubling near it.") from last
 
 
 _Found = Callable[[VectorField, BranchPoint, str], BranchPoint]
@@ -316,7 +322,7 @@ def begun(field: VectorField, point: BranchPoint, parameter: str, to: str | None
     if to is None and (not known or point.kind in _OF_EQUILIBRIA):
         return point
     if to is not None and to not in known:
-        if to == "homoclinic" and point.is_orbit:
+        if to == "homoclinic" and (point.is_orbit or point.is_homoclinic):
             return point
         others = choices(known) if known else "none that is named"
         raise InputError(f"{point.place}: no curve to = {to!r} begins there; known are: {others}.")

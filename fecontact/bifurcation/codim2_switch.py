@@ -13,6 +13,7 @@ from fecontact.system.fields.vector_field import VectorField
 # Smallest component of a tangent of length one that tells the sign of a parameter's change.
 _RESTS = 1e-6
 
+
 def other_curve(
     field: VectorField, point: BranchPoint, parameter: str
 ) -> tuple[Equilibrium, float | None]:

@@ -28,7 +28,8 @@ _STAYS = 1e-6
 # unfolding parameter shows.
 _PRECISION, _TOLERANCE = 1e-9, 1e-11
 # Distance of a multiplier from the unit circle beyond which a perturbation grows; beyond the first
-# of the others it may, beyond the second it must. Of pairs that meet the root of rounding is known.
+# of the others it may, beyond the second it must. Where two meet, they are known to the
+# square root of rounding only.
 _GROWS, _MAY, _MUST = 1e-6, 1e-9, 1e-4
 
 
@@ -193,7 +194,8 @@ def _followed(
     kept = {entry.name: getattr(problem, entry.name) for entry in fields(problem)}
     family = FamilyProblem(**kept | {"limits": limits, "precision": _PRECISION})
     return continue_branch(family, u, options, name=list(problem.field.parameters)[problem.free],
-                           tangent=tangent, both=both, attributes=attributes_of(problem, limits))
+                           tangent=tangent, both=both,
+                           attributes=attributes_of(problem, limits) | {"family": True})
 
 
 def _stays(field: VectorField, free: int, family: Branch) -> Branch:

@@ -6,6 +6,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     NeimarkSackerPoint,
     PeriodDoublingPoint,
+    require_no_family,
     with_details,
 )
 from fecontact.bifurcation.orbits.collocation import require_mesh
@@ -47,7 +48,7 @@ def with_normal_form(
     Raises
     ------
     InputError
-        If the point is of another kind, or belongs to another field.
+        If the point is of another kind, of a set-valued system, or belongs to another field.
     AnalysisError
         If collocation finds no orbit, or one without a critical multiplier.
     """
@@ -58,6 +59,10 @@ def with_normal_form(
         raise InputError(f"{point.place} is none of a branch of orbits over one parameter.")
     if point.criticality is not None:
         return point
+    require_no_family(point)
+    if "solver" in point.branch.attributes:
+        raise InputError(f"{point.place} is one of a set-valued system, which has no smooth normal "
+                         f"form.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
     motion = point.orbit(field, _SAMPLES)
     widths = np.delete(np.asarray(point.branch.attributes["scales"], dtype=float), -2)

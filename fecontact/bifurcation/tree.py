@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import require_no_family
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -140,6 +141,8 @@ def _named(first: Branch | Sequence[Branch] | Mapping[str, Branch]) -> dict[str,
                  for number, branch in enumerate(first)}
     for branch in first.values():
         require_kind("branch_tree", Branch, first=branch)
+        for point in branch.points[:1]:
+            require_no_family(point)
     names = {branch.parameter_names for branch in first.values() if len(branch)}
     if len(names) != 1 or len(next(iter(names))) != 1:
         raise InputError("branch_tree: first must hold branches over the same single parameter, "

@@ -112,7 +112,7 @@ def _period(point: BranchPoint) -> float | None:
 
 def _remark(point: BranchPoint) -> str:
     if point.kind is not None:
-        return ", ".join(filter(None, (_what_changes(point), _how_sure(point))))
+        return _what_changes(point)
     unstable = int(point.values["unstable"])
     if not unstable:
         return "stable"
@@ -129,12 +129,6 @@ def _what_changes(point: BranchPoint) -> str:
         return f"{point.unstable_before} to {point.unstable_after} unstable directions"
     criticality = point.criticality or ""
     return _BORN.get(criticality, "") if isinstance(point, HopfPoint) else criticality
-
-
-def _how_sure(point: BranchPoint) -> str:
-    """Error bound of the parameter, if it exceeds the digits shown in the table."""
-    error = point.parameter_error  # NaN compares as smaller
-    return f"known to {error:.1g} only" if error > 5e-7 * abs(point.parameter) else ""
 
 
 def _label(show: str, point: str | int, component: str) -> str:

@@ -11,6 +11,7 @@ from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
     PeriodicMotion,
+    codim2_beside,
     codim2_curve,
     equilibrium_branch,
     orbit_branch,
@@ -127,6 +128,18 @@ def test_there_need_not_be_a_torus():
     curve, _ = through(field, [-0.7, 0.0, 0.0], "a", "fold", "b", BOX)
     with pytest.raises(AnalysisError, match="no torus was found beside it; follow orbits from a"):
         codim2_curve(field, curve.of_kind("zero-Hopf")[0], "b", to="Neimark-Sacker", bounds=BOX)
+
+
+def test_why_nothing_was_found_is_kept(monkeypatch):
+    def failing(*_, **__):
+        raise AnalysisError("No orbit.")
+
+    monkeypatch.setattr(codim2_beside, "orbit_branch", failing)
+    field = vector_field(tangled, {"b": -1.0, "c": 0.2}, 2)
+    _, (point,) = through(field, [-1.0, 0.0], "b", "fold", "c", PLANE)
+    with pytest.raises(AnalysisError, match="no homoclinic orbit was found beside it") as found:
+        codim2_curve(field, point, "c", to="homoclinic", bounds=PLANE)
+    assert str(found.value.__cause__) == "No orbit."
 
 
 def test_folds_from_a_generalised_period_doubling():

@@ -38,6 +38,7 @@ def test_folds_of_free_orbits(size, tmp_path):
         period = 2.0 * np.pi / (2.0 + 0.7 * place)
         assert fold.values["period"] == pytest.approx(period, rel=1e-7)
         assert fold.coefficient == pytest.approx(3.0 * np.sqrt(0.1) * period * size, rel=1e-6)
+        assert 0.0 <= fold.coefficient_error < 1e-6 * fold.coefficient
         assert fold.criticality is None
 
 

@@ -126,6 +126,17 @@ def test_orbits_of_any_method_start_the_curve(field, near):
     assert c[1] == pytest.approx(homoclinic(-1.0), abs=2e-8)
 
 
+def test_points_of_the_curve_start_it_again(field, curve):
+    point = curve.points[len(curve) // 2]
+    values = point.orbit(field).parameter_values
+    assert dict(zip(field.parameters, values, strict=True)) == pytest.approx(
+        {"m": point.values["m"], "c": point.values["c"]}, rel=1e-12)
+    again = codim2_curve(field, point, "m", to="homoclinic", bounds=BOX,
+                         options=ContinuationOptions(points=2))
+    assert again.points[0].is_homoclinic
+    assert again.points[0].values["c"] == pytest.approx(point.values["c"], abs=1e-7)
+
+
 def leaf(t, x, p, out):
     # Sandstede's model: for mu = tilde = 0 an orbit on x^2 (1 - x) = y^2, z = 0.
     a, b, c, alpha, beta, gamma, mu, tilde = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]

@@ -46,6 +46,20 @@ def test_curve_agrees_with_branches(masses, kind, second, tolerance):
     assert end.values["period"] == pytest.approx(expected.values["period"], rel=tolerance)
 
 
+def test_curves_keep_the_mesh_of_their_first_point(masses):
+    field, fine = masses
+    before = max((point for point in fine.points if point.parameter < 8.05),
+                 key=lambda point: point.parameter)
+    branch = orbit_branch(field, before.orbit(field), "B", method=Collocation(intervals=40),
+                          bounds=(7.8, 8.2), options=ContinuationOptions(step=0.02))
+    start, = branch.of_kind("period doubling")
+    intervals = len(start.values["mesh"]) - 1
+    assert intervals > branch.attributes["intervals"]
+    curve = codim2_curve(field, start, "D", bounds={"B": (0.2, 20.0)}, both=False,
+                         options=ContinuationOptions(points=2))
+    assert curve.attributes["intervals"] == intervals == len(curve.points[0].values["mesh"]) - 1
+
+
 def torus(t, x, p, out):
     # A circle of radius one; across it w' = (lam - a^2 + 0.7 i) w - w |w|^2, w = r - 1 + i z.
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])

@@ -9,11 +9,18 @@ from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
     ContinuationOptions,
+    Shooting,
+    branch_tree,
+    codim2_curve,
     equilibrium_branch,
+    orbit_branch,
     orbit_family,
     vector_field,
+    with_normal_form,
 )
+from fecontact.core.errors import InputError
 from fecontact.integrate.field_runs.stepper import start_field
+from fecontact.io import read_branch, write_branch
 
 
 def pendulum(t, x, p, out):
@@ -144,3 +151,21 @@ def test_what_is_no_family_is_refused():
     forced = vector_field(pendulum, {"damping": 0.0}, 2, period=lambda p: 1.0)
     with pytest.raises(fc.InputError, match="depends on time"):
         orbit_family(forced, swing)
+
+
+def test_orbits_of_families_are_no_single_orbits(straight, tmp_path):
+    again = read_branch(write_branch(tmp_path / "family.h5", straight))
+    point, doubling = again.points[5], again.of_kind("period doubling")[0]
+    wrong = r"is one of a family of orbits at the same parameters; use orbit_family\(field, point"
+    for refused in (lambda: orbit_branch(STARS, point),
+                    lambda: orbit_branch(STARS, doubling),
+                    lambda: orbit_branch(STARS, point, method=Shooting()),
+                    lambda: branch_tree(STARS, again),
+                    lambda: with_normal_form(STARS, doubling),
+                    lambda: codim2_curve(STARS, point, "other", keep="period"),
+                    lambda: again.at(STARS, 0.0)):
+        with pytest.raises(InputError, match=wrong):
+            refused()
+    larger = orbit_family(STARS, point.orbit(STARS), bounds=(6.29, 12.0),
+                          method=Collocation(intervals=80), options=ContinuationOptions(points=2))
+    assert larger.points[0].values["period"] == pytest.approx(point.values["period"], rel=1e-6)

@@ -16,6 +16,7 @@ from fecontact.bifurcation.continuation.points import (
     NeimarkSackerPoint,
     PeriodDoublingPoint,
     on_branch,
+    require_no_family,
 )
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
@@ -44,7 +45,7 @@ class Branch(Summarised):
     status : BranchStatus
         How its forward end was reached.
     message : str
-        Error of the last failed step; empty if none failed.
+        Error of the last failed step, and what else is to be told; empty if there is nothing.
     attributes : mapping
         Further data of the branch: numbers, texts, arrays.
     """
@@ -161,6 +162,8 @@ class Branch(Summarised):
             values = as_floats(value, "The values of the parameter").ravel().tolist()
             return tuple(self.at(field, one, which) for one in values)
         require_finite("Branch.at", value=value)
+        for point in self.points[:1]:
+            require_no_family(point)
         passed = self._passed(float(value))
         if not (isinstance(which, int | np.integer) and -len(passed) <= which < len(passed)):
             span = (f"from {self.parameter.min():.6g} to {self.parameter.max():.6g}" if self.points

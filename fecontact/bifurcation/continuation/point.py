@@ -135,6 +135,16 @@ class BranchPoint:
             raise InputError(f"{self.place} has {states} states, but the field {field.dimension}.")
         return values
 
+    def _curve_values(self, field: VectorField) -> Array:
+        """Values (k,) of all parameters of a field at a point of a curve of homoclinic orbits."""
+        known, values = self.branch.attributes, field.values
+        for name, value in zip(known["parameter_names"], np.asarray(known["parameter_values"]),
+                               strict=True):
+            values[field.index(str(name))] = value
+        for name, value in zip(known["parameters"], self.u[[-1, -2]].tolist(), strict=True):
+            values[field.index(str(name))] = value
+        return values
+
     def orbit(self, field: VectorField | None = None, samples: int = 1000) -> "PeriodicMotion":
         """The orbit over one period, both ends included; a homoclinic one over its interval.
 
@@ -157,8 +167,10 @@ class BranchPoint:
 
         self._require_orbit("orbit: samples", samples)
         if self.is_homoclinic:
-            return sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
-                           len(self.values["saddle"]), float(self.values["time"]), samples)
+            found = sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
+                            len(self.values["saddle"]), float(self.values["time"]), samples)
+            return found if field is None else replace(
+                found, parameter_values=self._curve_values(field))
         values = None if field is None else self.parameter_values(field)
         period = float(self.values["period"])
         mesh = np.asarray(self.values.get("mesh", ()), dtype=float)

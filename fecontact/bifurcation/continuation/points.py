@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray
 
 # Kind of a point at which the stability changes though no test function has a zero, or that finer
@@ -25,11 +26,11 @@ class _NormalForm(BranchPoint):
 
     @property
     def coefficient_error(self) -> float:
-        """Error of the coefficient."""
+        """Error of the coefficient; of orbits by collocation."""
         return float(self._detail("coefficient_error"))
 
 
-class FoldPoint(BranchPoint):
+class FoldPoint(_NormalForm):
     """Where a branch of equilibria or orbits turns."""
 
     @property
@@ -84,6 +85,7 @@ class HopfPoint(BranchPoint):
     def first_lyapunov_error(self) -> float:
         """Error of the first Lyapunov coefficient."""
         return float(self._detail("first_lyapunov_error"))
+
 
 class PeriodDoublingPoint(_NormalForm):
     """Where orbits of twice the period begin."""
@@ -212,6 +214,13 @@ def on_branch(point: BranchPoint, header: BranchHeader) -> BranchPoint:
             and type(point) is _KINDS.get(point.kind, BranchPoint)):
         return point
     return special_point(point.u, point.tangent, point.values, point.kind, point._details, header)
+
+
+def require_no_family(point: BranchPoint) -> None:
+    """Raise InputError for an orbit of a family, which lies between others at its parameters."""
+    if point.header is not None and "family" in point.header.attributes:
+        raise InputError(f"{point.place} is one of a family of orbits at the same parameters; use "
+                         f"orbit_family(field, point.orbit(field)).")
 
 
 def details_of(point: BranchPoint) -> Mapping[str, Any]:

@@ -23,8 +23,8 @@ class BranchStatus(Enum):
             "folds at a Bautin point, one of homoclinic orbits at a Bogdanov-Takens point.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
-    DISCONTINUITY = ("The orbit meets a border of its contact states, which the last point names: "
-                     "beyond it no orbit of its neighbourhood goes on.")
+    DISCONTINUITY = ("The orbit meets a border of its contact states; on a branch the last point "
+                     "names it. Beyond it no orbit of this kind goes on.")
     SADDLE_NODE = ("The saddle of the homoclinic orbits meets another equilibrium in a fold: there "
                    "the curve ends.")
     STOPPED = "The branch reached a point at which it was to stop."

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch, regular
+from fecontact.bifurcation.continuation.follow import continue_branch, regular, shortened
 from fecontact.bifurcation.continuation.newton import corrected, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
@@ -113,10 +113,17 @@ def followed(
         return Branch(name, tuple(ahead.points), ahead.status, ahead.message, attributes)
     kept = max(options.points // 2 + 1, 2)
     left = max(options.points + 1 - min(regular(ahead.points), kept), 2)
-    back = _side(problem, u, replace(options, points=left), name,
-                 None if tangent is None else -tangent, -direction)
-    turned = [replace(point, tangent=-point.tangent) for point in back.points[:0:-1]]
-    return Branch(name, (*turned, *ahead.points), ahead.status, ahead.message, attributes)
+    message = ahead.message
+    try:
+        back = _side(problem, u, replace(options, points=left), name,
+                     None if tangent is None else -tangent, -direction).points
+    except FecontactError as error:
+        back = ahead.points[:1]
+        message = " ".join(filter(None, (message, f"Nothing was found to the other side: {error}")))
+    points, whole = shortened(ahead.points, options.points + 1 - regular(back))
+    turned = [replace(point, tangent=-point.tangent) for point in back[:0:-1]]
+    return Branch(name, (*turned, *points), ahead.status if whole else BranchStatus.POINTS,
+                  message, attributes)
 
 
 def _side(
@@ -125,20 +132,28 @@ def _side(
 ) -> Going:
     points: list[BranchPoint] = []
     stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
-    begun = False
     for _ in range(_MOST):
-        left = replace(options, points=max(options.points - regular(points), 2), locate=True)
-        piece = continue_branch(problem, u, left, name=name, tangent=tangent, direction=direction)
-        found = list(piece.points)
+        left = options.points - regular(points)
+        if left <= 0:
+            return Going(points, BranchStatus.POINTS)
+        try:
+            piece = continue_branch(problem, u, _of_piece(options, regular(points)), name=name,
+                                    tangent=tangent, direction=direction)
+        except FecontactError as error:
+            if not points:
+                raise
+            return Going(points, BranchStatus.STALLED, str(error))
+        found, whole = shortened(piece.points, left)
         last = found[-1]
-        ended = piece.status is BranchStatus.DISCONTINUITY
-        ends = ([found[0].u] if begun else []) + ([last.u] if ended else [])
+        ended = whole and piece.status is BranchStatus.DISCONTINUITY
+        ends = ([found[0].u] if points else []) + ([last.u] if ended else [])
         found = [point for point in found if point is last or not _is_turn(problem, point, ends)]
         if not options.locate:
             found = [point for point in found if point.kind is None]
         stored = [reduced(problem, point) for point in found]
         if not ended:
-            return Going([*points, *stored], piece.status, piece.message)
+            return Going([*points, *stored], piece.status if whole else BranchStatus.POINTS,
+                         piece.message)
         condition = nothing_left(problem, last.u)[0]
         kind = border_of(problem, last.u, condition)
         following = None if kind in stops else _following(problem, last, options)
@@ -149,8 +164,19 @@ def _side(
         if following is None:
             return Going(points, BranchStatus.DISCONTINUITY)
         problem, u, tangent = following
-        begun = True
+        low, high = options.bounds
+        if not low <= u[-1] <= high:
+            return Going(points, BranchStatus.BOUND)
     return Going(points, BranchStatus.STALLED, f"The orbit meets more than {_MOST} borders.")
+
+
+def _of_piece(options: ContinuationOptions, before: int) -> ContinuationOptions:
+    """Options of a piece of a branch that has so many regular points before it."""
+    tell = options.progress
+    found = replace(options, points=max(options.points - before, 2), locate=True)
+    if not before or not callable(tell):
+        return found
+    return replace(found, progress=lambda points: tell(before + points))
 
 
 def _is_turn(problem: EventOrbit, point: BranchPoint, ends: list[Array]) -> bool:

@@ -1,6 +1,6 @@
 """What the conditions of the phases of an orbit have left.
 
-An orbit ends to be of its kind where one of them has nothing left: a phase has no duration, what
+An orbit stops being of its kind where one of them has nothing left: a phase has no duration, what
 ends it vanishes without any rate (the orbit only touches there), something else vanishes within a
 phase or at its begin, or what slips through zero could stick there.
 """

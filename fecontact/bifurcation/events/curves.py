@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.points import DiscontinuityPoint
-from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, sizes_of
 from fecontact.bifurcation.events.borders import beyond
 from fecontact.bifurcation.events.branches import FITS, nothing_left
 from fecontact.bifurcation.events.conditions import Condition, Course, of_phase
@@ -18,7 +18,7 @@ from fecontact.bifurcation.events.phases import PERIOD, Phase, Strike
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.solvers import SetValued
 from fecontact.system.fields.vector_field import VectorField
 
@@ -196,23 +196,25 @@ class BorderLinearisation:
 
 
 def border_curve(
-    field: VectorField, point: DiscontinuityPoint, parameter: str, widths: Mapping[str, float]
+    field: VectorField, point: DiscontinuityPoint, parameter: str, widths: Mapping[str, float],
+    scales: ArrayLike | None = None,
 ) -> tuple[BorderCurve, Array, dict[str, Any]]:
     """Problem, unknowns and attributes of a border over the parameter of its branch and another.
 
     Raises
     ------
     InputError
-        If the field is not that of a contact system.
+        If the field is not that of a contact system, or ``scales`` are none of its states.
     """
     if not isinstance(field, ContactField):
         raise InputError(f"{point.place} is of a contact system; make the field with "
                          f"contact_field.")
     orbit, u = _restored(field, point)
     name = point.branch.parameter_name
-    scales = orbit.scales.copy()
-    scales[-1] = widths.get(name, scales[-1])
-    orbit = replace(orbit, scales=scales)
+    sizes = orbit.scales.copy()
+    sizes[: field.dimension] = sizes_of(scales, sizes[: field.dimension])[0]
+    sizes[-1] = widths.get(name, sizes[-1])
+    orbit = replace(orbit, scales=sizes)
     second = field.index(parameter)
     value = float(orbit.values[second])
     width = widths.get(parameter, abs(value) or 1.0)
@@ -224,7 +226,7 @@ def border_curve(
     problem = BorderCurve(orbit, second, width, what, phase, event, beside)
     return problem, np.concatenate([u[:-1], [value], u[-1:]]), {
         "parameter_names": list(field.parameters), "parameter_values": orbit.values,
-        "scales": scales}
+        "scales": sizes}
 
 
 def _with_event(

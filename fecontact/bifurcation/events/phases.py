@@ -151,7 +151,13 @@ class Motion:
 
     @cached_property
     def _beside(self) -> tuple[NonsmoothProblem, NonsmoothProblem, float]:
-        """Problems at larger and smaller parameters, and half their distance."""
+        """Problems at larger and smaller parameters, and half their distance.
+
+        Raises
+        ------
+        AnalysisError
+            If the system exists at neither.
+        """
         change, found = _CHANGE * self._width, []
         for sign in (1.0, -1.0):
             values = self._values.copy()
@@ -161,6 +167,8 @@ class Motion:
             except InputError:  # beside the end of the parameter's range
                 found.append(self.problem)
                 change /= 2.0
+        if found[0] is found[1]:
+            raise AnalysisError("The system exists at this value of the parameter alone.")
         return found[0], found[1], change
 
     def run(

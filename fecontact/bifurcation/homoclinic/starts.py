@@ -46,7 +46,7 @@ def homoclinic_curve(
     names = (second, point.branch.parameter_name)
     active = (field.index(second), field.index(names[1]))
     if point.is_homoclinic:
-        values = restored_values(field, point)
+        values = point._curve_values(field)
         motion, degree = None, int(known["degree"])
     else:
         values = point.parameter_values(field)
@@ -78,17 +78,6 @@ def homoclinic_curve(
     attributes = {"parameter_names": list(field.parameters), "parameter_values": values,
                   "scales": problem.scales, "degree": degree}
     return problem, u, attributes
-
-
-def restored_values(field: VectorField, point: BranchPoint) -> Array:
-    """Parameter values (k,) at a point of a curve of homoclinic orbits."""
-    known, values = point.branch.attributes, field.values
-    for name, value in zip(known["parameter_names"], np.asarray(known["parameter_values"]),
-                           strict=True):
-        values[field.index(str(name))] = value
-    for name, value in zip(known["parameters"], point.u[[-1, -2]].tolist(), strict=True):
-        values[field.index(str(name))] = value
-    return values
 
 
 def _cut_open(

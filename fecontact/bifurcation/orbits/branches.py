@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.points import HopfPoint
+from fecontact.bifurcation.continuation.points import HopfPoint, require_no_family
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -84,7 +84,7 @@ class Shooting:
     """Multiple shooting with the compiled integrator, for contact systems only.
 
     Suited to steep friction, impacts and many states, where collocation needs many intervals.
-    Extremes of the states are taken from samples; normal forms by ``with_normal_form`` alone.
+    Extremes are those of samples; normal forms by ``with_normal_form``, none of set-valued orbits.
 
     Parameters
     ----------
@@ -188,6 +188,7 @@ def orbit_branch(
     if not start.is_orbit:
         raise InputError(f"{start.place} has no orbits to follow: take a point of the kind 'Hopf', "
                          f"or one of a branch of orbits.")
+    require_no_family(start)
     known = start.branch.parameter_name
     name = known if parameter is None else field.parameter_or_only(parameter)
     if name == known and start.kind in _BRANCHING:
@@ -394,11 +395,10 @@ def _goes_on(
             field, point, method.rtol if isinstance(method, Shooting) else None, options, scales,
             width, sign, both)
     limits = None if scales is not None else point.branch.attributes.get("limits")
-    found = restored(field, point)
-    problem = replace(rescaled(found[0], scales, width), limits=limits)
-    chosen = method if isinstance(method, Collocation) else _method_of(point)
-    assert isinstance(chosen, Collocation)
-    problem, u, tangent = starts.on_intervals((problem, *found[1:]), chosen.intervals)
+    problem, u, tangent = restored(field, point)
+    problem = replace(rescaled(problem, scales, width), limits=limits)
+    chosen: Any = method if isinstance(method, Collocation) else _method_of(point)
+    problem, u, tangent = starts.on_intervals((problem, u, tangent), chosen.intervals)
     problem, u, tangent = problem.adapted(u, sign * tangent)
     return _followed((problem, u, tangent), chosen, options, limits, both=both)
 

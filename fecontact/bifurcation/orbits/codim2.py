@@ -264,7 +264,8 @@ def orbit_curve(
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
                          f"cannot keep; vary the frequency of the excitation instead.")
     curve = (PeriodCurve if kind == "period" else OrbitCurve)(orbit, kind, problem.period(u))
-    return curve, start, {**point.branch.attributes, "scales": orbit.scales}
+    return curve, start, {**point.branch.attributes, "scales": orbit.scales,
+                          "intervals": problem.intervals}
 
 
 def _unit(size: int, place: int) -> Array:

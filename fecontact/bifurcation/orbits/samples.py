@@ -69,6 +69,9 @@ def _extremes(point: BranchPoint, weights: Array) -> tuple[float, float]:
     if point.is_orbit and point.by_harmonics:
         return _peaks(point.orbit(samples=_FINE).states @ weights)
     if "mesh" not in point.values:
+        if "state" not in point.values:
+            raise InputError(f"{point.place} stores no orbit, only its extremes: take 'minimum' "
+                             f"and 'maximum' of the point.")
         value = float(weights @ np.asarray(point.values["state"]))
         return value, value
     nodes, degree = _nodes(point, len(weights))

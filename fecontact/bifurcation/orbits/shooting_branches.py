@@ -88,13 +88,13 @@ def from_motion(
     found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
                          motion.periods, widths)
     problem, u = shooting_from(*found, segments, rtol, derivative_rtol, solver)
-    branch = _from_event_to_event(problem, u, options, direction=direction, both=both)
+    branch, why = _from_event_to_event(problem, u, options, direction=direction, both=both)
     if branch is not None:
         return branch
     try:
-        return continue_branch(problem, u, options, name=_name(problem), direction=direction,
-                               both=both,
-                               attributes=_attributes(problem))
+        return _noted(why, continue_branch(
+            problem, u, options, name=_name(problem), direction=direction, both=both,
+            attributes=_attributes(problem)))
     except (AnalysisError, InputError) as error:
         raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {values[free]:.6g} "
                             f"near the motion: Newton's method does not converge; run it longer "
@@ -104,11 +104,11 @@ def from_motion(
 
 def _from_event_to_event(
     problem: ShootingProblem, u: Array, options: ContinuationOptions, **how: Any
-) -> Branch | None:
-    """The branch of a set-valued orbit whose events are known; None for others.
+) -> tuple[Branch | None, str]:
+    """The branch of a set-valued orbit whose events are known; None for others, and why.
 
-    Those are orbits of time-stepping, without events though nothing excites them, with chatter, or
-    with compliant contacts that open.
+    Those are orbits of time-stepping and of Poisson's impacts, without events though nothing
+    excites them, with chatter, or with compliant contacts that open.
 
     Raises
     ------
@@ -116,24 +116,33 @@ def _from_event_to_event(
         If Newton's method finds no orbit near the start.
     """
     if not isinstance(problem.solver, SetValued):
-        return None
+        return None, ""
     from fecontact.bifurcation.events.branches import followed, orbit_from
+    from fecontact.integrate.nonsmooth.driver import by_events
 
-    values, d = problem.parameters(u), problem.field.dimension
+    values, d, solver = problem.parameters(u), problem.field.dimension, problem.solver
+    if not by_events(problem.field.system(values), solver.scheme, solver.restitution,
+                     solver.impact_law, solver.static_coefficient):
+        return None, ""
     try:
         found = orbit_from(problem.field, values, problem.free, 0.0, problem.starts(u)[0].copy(),
                            problem.period(u), problem.periods,
                            np.append(problem.scales[:d], problem.scales[-1]), problem.rtol,
                            problem.solver)
-    except AnalysisError:
-        return None
+    except AnalysisError as error:
+        return None, f"The runs of the orbit were differenced: {error}"
     whole = {**_attributes(problem), "segments": 1}
     try:
-        return followed(*found, options, name=_name(problem), attributes=whole, **how)
+        return followed(*found, options, name=_name(problem), attributes=whole, **how), ""
     except InputError as error:
         raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {u[-1]:.6g} near "
                             f"the motion: Newton's method does not converge; run it longer until "
                             f"it has settled.") from error
+
+
+def _noted(why: str, branch: Branch) -> Branch:
+    """The branch with why it was not followed from event to event in its message."""
+    return replace(branch, message=" ".join(filter(None, (why, branch.message))))
 
 
 def _to_fastest(
@@ -162,12 +171,12 @@ def goes_on(
     if rtol is not None:
         problem = replace(problem, rtol=rtol)
     ahead = float(np.copysign(1.0, sign * tangent[-1]))
-    branch = _from_event_to_event(problem, u, options, direction=ahead, both=both)
+    branch, why = _from_event_to_event(problem, u, options, direction=ahead, both=both)
     if branch is not None:
         return branch
-    return continue_branch(problem, u, options, name=_name(problem), tangent=sign * tangent,
-                           both=both,
-                           attributes=_attributes(problem))
+    return _noted(why, continue_branch(
+        problem, u, options, name=_name(problem), tangent=sign * tangent, both=both,
+        attributes=_attributes(problem)))
 
 
 def doubled(

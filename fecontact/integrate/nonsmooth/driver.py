@@ -252,6 +252,16 @@ def nonsmooth_problem(
     return problem, rubbing
 
 
+def by_events(
+    system: ContactSystem, scheme: str, restitution: float | None, impact_law: str,
+    static_coefficient: float | Sequence[float] | None,
+) -> bool:
+    """Whether a system runs from event to event, with impacts of Newton's law if any."""
+    problem, _ = nonsmooth_problem(system, restitution, static_coefficient, 1.0)
+    newton = restitution is None or impact_law == "newton"
+    return newton and _chosen(problem, scheme) == "events"
+
+
 def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
     if law.memory or "smoothing_slope" not in (entry.name for entry in fields(law)):
         raise InputError(f"{type(law).__name__} has no smoothing_slope that could become infinite; "

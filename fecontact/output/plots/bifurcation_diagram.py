@@ -56,6 +56,7 @@ SPECIAL = {
 # Letters alone, for diagrams of other kinds.
 LETTERS = {kind: letters for kind, (letters, _) in SPECIAL.items()}
 
+
 def plot_branches(
     branches: "Branch | Sequence[Branch]", y: Quantity = 0, *,
     x: Quantity = "parameter", x_label: str | None = None, y_label: str | None = None,

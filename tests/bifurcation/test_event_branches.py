@@ -1,0 +1,188 @@
+"""Which set-valued orbits go from event to event, and where their branches end."""
+
+import numpy as np
+import pytest
+from test_sliding_bifurcations import DAMPING, FILIPPOV, STOPS, forced, gain, impacting
+
+import fecontact as fc
+from fecontact.bifurcation import (
+    BranchStatus,
+    ContinuationOptions,
+    Shooting,
+    amplitude,
+    codim2_curve,
+    contact_field,
+    orbit_branch,
+    periodic_motion,
+    with_normal_form,
+)
+from fecontact.bifurcation.continuation.follow import regular
+from fecontact.integrate import SetValued
+from fecontact.laws import ConstantFriction, LinearContact
+
+GRAZING = 4.0 / gain(0.8)
+
+
+def skew(drive):
+    """A stop with friction whose motions along and across the ground are coupled."""
+    rows = [[1.0, 0.5], [0.0, 1.0], [0.0, 0.0]]
+    basis = fc.basis_from_matrices(np.eye(2), np.diag([2.0, 0.5]),
+                                   {"contact": [rows], "B": rows, "C": rows},
+                                   damping=0.1 * np.eye(2))
+    return fc.ContactSystem(
+        basis, normal=LinearContact(1e6), friction=ConstantFriction(0.3),
+        ground=fc.Ground(speed=0.3), load=fc.Load(1.0),
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=drive, angular_frequency=2.0))
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_orbits_of_either_impact_law_are_those_of_runs(law):
+    """One impact a period, in which the laws differ; multipliers are differences of runs."""
+    solver = SetValued(restitution=0.5, impact_law=law)
+    system = skew(8.0)
+    field = contact_field(system, "drive.amplitude_y")
+    motion = periodic_motion(system, solver=solver, initial=[0.0, 0.5, 0.0, 0.0], rtol=1e-9)
+    branch = orbit_branch(field, motion, method=Shooting(3, solver=solver), bounds=(7.2, 8.8),
+                          options=ContinuationOptions(points=2, step=0.05))
+    assert branch.attributes["segments"] == (1 if law == "newton" else 3)
+    point = branch.points[-1]
+    there, period = field.system(np.array([point.parameter])), point.values["period"]
+    start = point.u[:4]
+
+    def ends(state):
+        return fc.simulate(there, period, initial=state, solver=solver, rtol=1e-12,
+                           outputs=2).states[-1]
+
+    assert ends(start) == pytest.approx(start, abs=1e-8)
+    known = np.linalg.eigvals(np.array([(ends(start + away) - ends(start - away)) / 2e-6
+                                        for away in 1e-6 * np.eye(4)]).T)
+    assert np.sort(np.abs(point.values["multipliers"])) == pytest.approx(np.sort(np.abs(known)),
+                                                                         abs=1e-5)
+
+
+def test_time_stepping_is_differenced():
+    """Above the largest speed of the mass it slips all the time: a linear oscillator."""
+    solver = SetValued(scheme="stepping")
+    system = forced(speed=3.0)
+    motion = periodic_motion(system, solver=solver, rtol=1e-8)
+    branch = orbit_branch(
+        contact_field(system, "ground.speed"), motion,
+        method=Shooting(2, solver=solver, rtol=1e-8), bounds=(2.9, 3.1),
+        options=ContinuationOptions(points=1))
+    assert branch.attributes["segments"] == 2
+    assert branch.message == ""
+    matrix = np.array([[0.0, 1.0], [-1.0, -2.0 * DAMPING]])
+    known = np.exp(np.linalg.eigvals(matrix) * branch.points[0].values["period"])
+    found = branch.points[0].values["multipliers"]
+    assert found[np.argsort(found.imag)] == pytest.approx(known[np.argsort(known.imag)], abs=1e-7)
+
+
+def test_messages_say_why_runs_are_differenced():
+    """Before it rests, the stop is struck ever more quickly."""
+    solver = SetValued(restitution=0.5)
+    system = skew(2.4)
+    motion = periodic_motion(system, solver=solver, initial=[0.0, 0.5, 0.0, 0.0], rtol=1e-9)
+    branch = orbit_branch(contact_field(system, "drive.amplitude_y"), motion,
+                          method=Shooting(1, solver=solver), bounds=(2.2, 2.6),
+                          options=ContinuationOptions(points=1))
+    assert branch.message.startswith("The runs of the orbit were differenced: ")
+
+
+@pytest.fixture(scope="module")
+def stop():
+    """The oscillator over a stop that it does not touch, and its orbit."""
+    system = impacting()
+    field = contact_field(system, ["drive.amplitude_y", "drive.angular_frequency"])
+    return field, periodic_motion(system, solver=STOPS, initial=[2.0, 0.0], rtol=1e-9)
+
+
+def over_amplitude(stop, **options):
+    both, bounds = options.pop("both", False), options.pop("bounds")
+    return orbit_branch(*stop, "drive.amplitude_y", method=Shooting(1, solver=STOPS),
+                        bounds=bounds, both=both,
+                        options=ContinuationOptions(tolerance=1e-10, **options))
+
+
+@pytest.mark.parametrize("beyond", [1e-7, 1e-5, 1e-4])
+def test_a_bound_just_behind_a_border(stop, beyond):
+    branch = over_amplitude(stop, bounds=(1.0, GRAZING + beyond), step=0.02)
+    assert branch.status is BranchStatus.BOUND
+    assert branch.parameter.max() <= GRAZING + beyond
+    assert branch.of_kind("grazing")[0].parameter == pytest.approx(GRAZING, rel=1e-10)
+
+
+def test_as_many_points_to_both_sides_as_asked_for(stop):
+    told = []
+    branch = over_amplitude(stop, bounds=(0.2, 3.0), step=0.02, largest_step=0.05, points=16,
+                            both=True, progress=told.append)
+    assert branch.status is BranchStatus.POINTS
+    assert regular(branch.points) == 16
+    alone = []
+    long = over_amplitude(stop, bounds=(1.0, 3.0), step=0.05, points=14, progress=alone.append)
+    assert len(long.of_kind("grazing")) == 1
+    assert regular(long.points) == 14
+    assert (np.diff(alone) >= 0).all()
+
+
+def test_a_failure_beyond_a_border_keeps_the_branch(stop, monkeypatch):
+    from fecontact.bifurcation.events import branches
+
+    go, calls = branches.continue_branch, []
+
+    def failing(*given, **how):
+        calls.append(given)
+        if len(calls) > 1:
+            raise fc.AnalysisError("No orbit.")
+        return go(*given, **how)
+
+    monkeypatch.setattr(branches, "continue_branch", failing)
+    branch = over_amplitude(stop, bounds=(1.0, 3.0), step=0.02)
+    assert (branch.status, branch.message) == (BranchStatus.STALLED, "No orbit.")
+    assert branch.points[-1].kind == "grazing"
+    calls.clear()
+    branch = over_amplitude(stop, bounds=(1.0, 1.3), step=0.02, both=True)
+    assert branch.status is BranchStatus.BOUND
+    assert branch.message == "Nothing was found to the other side: No orbit."
+    assert branch.parameter[0] == pytest.approx(1.2)
+
+
+def test_what_borders_take(stop):
+    field, _ = stop
+    grazing, = over_amplitude(stop, bounds=(1.0, GRAZING + 1e-5), step=0.02).of_kind("grazing")
+    over = "drive.angular_frequency"
+    box = {"drive.amplitude_y": (0.1, 8.0), over: (0.7, 1.2)}
+    brief = ContinuationOptions(points=2)
+    curve = codim2_curve(field, grazing, over, bounds=box, scales=[3.0, 7.0], options=brief)
+    assert curve.attributes["scales"][:2].tolist() == [3.0, 7.0]
+    with pytest.raises(fc.InputError, match=r"scales = .* must hold 2 numbers above zero"):
+        codim2_curve(field, grazing, over, bounds=box, scales=[1.0, -1.0])
+    with pytest.raises(fc.InputError, match="is a border of set-valued orbits, which keep="):
+        codim2_curve(field, grazing, over, bounds=box, keep="period")
+    with pytest.raises(fc.InputError, match="leave one of them out"):
+        codim2_curve(field, grazing, over, bounds=box, keep="period", to="fold")
+    with pytest.raises(fc.InputError, match="stores no orbit, only its extremes"):
+        amplitude([1.0, 0.0])(curve.points[0])
+
+
+def test_set_valued_orbits_have_no_smooth_normal_form():
+    system = impacting(amplitude=2.2)
+    field = contact_field(system, ["drive.amplitude_y"])
+    motion = periodic_motion(system, solver=STOPS, initial=[2.0, 0.0], rtol=1e-9)
+    doubling = orbit_branch(
+        field, motion, method=Shooting(1, solver=STOPS), bounds=(2.0, 2.3), direction=-1.0,
+        options=ContinuationOptions(step=0.02, stop_at="period doubling")).points[-1]
+    with pytest.raises(fc.InputError, match="set-valued system, which has no smooth normal form"):
+        with_normal_form(field, doubling)
+
+
+def test_a_system_at_one_value_alone_has_no_branch():
+    def only(system, value):
+        if value != 0.1:
+            raise fc.InputError("There is no such belt.")
+        return system
+
+    system = forced(speed=0.1)
+    field = contact_field(system, {"belt": (0.1, only)})
+    with pytest.raises(fc.AnalysisError, match="exists at this value of the parameter alone"):
+        orbit_branch(field, periodic_motion(system, solver=FILIPPOV, rtol=1e-9),
+                     method=Shooting(1, solver=FILIPPOV), bounds=(0.05, 0.2))
