@@ -118,7 +118,7 @@ def test_runs_come_back_from_files(run, tmp_path):
 
 
 @pytest.mark.parametrize("solver", [
-    Rodas5P(), SetValued(), SetValued(static_coefficient=[0.5])])
+    Rodas5P(), SetValued(), SetValued(static_coefficient=[0.85])])
 def test_runs_of_contact_fields_come_back(solver, tmp_path):
     field = contact_field(friction_oscillator(), {"drive.angular_frequency": None})
     run = fc.simulate(field, 1.0, initial="rest", solver=solver, events=ContactEvents())
