@@ -98,33 +98,34 @@ def driven(quick: bool) -> tuple[ContactField, Branch]:
 
 def figure(branch: Branch, curve: Branch, field: ContactField, forced: Branch, path: Path) -> None:
     """Draw the border with its closed form, and phase planes on both sides of three borders."""
-    import matplotlib.pyplot as plt
+    from fecontact.plot import COLOURS, new_figure
 
-    drawn, axes = plt.subplots(1, 2, figsize=(10.0, 4.2), layout="constrained")
-    dashpots = curve.column("dashpot")
-    axes[0].plot(dashpots, curve.parameter, label="end of stick-slip, followed")
-    some = np.linspace(dashpots.min(), dashpots.max(), 9)
-    axes[0].plot(some, [closed_form(c) for c in some], "o", label="closed form")
-    axes[0].plot(DASHPOT, branch.points[-1].parameter, "kd", label="found on a branch")
-    axes[0].set(xlabel="dashpot c / √(k m)", ylabel="speed of the belt / (F$_N$/√(k m))")
-    axes[0].legend()
-    regular = [point for point in forced.points if point.kind is None]
-    borders = [point.parameter for point in forced.special]
-    edges = [forced.parameter.min(), *borders, forced.parameter.max()]
-    names = ["slip to both sides", "with stick", "stick and slip to one side", "slip alone"]
-    for low, high, name in zip(edges[:-1], edges[1:], names, strict=False):
-        inside = [point for point in regular if low < point.parameter < high]
-        if not inside:
-            continue
-        point = min(inside, key=lambda one: abs(one.parameter - 0.5 * (low + high)))
-        states = point.orbit(field, 2000).states
-        line, = axes[1].plot(states[:, 0], states[:, 1],
-                             label=f"V = {point.parameter:.2f}: {name}")
-        axes[1].axhline(point.parameter, color=line.get_color(), linewidth=0.6, linestyle=":")
-    axes[1].set(xlabel="displacement x", ylabel="velocity; the belt's dotted")
-    axes[1].legend(fontsize="small", loc="center")
-    drawn.savefig(path, dpi=120)
-    plt.close(drawn)
+    with new_figure(9.6, 4.2, path) as drawn:
+        border, plane = drawn.subplots(1, 2)
+        dashpots = curve.column("dashpot")
+        border.plot(dashpots, curve.parameter, color=COLOURS[0], label="end of stick-slip")
+        some = np.linspace(dashpots.min(), dashpots.max(), 9)
+        border.plot(some, [closed_form(c) for c in some], "o", color=COLOURS[1],
+                    label="closed form")
+        border.plot(DASHPOT, branch.points[-1].parameter, "kd", label="found on a branch")
+        border.set(xlabel="dashpot c / √(k m)", ylabel="speed V of the belt / (F$_N$/√(k m))")
+        border.legend()
+        regular = [point for point in forced.points if point.kind is None]
+        borders = [point.parameter for point in forced.special]
+        edges = [forced.parameter.min(), *borders, forced.parameter.max()]
+        names = ["slip to both sides", "with stick", "stick, slip to one side", "slip alone"]
+        for low, high, name, colour in zip(edges[:-1], edges[1:], names, COLOURS, strict=False):
+            inside = [point for point in regular if low < point.parameter < high]
+            if not inside:
+                continue
+            point = min(inside, key=lambda one: abs(one.parameter - 0.5 * (low + high)))
+            states = point.orbit(field, 2000).states
+            plane.plot(states[:, 0], states[:, 1], color=colour,
+                       label=f"V = {point.parameter:.2f}: {name}")
+            plane.axhline(point.parameter, color=colour, linewidth=0.8, linestyle=":")
+        plane.set(xlabel="displacement / (F$_N$/k)",
+                  ylabel="velocity (dotted: V) / (F$_N$/√(k m))")
+        plane.legend(fontsize="small", loc="center", bbox_to_anchor=(0.48, 0.45))
 
 
 def main(folder: Path = Path("."), quick: bool = False) -> None:

@@ -33,7 +33,7 @@ from fecontact.bifurcation import (
     periodic_motion,
     poincare_scan,
 )
-from fecontact.integrate import Crossing
+from fecontact.integrate import Crossing, Rodas5P
 from fecontact.laws import ConstantFriction, ExponentialFriction, LinearContact, PrescribedForce
 
 MASS = 5.632
@@ -120,8 +120,9 @@ def test_orbits_are_those_of_the_plane(sliding, method):
 def test_scan_of_impacts_is_that_of_the_plane():
     """Periods one and two over the frequency of the drive."""
     values = [30.84, 64.32]
+    # Power series, which the plane's runs would take, leave no errors to share.
     plane = poincare_scan(impact_oscillator(2), "drive.angular_frequency", values,
-                          transient_periods=200, keep=4)
+                          transient_periods=200, keep=4, solver=Rodas5P(series="never"))
     space = poincare_scan(impacts_in_space(), "drive.angular_frequency", values,
                           transient_periods=200, keep=4)
     for one, other in ((plane.up, space.up), (plane.down, space.down)):

@@ -42,6 +42,8 @@ def test_curves_hold_the_states_of_runs():
     assert np.transpose(space.lines[0].get_data_3d()) == pytest.approx(RUN.states)
     assert np.transpose(space.lines[2].get_data_3d()) == pytest.approx(RUN.events.states)
     assert space.get_zlabel() == "z"
+    # States by number have their names too.
+    assert plot_phase_space(RUN, [2, 0]).axes[0].get_xlabel() == "z"
 
 
 def test_quantities_of_contact_systems_come_by_rows():

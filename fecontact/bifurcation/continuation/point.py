@@ -52,7 +52,8 @@ class BranchPoint:
         Stored values of the solution, such as state and stability.
     kind : str or None
         What is special about the point: 'fold', 'Hopf', ...; None for the others. On a branch a
-        special point has the class of its kind, such as :class:`HopfPoint`.
+        special point has the class of its kind, such as
+        :class:`fecontact.bifurcation.HopfPoint`.
     header : BranchHeader or None
         Parameter and attributes of its branch; None while the point is on no branch.
     """

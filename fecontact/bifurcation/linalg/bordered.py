@@ -79,7 +79,10 @@ class Bordered:
         unknowns.
         """
         d, matrix = len(self._factors.end), self.matrix
-        balance = 1.0 / np.abs(matrix).max(axis=1)
+        size = np.abs(matrix).max(axis=1)
+        # Both ends may cancel in a whole row, in which nothing but rounding is left.
+        size[:d] = np.abs(self._factors.end[:, : 2 * d]).max(axis=1)
+        balance = 1.0 / size
         lefts, sizes, rights = np.linalg.svd(matrix * balance[:, None])
         left = lefts[:, -1] * balance
         rows = original_rows(self._factors, left[:d], -left[d:] @ self._weights)

@@ -1,5 +1,6 @@
 """Continuation problem of a nonlinear mode: periodic motion under negative damping."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -88,6 +89,14 @@ class ModeProblem(HarmonicProblem):
     def rounding(self) -> float:
         """Relative size of Newton steps below which growing steps are rounding."""
         return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
+
+    def lost(self, values: Mapping[str, Any]) -> bool:
+        """False: no special point of a mode follows from multipliers."""
+        return False
+
+    def note(self, points: Any) -> str:
+        """Nothing: 'trivial_error' tells how far multipliers are right."""
+        return ""
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """The predictor; that of a motion x(-t) = x(t) without losses is one too.

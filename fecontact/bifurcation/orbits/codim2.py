@@ -41,6 +41,7 @@ from fecontact.system.fields.vector_field import VectorField
 
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
 _AT_RESONANCE = 1e-6  # distance of the cosine of the angle from 1 or -1 at these resonances
+_LEAST = 1e-200  # in place of zero
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
 # Points at which a pair beside the critical multipliers passes the unit circle, by the curve.
 _PAIRS = {"fold": "fold-Neimark-Sacker", "period doubling": "flip-Neimark-Sacker",
@@ -212,7 +213,8 @@ class CurveLinearised:
         """Curvature -w G_uu v v / w G_p of the first parameter over the orbits, at folds."""
         v = self._critical.v
         assert v is not None
-        slope = along_parameter(self.orbit, self.terms[0])
+        # Zero where a curve of doubled orbits begins.
+        slope = along_parameter(self.orbit, self.terms[0]) or _LEAST
         return float(self.gradient @ v / slope / (self.problem.weights() @ v**2))
 
     @cached_property

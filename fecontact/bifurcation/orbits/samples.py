@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate
@@ -15,6 +16,7 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.reduction.modal_basis import Component
+from fecontact.system.fields.vector_field import VectorField, require_field
 
 
 def _nodes(point: BranchPoint, states: int) -> tuple[Array, int]:
@@ -22,14 +24,46 @@ def _nodes(point: BranchPoint, states: int) -> tuple[Array, int]:
     return nodes_on_mesh(point.u, np.asarray(point.values["mesh"], dtype=float), states)
 
 
-def quantity_range(point: BranchPoint, row: ArrayLike) -> tuple[float, float]:
+def quantity_range(
+    point: BranchPoint, row: ArrayLike, *, about: VectorField | None = None
+) -> tuple[float, float]:
     """Smallest and largest value of a linear quantity ``row @ x`` over an orbit or equilibrium.
 
-    ``row`` (d,) is a row of the states, such as that of a displacement
-    (:meth:`fecontact.bifurcation.ContactField.displacement_row`).
+    Parameters
+    ----------
+    point : BranchPoint
+        An orbit or equilibrium of a branch.
+    row : (d,) sequence
+        Row of the states, such as that of a displacement
+        (:meth:`fecontact.bifurcation.ContactField.displacement_row`).
+    about : VectorField, optional
+        The field of the branch, for values relative to that of its equilibrium at the same
+        parameters: of steady sliding for contact systems, else of the equilibrium that Newton's
+        method finds from the middle of the orbit.
+
+    Raises
+    ------
+    InputError
+        If the row has another shape, or the field other parameters.
+    AnalysisError
+        If the field depends on time, or no equilibrium is found.
     """
     require_kind("quantity_range", BranchPoint, point=point)
-    weights = as_floats(row, "row")
+    low, high = _extremes(point, as_floats(row, "row"))
+    if about is None:
+        return low, high
+    require_field(about)
+    values = dict(zip(about.parameters, point.parameter_values(about).tolist(), strict=True))
+    start = None
+    if not isinstance(about, ContactField):
+        start = (point.orbit(about).states[:-1].mean(axis=0) if point.is_orbit
+                 else np.asarray(point.values["state"]))
+    rest = float(as_floats(row, "row") @ find_equilibrium(about, values, start=start).state)
+    return low - rest, high - rest
+
+
+def _extremes(point: BranchPoint, weights: Array) -> tuple[float, float]:
+    """The range of the quantity with so many weights."""
     if weights.ndim != 1:
         raise InputError(f"row must hold one number for each state, not shape {weights.shape}.")
     if point.is_orbit and point.by_harmonics:

@@ -58,8 +58,9 @@ def phase_curves(
         events = None if isinstance(one, PeriodicMotion) else one.events
         passed = np.zeros((0, len(rows))) if events is None else events.states @ rows.T
         curves.append(Curve(time, one.states @ rows.T, passed))
-    names = [f"state {one}" if isinstance(one, int | np.integer) else
-             one if isinstance(one, str) else f"quantity {number + 1}"
+    known = given[0].state_names if isinstance(given[0], FieldRun) else ()
+    names = [one if isinstance(one, str) else f"quantity {number + 1}"
+             if not isinstance(one, int | np.integer) else known[one] if known else f"state {one}"
              for number, one in enumerate(coordinates)]
     return curves, names if labels is None else list(labels)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.compiled import i8, kernel
 from fecontact.core.types import Array, Integers
 
 _index = types.Array(types.int32, 1, "C")
@@ -120,8 +120,8 @@ _diagonal_products = _compiled(_diagonal_product, (3, True), (3, True), (3, True
 _smoothings = _compiled(_smoothing, (1, False), (1, False), (3, True), (3, True), (3, True),
                         (1, True), (3, True), (3, True), (3, True))
 
-_step_on = kernel(types.void(i8, i8, vector, matrix, matrix, matrix, matrix), nogil=True)(_step_on)
-_turn_to = kernel(types.void(i8, i8, vector, matrix, matrix), nogil=True)(_turn_to)
+_steps_on = _compiled(_step_on, (1, True), (2, True), (2, True), (2, True), (2, True))
+_turns_to = _compiled(_turn_to, (1, True), (2, True), (2, True))
 
 # Rows that one thread does at a time, and fewer than which are not worth threads.
 _ROWS = 4096
@@ -152,6 +152,10 @@ class BlockRows:
         return cls(matrix.indptr.astype(np.int32, copy=False),
                    matrix.indices.astype(np.int32, copy=False),
                    np.ascontiguousarray(matrix.data, dtype=dtype))
+
+    def single(self) -> "BlockRows":
+        """The same in single precision."""
+        return BlockRows(self.indptr, self.indices, self.blocks.astype(np.float32))
 
     def product(self, x: Any) -> Any:
         """A x (N, 3, k) of vectors of the matrix's precision."""
@@ -185,9 +189,9 @@ def diagonal_product(blocks: Any, x: Any) -> Any:
 
 def step_on(step: Array, direction: Array, pushed: Array, x: Array, residual: Array) -> None:
     """``x += step direction`` and ``residual -= step pushed`` of vectors (n, k), step (k,)."""
-    _in_parts(_step_on, len(x), step, direction, pushed, x, residual)
+    _in_parts(_steps_on[x.dtype], len(x), step.astype(x.dtype), direction, pushed, x, residual)
 
 
 def turn_to(ratio: Array, z: Array, direction: Array) -> None:
     """``direction = z + ratio direction`` of vectors (n, k), ratio (k,)."""
-    _in_parts(_turn_to, len(z), ratio, z, direction)
+    _in_parts(_turns_to[z.dtype], len(z), ratio.astype(z.dtype), z, direction)

@@ -44,9 +44,9 @@ class NearSolver:
     followers : (m,) integers
         The nodes that follow.
     coupling : BlockRows
-        Their rows of K B.
+        Their rows of K B, of single precision.
     inverse : (m, 3, 3) array
-        The inverse of their blocks K_mm.
+        The inverse of their blocks K_mm, too.
     """
 
     spread: Any
@@ -84,21 +84,23 @@ class NearSolver:
         indptr = np.concatenate([[0], np.cumsum(counts)])
         picked = np.repeat(rows - indptr[:-1], counts) + np.arange(indptr[-1])
         coupling = BlockRows(indptr.astype(np.int32), KB.indices[picked].astype(np.int32),
-                             np.ascontiguousarray(KB.data[picked]))
+                             np.ascontiguousarray(KB.data[picked], np.float32))
         everywhere = np.repeat(np.arange(len(moving)), np.diff(K.indptr))
         blocks = K.data[everywhere == K.indices][followers]
         smaller = SolidSolver(
             BlockRows.of(near), BlockRows.of(mass),
             with_finest(solver.mesh_cycle, regular, between[own]), free[:, :, None],
             solver.gauge.reshape(len(moving), -1)[own].reshape(3 * len(own), -1), solver.shift)
-        return cls(spread, smaller, followers, coupling, np.linalg.inv(blocks))
+        return cls(spread, smaller, followers, coupling,
+                   np.linalg.inv(blocks).astype(np.float32))
 
     def missing(self, forces: Array, found: Array) -> Array:
         """What the works (k,) of forces on displacements (3 n, k) lack, by estimate.
 
         ``forces`` (3 m, k) are those at the nodes that follow.
         """
-        left = self.coupling.product(found.reshape(-1, 3, found.shape[1]))
+        left = self.coupling.product(
+            np.ascontiguousarray(found, np.float32).reshape(-1, 3, found.shape[1]))
         left -= forces.reshape(left.shape)
         return np.asarray(np.einsum("mik,mik->k", left, diagonal_product(self.inverse, left)))
 

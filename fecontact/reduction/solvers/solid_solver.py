@@ -34,6 +34,9 @@ _MODES = 1e-6
 # Vectors that are solved at once.
 WIDTH = 32
 
+# Accuracy of deflections for which single precision suffices.
+_SINGLE = 1e-3
+
 
 def suited(body: ElasticBody) -> bool:
     """Whether the iterative solver is the better one for a body.
@@ -131,20 +134,22 @@ class SolidSolver:
 
         Conjugate gradients, until the energy norm of the residual is below the tolerance, relative
         to that of the displacements, which may hold any rigid motion: balanced forces do no work
-        on it.
+        on it. Above a tolerance of 1e-3 they are of single precision.
         """
-        found, converged = np.empty(forces.shape), True
+        solver, dtype = (self._single, np.float32) if tolerance >= _SINGLE else (self, np.float64)
+        found, converged = np.empty(forces.shape, dtype), True
         for first in range(0, forces.shape[1], WIDTH):
             part = slice(first, first + WIDTH)
-            found[:, part], reached = self._conjugate_gradients(forces[:, part], tolerance, most)
+            found[:, part], reached = solver._conjugate_gradients(
+                forces[:, part].astype(dtype), tolerance, most)
             converged &= reached
         return found, converged
 
     def _conjugate_gradients(
         self, forces: Array, tolerance: float, most: int
     ) -> tuple[Array, bool]:
-        x = np.zeros(forces.shape)
-        residual = np.ascontiguousarray(forces * self.moving.reshape(-1, 1))
+        x = np.zeros(forces.shape, forces.dtype)
+        residual = self._held(np.ascontiguousarray(forces))
         direction = self._cycle(residual)
         energy = np.einsum("ij,ij->j", residual, direction)
         work = np.zeros(forces.shape[1])
@@ -189,6 +194,11 @@ class SolidSolver:
         if not self._free:
             x *= self.moving.reshape(-1, 1)
         return x
+
+    @cached_property
+    def _single(self) -> "SolidSolver":
+        """The same with a stiffness of single precision, as the multigrid is."""
+        return replace(self, stiffness=self.stiffness.single())
 
     @cached_property
     def _free(self) -> bool:

@@ -157,7 +157,7 @@ class Answers:
         far = space.at_followers(momentum)
         compliance, missing = np.zeros((count, count)), np.zeros(count)
         size = own.shape[1]
-        found = np.zeros((size, count)) if 8.0 * size * count <= _ROOM else None
+        found: Array | None = None
         loaded = np.flatnonzero(np.diff(rows.indptr))
         for first in range(0, len(loaded), WIDTH):
             part = loaded[first : first + WIDTH]
@@ -165,6 +165,8 @@ class Answers:
                 own[part].T.toarray() - inertia @ at_rows[part].T, accuracy)
             if answer is None:
                 return cls(compliance, None, missing, False)
+            if found is None and answer.itemsize * float(size) * count <= _ROOM:
+                found = np.zeros((size, count), answer.dtype)
             compliance[:, part] = own @ answer - at_rows @ (inertia.T @ answer)
             if near is not None:
                 missing[part] = _SAFETY * near.missing(-far @ at_rows[part].T, answer)
@@ -245,14 +247,14 @@ class IteratedFlexibility(Flexibility):
             return whole.coordinates(further)
         space, answers = self._solved
         if answers.found is not None:
-            return answers.found @ patterns
+            return np.asarray(answers.found @ patterns.astype(answers.found.dtype), dtype=float)
         forces = self.rows.T @ patterns
         forces -= (self.system.mass @ self.modes[1]) @ (self.modes[1].T @ forces)
         found = space.deflections(space.gather(forces), self.accuracy)
         if found is None:
             raise AnalysisError("The deflections under forces at the contact nodes do not "
                                 "converge; take eigensolver = 'direct'.")
-        return found
+        return np.asarray(found, dtype=float)
 
     def deflections(self, patterns: Array) -> Array:
         """G W^T patterns (f, p): elastic displacements under force patterns (k, p) [m/N]."""

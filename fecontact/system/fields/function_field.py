@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
+from numbers import Real
 from types import CodeType, MappingProxyType
 from typing import Any
 
@@ -142,7 +143,7 @@ def vector_field(
     jacobian: Callable[..., Any] | None = None,
     differentiation: str = "automatic",
     scales: ArrayLike | None = None,
-    period: Callable[[Mapping[str, float]], float] | None = None,
+    period: float | Callable[[Mapping[str, float]], float] | None = None,
 ) -> VectorField:
     """A vector field from a function of one state, compiled by numba.
 
@@ -172,8 +173,8 @@ def vector_field(
         a warning.
     scales : sequence, optional
         Typical size (d,) of each state; one by default. Smaller states are fine.
-    period : callable, optional
-        Period in t from the parameters by name, for a function that depends on t.
+    period : float or callable, optional
+        Period in t [s], or that from the parameters by name, for a function that depends on t.
 
     Raises
     ------
@@ -193,6 +194,7 @@ def vector_field(
     if typical.shape != (len(names),) or not (typical > 0.0).all():
         raise InputError(f"scales = {scales!r} must hold {len(names)} numbers above zero, one for "
                          f"each state.")
+    period_of = _period_of(period)
     rates = compile_law(kernels.RATES, _FORM, function)
     _ = rates.address
     given = None if jacobian is None else compile_law(kernels.JACOBIAN, _FORM, jacobian)
@@ -203,14 +205,23 @@ def vector_field(
     if differentiation != "differences":
         complex_rates = _analytic(function, required)
     if complex_rates is not None:
-        made = FunctionField(rates, given, complex_rates, parameters, names, typical, period,
+        made = FunctionField(rates, given, complex_rates, parameters, names, typical, period_of,
                              required)
         told = _wrong_at_samples(made)
         if told is None:
             return made
         if required:
             raise InputError(told)
-    return FunctionField(rates, given, None, parameters, names, typical, period)
+    return FunctionField(rates, given, None, parameters, names, typical, period_of)
+
+
+def _period_of(period: Any) -> Callable[[Mapping[str, float]], float] | None:
+    if period is None or callable(period):
+        return period
+    if not (isinstance(period, Real) and 0.0 < period < np.inf):
+        raise InputError(f"period = {period!r} must be a number above zero [s], or a function that "
+                         f"returns it from the parameters by name.")
+    return lambda parameters: float(period)
 
 
 def _wrong_at_samples(field: FunctionField) -> str | None:

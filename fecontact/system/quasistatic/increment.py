@@ -130,11 +130,19 @@ def _rub(j, g, g_across, pressing, sliders, pose, room, out):
     for e in range(elements):
         stiffness, limit, first = sliders.stiffness[j, e], sliders.limit[j, e], tangents * e
         R = room.multiplier[j, first] + stiffness * (g - pose.left[j, first])
-        R2 = 0.0
-        size = abs(R)
-        if tangents == 2:
-            R2 = room.multiplier[j, first + 1] + stiffness * (g_across - pose.left[j, first + 1])
-            size = math.hypot(R, R2)
+        if tangents == 1:
+            if abs(R) <= limit * pressing:
+                out[1, 0] += stiffness
+            else:
+                sign = 1.0 if R > 0.0 else -1.0
+                R = sign * limit * pressing
+                out[1, 0] += sign * limit * out[2, 0]
+                out[1, 1] += sign * limit * out[2, 1]
+            pose.force[j, first] = R
+            along += R
+            continue
+        R2 = room.multiplier[j, first + 1] + stiffness * (g_across - pose.left[j, first + 1])
+        size = math.hypot(R, R2)
         if size <= limit * pressing:
             out[1, 0] += stiffness
             out[3, 2] += stiffness
@@ -149,9 +157,7 @@ def _rub(j, g, g_across, pressing, sliders, pose, room, out):
             out[1, 2] -= turn * a * b
             out[3, 0] -= turn * a * b
             out[3, 2] += turn * a * a
-        pose.force[j, first] = R
-        if tangents == 2:
-            pose.force[j, first + 1] = R2
+        pose.force[j, first], pose.force[j, first + 1] = R, R2
         along += R
         across += R2
     return along, across
@@ -170,12 +176,13 @@ def _lean(F, contact, out):
 
 
 @helper
-def _push(row, force, rounding, room):
-    """Add a force along a row to the out-of-balance force, and to the sizes of forces."""
-    for i in range(len(row)):
-        room.residual[i] += row[i] * force
-        room.before[i] += abs(row[i]) * (abs(force) + rounding)
-        room.acting[i] += abs(row[i] * force)
+def _push(away, F, along, T, rounding, room):
+    """Add F along one row and -T along another to the out-of-balance force, and to sizes."""
+    for i in range(len(away)):
+        room.residual[i] += away[i] * F - along[i] * T
+        size = abs(away[i] * F) + abs(along[i] * T)
+        room.acting[i] += size
+        room.before[i] += size + abs(along[i]) * rounding
 
 
 @helper
@@ -226,8 +233,7 @@ def evaluate(load, moved, held_sliders, held_s, held_pose, held_room, derive):
         for e in range(sliders.stiffness.shape[1]):
             springs += sliders.stiffness[j, e]
         rounding = _SPRINGS * (springs * (abs(x) + abs(gone)) + _stretched(j, 0, sliders, pose))
-        _push(s.Ty[j], F, 0.0, room)
-        _push(s.Tx[j], -T, rounding, room)
+        _push(s.Ty[j], F, s.Tx[j], T, rounding, room)
         if derive:
             for i in range(m):
                 tx, ty = s.Tx[j, i], s.Ty[j, i]
@@ -240,7 +246,7 @@ def evaluate(load, moved, held_sliders, held_s, held_pose, held_room, derive):
             node[j, LEANING + second] = F * contact.slope_across
             rounding = _SPRINGS * (springs * (abs(across) + abs(gone_across))
                                    + _stretched(j, 1, sliders, pose))
-            _push(s.T2[j], -T, rounding, room)
+            _push(s.T2[j], 0.0, s.T2[j], T, rounding, room)
             if derive:
                 for i in range(m):
                     tx, ty, t2 = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
