@@ -84,6 +84,7 @@ def _earlier(study: "Study", file: Path, amplitudes: tuple[float, float]) -> "No
     InputError
         If there is none, or it is one of other values.
     """
+    from fecontact.bifurcation.continuation.problem import BranchStatus
     from fecontact.cli.run_files import require_same_study
     from fecontact.output.files.branches import read_mode
 
@@ -96,6 +97,11 @@ def _earlier(study: "Study", file: Path, amplitudes: tuple[float, float]) -> "No
     if abs(begins - amplitudes[0]) > _SAME * amplitudes[0]:
         raise InputError(f"{file} begins at the amplitude {begins:.6g}, not at "
                          f"{amplitudes[0]:g}; give the same --amplitudes, or leave out --resume.")
+    reached = float(mode.amplitude[-1])
+    if (mode.branch.status is BranchStatus.BOUND and reached > 1.5 * amplitudes[0]
+            and abs(reached - amplitudes[1]) > _SAME * amplitudes[1]):
+        raise InputError(f"{file} ends at the amplitude {reached:.6g}, not at {amplitudes[1]:g}; "
+                         f"give the same --amplitudes, or leave out --resume.")
     return mode
 
 

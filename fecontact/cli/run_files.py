@@ -60,7 +60,9 @@ def require_same_study(study: "Study", file: Path, *free: str) -> None:
                          f"leave out --resume.")
 
 
-def write_run(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
+def write_results_of_run(
+    study: "Study", trajectory: "Trajectory", folder: Path
+) -> list[Path]:
     """Write a run and its plots into a folder; returns the files."""
     from fecontact.output.files.case import write_case
 

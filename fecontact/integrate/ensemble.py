@@ -142,6 +142,9 @@ def ensemble(
     seen = [Events.none(state_size(members[0]))] * count
     if not all(isinstance(member, ContactSystem) for member in members):
         require_rodas(solver)
+    if isinstance(solver, Rodas5P) and solver.checkpoint is not None:
+        raise InputError(f"solver = {solver!r}: runs of an ensemble keep no checkpoint; leave it "
+                         f"out.")
     done, leave = [0], [False]
 
     series = solver.series if isinstance(solver, Rodas5P) else "never"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import InputError, choices, nearest
@@ -249,6 +250,10 @@ class Events:
     def __len__(self) -> int:
         return len(self.time)
 
+    def between(self, first: float, last: float) -> "Events":
+        """Events from the time ``first`` to ``last`` [s], both included."""
+        return self._kept((self.time >= first) & (self.time <= last))
+
     def only(self, kind: str | None = None, node: int | None = None) -> "Events":
         """Events of one kind, of one node, or both; InputError for an unknown kind."""
         own = isinstance(kind, str) and kind.startswith("event ") and kind[6:].isdigit()
@@ -260,6 +265,9 @@ class Events:
             keep &= np.array([one == kind for one in self.kind], dtype=bool)
         if node is not None:
             keep &= self.node == node
+        return self._kept(keep)
+
+    def _kept(self, keep: NDArray[np.bool_]) -> "Events":
         return Events(self.time[keep],
                       tuple(one for one, stays in zip(self.kind, keep, strict=True) if stays),
                       self.node[keep], self.states[keep])

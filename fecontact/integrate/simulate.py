@@ -48,8 +48,8 @@ def simulate(
 @overload
 def simulate(
     system: VectorField, t_end: float, *, t_start: float | None = None,
-    initial: FieldRun | ArrayLike, outputs: int | ArrayLike = 1001, solver: Solver = RODAS5P,
-    rtol: float = 1e-6, max_step: float | None = None,
+    initial: Initial | FieldRun | ArrayLike, outputs: int | ArrayLike = 1001,
+    solver: Solver = RODAS5P, rtol: float = 1e-6, max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> FieldRun: ...
@@ -85,6 +85,7 @@ def simulate(
         Relative tolerance; absolute ones follow from it and the scales of laws, or of states.
     max_step : float, optional
         Longest step [s]; at most a fraction of the shortest period of drive, loads and waves.
+        What acts briefly in a field without a period needs a ``max_step``.
     events : ContactEvents, Crossing, Event or sequence of them, optional
         Located within the steps of Rodas5P or SetValued and stored in :attr:`Trajectory.events`.
     progress : bool or callable, optional
@@ -110,6 +111,8 @@ def simulate(
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         require_memory("outputs", int(outputs), _row_size(moving))
     times = output_times(t_start, t_end, outputs)
+    if isinstance(moving, ContactSystem) and isinstance(initial, FieldRun):
+        initial = initial.states[-1]
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_max_step(max_step)
@@ -119,14 +122,14 @@ def simulate(
                          f"{solver!r}; leave them out, or evaluate the outputs of the run.")
     watched = as_events(events)
     if isinstance(system, VectorField):
-        state = field_state(system, initial)
         if isinstance(moving, ContactSystem):
-            run = simulate(moving, t_end, t_start=t_start, initial=state, outputs=times,
+            run = simulate(moving, t_end, t_start=t_start, initial=initial, outputs=times,
                            solver=solver, rtol=rtol, max_step=max_step, events=watched,
                            progress=progress)
             return FieldRun(system.parameters, system.state_names, run.time, run.states, run.status,
                             run.statistics, run.events)
         require_rodas(solver)
+        state = field_state(system, initial)
         with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:
             return run_field(system, state, times, rtol=float(rtol), max_step=max_step,
                              events=watched, progress=tell)
@@ -226,9 +229,10 @@ def _depth_at_rest(system: ContactSystem, time: float) -> float:
 
 def require_rodas(solver: Solver) -> None:
     """Raise InputError unless a solver runs vector fields."""
-    if not isinstance(solver, Rodas5P) or solver.checkpoint is not None:
+    if (not isinstance(solver, Rodas5P) or solver.checkpoint is not None
+            or solver.series == "always"):
         raise InputError(f"solver = {solver!r}: vector fields are run by Rodas5P() without a "
-                         f"checkpoint.")
+                         f"checkpoint or series = 'always'.")
 
 
 def require_max_step(max_step: Any) -> None:

@@ -77,8 +77,8 @@ class Rodas5P(Solver):
     """The compiled Rosenbrock method of order 5, for smooth laws of contact and friction.
 
     Between two switches of contacts whose laws are polynomials piece by piece, without friction,
-    the motion is a power series, which converges for all times: such systems are integrated by
-    these series instead, to nearly round-off and several times faster.
+    the motion is a power series in time, whose coefficients follow from one another: such systems
+    are integrated by these series instead, to nearly round-off and several times faster.
 
     Parameters
     ----------

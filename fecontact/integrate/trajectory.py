@@ -244,7 +244,8 @@ class Trajectory(ContactQuantities, Summarised):
     def between(self, t_start: float | None = None, t_end: float | None = None) -> "Trajectory":
         """Part of the run with the output times from ``t_start`` to ``t_end``, both included.
 
-        Work and losses count from the first of them, as in a run that started there.
+        Work and losses count from the first of them, as in a run that started there. Events
+        are those from the first to the last of these times.
 
         Parameters
         ----------
@@ -266,7 +267,9 @@ class Trajectory(ContactQuantities, Summarised):
             name: values[chosen] - values[chosen.start]
             for name in ("work", "node_friction_work", "node_creep_work")
             if (values := getattr(self, name)) is not None}
-        return replace(self, **kept, **counted)
+        time = kept["time"]
+        events = None if self.events is None else self.events.between(time[0], time[-1])
+        return replace(self, **kept, **counted, events=events)
 
     def displacement(self, point: str | int | tuple[float, ...]) -> Array:
         """Displacement x, y [m] and rotation phi [rad] (N, 3) of a point.

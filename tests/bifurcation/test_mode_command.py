@@ -124,6 +124,18 @@ def test_going_on_needs_the_same_values(cli, file):
                "--resume")[0] == 0
 
 
+def test_a_finished_mode_ends_at_its_amplitude(cli, file):
+    described = Study.read(file)
+    mode = follow_mode(described.system(), described.response, (1e-5, 3e-5), 1)
+    stored = store(described, mode, file.parent / "results")
+    before = stored.read_bytes()
+    code, _, said = cli("modes", file, "--nonlinear", 1, "--amplitudes", 1e-5, 3e-4, "--resume")
+    assert code == 1
+    assert "ends at the amplitude 3e-05, not at 0.0003; give the same --amplitudes" in said
+    assert stored.read_bytes() == before
+    assert cli("modes", file, "--nonlinear", 1, "--amplitudes", 1e-5, 3e-5, "--resume")[0] == 0
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")
 def test_killed_mode_is_never_corrupt(file):

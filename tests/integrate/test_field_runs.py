@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 from fields_in_time import LORENZ, Pendulum
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from systems import impact_oscillator
 
 import fecontact as fc
-from fecontact.bifurcation import contact_field, vector_field
+from fecontact.bifurcation import (
+    VectorField,
+    contact_field,
+    lyapunov_exponents,
+    periodic_motion,
+    vector_field,
+)
 from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.integrate.field_runs.stepper import start_field
 
@@ -158,6 +164,26 @@ def test_fields_of_python_run_as_compiled_ones_do():
     assert np.diff(both[0].events.time) == pytest.approx(period, rel=5e-7)
 
 
+class Pulse(VectorField):
+    """x' = -x + exp(-((t - 3) / 0.3)^2)."""
+
+    def __init__(self):
+        self.parameters, self.state_names = {}, ("x",)
+
+    def rates(self, t, x, values):
+        return -x + np.exp(-((t[:, None] - 3.0) / 0.3) ** 2)
+
+    def derivatives(self, t, x, values, active=()):
+        return self.rates(t, x, values), np.full((len(t), 1, 1), -1.0), np.zeros((len(t), 1, 0))
+
+
+@pytest.mark.parametrize("end", [5.0, 10.0, 30.0, 300.0, 1e4, 1e6])
+def test_the_end_of_a_run_does_not_change_its_begin(end):
+    wanted = quad(lambda s: np.exp(s - 4.0 - ((s - 3.0) / 0.3) ** 2), 0.0, 4.0, points=[3.0])[0]
+    run = fc.simulate(Pulse(), end, initial=[0.0], outputs=[0.0, 4.0, end], rtol=1e-8)
+    assert run.states[1, 0] == pytest.approx(wanted, rel=1e-6)
+
+
 class Failing(Pendulum):
     def rates(self, t, x, values):
         if t[0] > 1.0:
@@ -186,6 +212,23 @@ def test_ensembles_of_fields_are_their_single_runs():
 def test_what_a_field_of_python_raises_comes_through():
     with pytest.raises(ZeroDivisionError, match="no rates"):
         fc.simulate(Failing(), 3.0, initial=[1.0, 0.0])
+
+
+class Interrupted(Pendulum):
+    def rates(self, t, x, values):
+        if t[0] > 8.0:
+            raise KeyboardInterrupt
+        return super().rates(t, x, values)
+
+
+def test_events_before_an_interruption_are_kept():
+    watch = Crossing("angle")
+    run = fc.simulate(Interrupted(), 20.0, initial=[1.0, 0.0], outputs=201, events=watch)
+    assert run.status is fc.Status.INTERRUPTED
+    whole = fc.simulate(Pendulum(), 20.0, initial=[1.0, 0.0], outputs=201, events=watch)
+    before = whole.events.time[whole.events.time < run.time[-1]]
+    assert len(before) > 1
+    assert run.events.time == pytest.approx(before, rel=1e-6)
 
 
 def exploding(t, x, p, out):
@@ -223,12 +266,36 @@ def test_runs_of_contact_fields_are_those_of_their_systems():
     assert run.state_names == ("q1", "q2", "q1'", "q2'")
 
 
+def test_starts_of_contact_fields():
+    system = impact_oscillator(2)
+    field = contact_field(system, {"drive.angular_frequency": None})
+    rest = fc.simulate(field, 0.1, initial="rest")
+    assert (rest.states == fc.simulate(system, 0.1).states).all()
+    # A run goes on from its end, in runs, ensembles, exponents and on the way to orbits.
+    on = fc.simulate(field, 0.2, initial=rest)
+    assert on.time[0] == rest.time[-1]
+    assert (on.states[0] == rest.states[-1]).all()
+    many = fc.ensemble(field, [0.1, 0.2], initial=rest)
+    assert (many.states[0, 0] == rest.states[-1]).all()
+    chaos = [lyapunov_exponents(field, 0.2, initial=start).exponents
+             for start in (rest, rest.states[-1])]
+    assert (chaos[0] == chaos[1]).all()
+    motions = [periodic_motion(field, initial=start, transient=2.0, longest_period=0.5)
+               for start in (rest, rest.states[-1])]
+    assert (motions[0].states == motions[1].states).all()
+
+
 def test_parts_of_runs():
     run = fc.simulate(LORENZ, 2.0, initial=[1.0, 1.0, 1.0], outputs=21)
+    assert run.between(0.5).events is None
     part = run.between(0.5, 1.0)
     assert part.time[0] == 0.5
     assert (part.states == run.states[5:11]).all()
     assert "rho = 28" in repr(run)
+    swing = fc.simulate(Pendulum(), 20.0, initial=[1.0, 0.0], outputs=21, events=Crossing("angle"))
+    late = swing.between(10.0).events
+    assert (late.time == swing.events.time[swing.events.time >= 10.0]).all()
+    assert len(late.kind) == len(late.node) == len(late.states) == len(late) > 1
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
@@ -237,6 +304,7 @@ def test_parts_of_runs():
     ({"initial": [1.0, 2.0, np.nan]}, "must be 3 finite numbers"),
     ({"initial": np.ones(3), "solver": Scipy("Radau")}, "run by Rodas5P"),
     ({"initial": np.ones(3), "solver": Rodas5P(checkpoint="a.npz")}, "without a checkpoint"),
+    ({"initial": np.ones(3), "solver": Rodas5P(series="always")}, "or series = 'always'"),
     ({"initial": np.ones(3), "events": ContactEvents()}, "no contact nodes"),
     ({"initial": np.ones(3), "events": Crossing("w")}, "no state 'w'"),
     ({"initial": np.ones(3), "events": Crossing("x", "y")}, "the name of one alone"),
@@ -245,6 +313,13 @@ def test_parts_of_runs():
 def test_errors_of_runs(arguments, told):
     with pytest.raises(fc.InputError, match=told):
         fc.simulate(LORENZ, 1.0, **arguments)
+
+
+def test_ensembles_keep_no_checkpoint():
+    with pytest.raises(fc.InputError, match="keep no checkpoint; leave it out"):
+        fc.ensemble(impact_oscillator(2), [0.0, 0.1], solver=Rodas5P(checkpoint="a.npz"))
+    with pytest.raises(fc.InputError, match="or series = 'always'"):
+        fc.ensemble(LORENZ, [0.0, 0.1], initial=np.ones(3), solver=Rodas5P(series="always"))
 
 
 def test_contact_systems_need_a_component():

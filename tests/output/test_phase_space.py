@@ -7,11 +7,17 @@ import matplotlib.image
 import numpy as np
 import pytest
 from fields_in_time import LORENZ, Pendulum
-from systems import impact_oscillator
+from systems import friction_oscillator, impact_oscillator
 
 import fecontact as fc
-from fecontact.bifurcation import PeriodicMotion, orbit_branch, poincare_scan, vector_field
-from fecontact.integrate import Crossing
+from fecontact.bifurcation import (
+    PeriodicMotion,
+    contact_field,
+    orbit_branch,
+    poincare_scan,
+    vector_field,
+)
+from fecontact.integrate import ContactEvents, Crossing, Rodas5P, SetValued
 from fecontact.io import read_run, write_run
 from fecontact.plot import plot_branches, plot_phase_space, render_phase_space
 
@@ -111,6 +117,22 @@ def test_runs_come_back_from_files(run, tmp_path):
         assert read.events.kind == run.events.kind
     again = fc.simulate(LORENZ, 11.0, initial=read_run(write_run(tmp_path / "b.h5", RUN)))
     assert (again.states[0] == RUN.states[-1]).all()
+
+
+@pytest.mark.parametrize("solver", [
+    Rodas5P(), SetValued(), SetValued(static_coefficient=[0.85])])
+def test_runs_of_contact_fields_come_back(solver, tmp_path):
+    field = contact_field(friction_oscillator(), {"drive.angular_frequency": None})
+    run = fc.simulate(field, 1.0, initial="rest", solver=solver, events=ContactEvents())
+    read = read_run(write_run(tmp_path / "run.h5", run))
+    assert len(run.events) > 0
+    assert (run.events.node == 0).all()
+    assert (read.events.node == run.events.node).all()
+    assert read.events.kind == run.events.kind
+    wanted = {name: value for name, value in run.statistics.items() if value is not None}
+    assert read.statistics.keys() == wanted.keys()
+    for name, value in wanted.items():
+        assert np.all(read.statistics[name] == np.array(value).tolist()), name
 
 
 def test_runs_of_fields_beneath_branches():

@@ -98,7 +98,8 @@ def modes(
     counted through. With --nonlinear, frequency and damping over the amplitude are written
     (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page whose points play the motion (.html);
     harmonics, the observed displacement and preload are those of [response]. It is stored as it
-    grows; Ctrl-C stops it, --resume goes on where it was.
+    grows; Ctrl-C stops it, --resume goes on where it was. With a `tolerance` it is stored at the
+    end only, and followed anew.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import interfaces_of, read_study
@@ -216,7 +217,7 @@ def run(
     continues it.
     """
     from fecontact.cli.console import waiting
-    from fecontact.cli.run_files import read_study, write_run
+    from fecontact.cli.run_files import read_study, write_results_of_run
     from fecontact.cli.tables import run_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.files.locks import locked
@@ -241,7 +242,7 @@ def run(
         from fecontact.analysis.run_facts import notes
 
         with waiting("Writing"):
-            files = write_run(described, trajectory, folder)
+            files = write_results_of_run(described, trajectory, folder)
         ended = trajectory.status.name
         if ended != "INTERRUPTED":
             checkpoint.unlink(missing_ok=True)

@@ -70,13 +70,17 @@ class FieldRun(Summarised):
     def between(self, t_start: float | None = None, t_end: float | None = None) -> "FieldRun":
         """Part of the run with the output times from ``t_start`` to ``t_end``, both included.
 
+        Events are those from the first to the last of these times.
+
         Raises
         ------
         InputError
             If there are fewer than two output times between them.
         """
         chosen = output_part(self.time, t_start, t_end)
-        return replace(self, time=self.time[chosen], states=self.states[chosen])
+        time = self.time[chosen]
+        events = None if self.events is None else self.events.between(time[0], time[-1])
+        return replace(self, time=time, states=self.states[chosen], events=events)
 
 
 def field_state(moving: VectorField, initial: Any) -> Array:

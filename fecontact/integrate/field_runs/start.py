@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fecontact.core.types import Array
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.field_runs.field_run import field_state
+from fecontact.integrate.field_runs.field_run import FieldRun, field_state
 from fecontact.integrate.initial_state import initial_state
 from fecontact.integrate.rodas5p.driver import start
 from fecontact.integrate.rodas5p.run import Run
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 def start_state(moving: Moving, initial: Any, time: float) -> Array:
     """State (size,) for the start of a run; see ``initial`` of :func:`fecontact.simulate`."""
     if isinstance(moving, ContactSystem):
+        if isinstance(initial, FieldRun):
+            initial = initial.states[-1]
         return initial_state(moving, initial, time)
     return field_state(moving, initial)
 

@@ -13,7 +13,7 @@ from fecontact.core.compiled import f8, helper, i8, integers, kernel, matrix, ro
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.field_runs.variational import VARIED, propagate
+from fecontact.integrate.field_runs.variational import VARIED, propagate, steepest
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.event_kernels import (
     FOUND,
@@ -128,6 +128,10 @@ def _start(t, field, progress, room, output, watch):
         output.states[0, k] = progress.state[k]
     if size > 0.0:
         numbers[LENGTH] = min(numbers[LENGTH], 0.01 / size)
+    # What is at rest may not stay there: the first step does not depend on the end of the run.
+    steep = steepest(progress.J, progress.sizes)
+    if steep > 0.0:
+        numbers[LENGTH] = min(numbers[LENGTH], 0.1 / steep)
     for k in range(len(watch.own)):
         watch.own_values[k] = event_at(watch.own[k])(t, progress.state, watch.own_parameters[k])
     progress.counts[STARTED], progress.counts[OUTPUTS] = 1, 1

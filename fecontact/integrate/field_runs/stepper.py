@@ -107,9 +107,9 @@ class FieldSteps:
         """
         status = step_loop.advance(self.kernel, self.progress, self.room, self.output, self.varied,
                                    self.watch, most)
+        take_events(self.watch, self.found, self.time)
         if self.function is not None and self.function.error is not None:
             raise self.function.error
-        take_events(self.watch, self.found, self.time)
         if status != RUNNING:
             self.moving.heed(self.kernel.wrong)
         return int(status)
@@ -139,7 +139,8 @@ def start_field(
         Error of one step, of each state relative to its largest size so far, or to a thousandth of
         its scale where that is more.
     max_step : float, optional
-        Longest step [s]; at most a quarter of the period of a field that depends on time.
+        Longest step [s]; at most a quarter of the period of a field that depends on time. What
+        acts briefly in a field without a period needs one.
     vary : bool
         Whether to carry derivatives to the state at the output time before along.
     events : sequence of Crossing and Event
@@ -157,13 +158,14 @@ def start_field(
     if kernel is None:
         function = PythonFunction(field)
         kernel = python_field(function.address, values, field.state_scales(values))
-    period, longest = field.forcing_period(values), float(times[-1] - times[0])
+    period, whole = field.forcing_period(values), float(times[-1] - times[0])
+    longest = whole
     if period is not None:
         longest = min(longest, 0.25 * period)
     if max_step is not None:
         longest = min(longest, float(max_step))
     numbers = np.zeros(5)
-    numbers[step_loop.TIME], numbers[step_loop.LENGTH] = times[0], longest
+    numbers[step_loop.TIME], numbers[step_loop.LENGTH] = times[0], min(0.01 * whole, longest)
     vectors, squares = np.zeros((6, d)), np.zeros((2, d, d))
     return FieldSteps(
         field, kernel, function,

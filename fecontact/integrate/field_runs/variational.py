@@ -77,7 +77,7 @@ def varied_for(states: int, outputs: int) -> Varied:
 
 
 @helper
-def _steepest(J, sizes):
+def steepest(J, sizes):
     """Bound of the growth rates of differences by a Jacobian, whatever the units of the states."""
     largest = 0.0
     for i in range(len(sizes)):
@@ -124,7 +124,7 @@ def propagate(step, field, progress, room, varied):
     A step over which differences may change much is divided: what shrinks has to be as accurate as
     what grows.
     """
-    steep = max(_steepest(progress.J, progress.sizes), _steepest(room.J_after, progress.sizes))
+    steep = max(steepest(progress.J, progress.sizes), steepest(room.J_after, progress.sizes))
     parts = int(min(max(np.ceil(step.h * steep / _LARGEST), 1.0), _MOST_PARTS))
     for part in range(parts):
         for stage in range(3):

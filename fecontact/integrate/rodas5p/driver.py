@@ -132,7 +132,8 @@ def start(
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate.address if vary else 0),
         watch_for(system, events, bool(vary)),
-        None if vary else chosen_series(system, state, rtol, max_step, events, work, series))
+        None if vary else chosen_series(
+            system, state, times, rtol, max_step, events, work, series))
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

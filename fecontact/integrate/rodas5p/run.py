@@ -91,11 +91,11 @@ class Run:
 
     @property
     def statistics(self) -> dict[str, int]:
-        """Counts of steps, rejected steps, right-hand sides and Jacobians, or of series."""
+        """Counts of steps, rejected steps, right-hand sides and Jacobians, or of expansions."""
         counts = self.progress.counts
         if self.series is not None:
             return {"steps": int(counts[state.STEPS]), "rejected": int(counts[state.REJECTIONS]),
-                    "series": int(counts[state.RATES])}
+                    "expansions": int(counts[state.RATES])}
         return {"steps": int(counts[state.STEPS]),
                 "rejected": int(counts[state.REJECTIONS]),
                 "right_hand_sides": int(counts[state.RATES]),

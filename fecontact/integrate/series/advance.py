@@ -1,9 +1,10 @@
 """Steps by power series, from one switch of the contacts to the next.
 
-Between two switches forces are polynomials of displacements, velocities and signals, and the series
-of the motion converges for all times. A step is as long as its last coefficients allow, and ends
-before that where a node leaves the piece of its law that acts: at the first zero of its distance
-from the ends of that piece, none of which is missed, or where its force falls to zero.
+Between two switches forces are polynomials of displacements, velocities and signals, and the motion
+is a power series in time, whose coefficients follow from one another. A step is as long as its last
+coefficients allow, and ends before that where a node leaves the piece of its law that acts: at the
+first zero of its distance from the ends of that piece, none of which is missed, or where its force
+falls to zero.
 """
 
 import math
@@ -285,7 +286,8 @@ def _advance_by(problem, progress, output, watch, series, most):
         if part < 0.0:
             numbers[TIME], numbers[STEP] = t, h
             return NOT_FINITE
-        if not part * h >= smallest:
+        # A short first step is only the first; NaN fails.
+        if not (part * h >= smallest or part >= _LARGEST_GROWTH):
             counts[WORST_NODE] = 0
             counts[REJECTIONS] += 1
             numbers[TIME], numbers[STEP] = t, part * h

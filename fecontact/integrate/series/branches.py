@@ -60,8 +60,8 @@ class Series(NamedTuple):
         Those of the penetrations, forces, and of u^2 and u^3.
     powers : (5, n + 1) array
         Those of the powers, then of their integrals.
-    line, room : (3, n + 1), (d, n + 1) arrays
-        Room to work in.
+    line, room : (3, l), (d, n + 1) arrays
+        Room to work in; l is n + 1, or the number of nodes where that is more.
     """
 
     pieces: Array
@@ -92,13 +92,13 @@ SERIES = types.NamedTuple(
 
 
 def chosen_series(
-    system: ContactSystem, state: Array, rtol: float, max_step: float | None,
+    system: ContactSystem, state: Array, times: Array, rtol: float, max_step: float | None,
     events: Sequence[AnyEvent], work: bool, use: str,
 ) -> Series | None:
     """Tables of a system for which series are used; InputError where they cannot 'always' be."""
     if use == "never":
         return None
-    found = obstacle(system, events)
+    found = obstacle(system, events, float(times[0]), float(times[-1]))
     if found is not None:
         if use == "always":
             raise InputError(f"Rodas5P: series = 'always' is for systems whose forces are "
@@ -136,7 +136,7 @@ def _tables(
         np.inf if max_step is None else float(max_step), max(_PART * rtol, _ROUNDING),
         _first_states(system, pieces, state), q, v, forcing,
         np.zeros((len(parts) if work else 0, COEFFICIENTS)), u, F, square, cube,
-        np.zeros((SERIES_POWERS, COEFFICIENTS)), np.zeros((3, COEFFICIENTS)),
+        np.zeros((SERIES_POWERS, COEFFICIENTS)), np.zeros((3, max(COEFFICIENTS, n))),
         np.zeros((DEPTH + 3, COEFFICIENTS)))
 
 
@@ -191,8 +191,10 @@ def acts(piece: Array, u: float, v: float) -> bool:
     return bool(release[2] == 0.0 or release @ [1.0, u, v] > 0.0)
 
 
-def obstacle(system: ContactSystem, events: Sequence[AnyEvent]) -> str | None:
-    """Why series cannot be used for a system and such events, or None."""
+def obstacle(
+    system: ContactSystem, events: Sequence[AnyEvent], begin: float, end: float
+) -> str | None:
+    """Why series cannot be used for a system and such events from begin to end, or None."""
     basis, arrays, ground = system.basis, system.arrays, system.ground
     if basis.dimension == 3:
         return "bodies in space are not among them"
@@ -212,7 +214,7 @@ def obstacle(system: ContactSystem, events: Sequence[AnyEvent]) -> str | None:
         return "the stiffness is not symmetric"
     if not all(isinstance(one, ContactEvents) for one in events):
         return "events other than ContactEvents are not located in them"
-    if events and (arrays.Tx.any() or any(motion.largest_speed(0.0, 1.0) for motion
+    if events and (arrays.Tx.any() or any(motion.largest_speed(begin, end) for motion
                                           in system.prescribed_motion.motions)):
         return "ContactEvents are located in them only where contact nodes do not slide"
     return None

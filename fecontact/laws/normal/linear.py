@@ -124,14 +124,21 @@ class TwoSidedStop(NormalLaw):
         return np.array([np.zeros(nodes), np.broadcast_to(-np.asarray(self.clearance), nodes)])
 
     def pieces(self, share: Array) -> Array | None:
-        """Upper stop, nothing, lower stop, for n = 1 or n = 2; else None."""
+        """Upper stop, nothing, lower stop, for n = 1 or n = 2; else None.
+
+        Nothing is left out where no node has a clearance; None where only some have.
+        """
         K, s, exponent, factor = self.table(share).T
         below = np.where(exponent == 1.0, [K * s, K, 0.0 * K], [-K * s * s, -2.0 * K * s, -K])
         above = np.where(exponent == 1.0, [0.0 * K, K, 0.0 * K], [0.0 * K, 0.0 * K, K])
         if self.kernel is not _two_sided or not np.isin(exponent, (1.0, 2.0)).all():
             return None
+        # Without a clearance one stop begins where the other ends.
+        if not s.all() and s.any():
+            return None
+        middle: list[list[Array | float]] = [[-s, 0.0]] if s.any() else []
         return pieces_of(len(share), [
-            [-np.inf, -s, *below, *(-factor * below), 1.0, 0.0, -factor], [-s, 0.0],
+            [-np.inf, -s, *below, *(-factor * below), 1.0, 0.0, -factor], *middle,
             [0.0, np.inf, *above, *(factor * above), 1.0, 0.0, factor]])
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:

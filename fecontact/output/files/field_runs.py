@@ -4,8 +4,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.files.stored import array, member, require_lengths, text, texts
 from fecontact.integrate.events import Events
@@ -36,9 +34,10 @@ def write_run(path: str | Path, run: FieldRun) -> Path:
         group.create_dataset("parameters/names", data=list(run.parameters), dtype=_text())
         group.create_dataset("parameters/values", data=list(run.parameters.values()), dtype=float)
         for name, value in run.statistics.items():
-            group.create_dataset(f"statistics/{name}", data=value)
+            if value is not None:
+                group.create_dataset(f"statistics/{name}", data=value)
         if run.events is not None:
-            for name in ("time", "states"):
+            for name in ("time", "states", "node"):
                 group.create_dataset(f"events/{name}", data=getattr(run.events, name))
             group.create_dataset("events/kind", data=list(run.events.kind), dtype=_text())
     return path
@@ -66,7 +65,7 @@ def read_run(path: str | Path) -> FieldRun:
             at = array(stored, "time", (None,))
             kinds = texts(stored, "kind") if len(at) else []
             require_lengths("'events'", len(at), kinds)
-            events = Events(at, tuple(kinds), np.full(len(at), -1),
+            events = Events(at, tuple(kinds), array(stored, "node", (len(at),), "i"),
                             array(stored, "states", (len(at), len(names))))
         statistics = {name: _plain(item[()]) for name, item in
                       (member(group, "statistics").items() if "statistics" in group else ())}
@@ -82,4 +81,4 @@ def _text() -> Any:
 
 
 def _plain(value: Any) -> Any:
-    return value.decode() if isinstance(value, bytes) else value.item()
+    return value.decode() if isinstance(value, bytes) else value.tolist()
