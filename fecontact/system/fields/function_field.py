@@ -218,7 +218,7 @@ def vector_field(
 def _period_of(period: Any) -> Callable[[Mapping[str, float]], float] | None:
     if period is None or callable(period):
         return period
-    if not (isinstance(period, Real) and 0.0 < period < np.inf):
+    if not (isinstance(period, Real) and 0.0 < float(period) < np.inf):
         raise InputError(f"period = {period!r} must be a number above zero [s], or a function that "
                          f"returns it from the parameters by name.")
     return lambda parameters: float(period)
