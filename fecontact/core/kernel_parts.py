@@ -73,8 +73,10 @@ class _KernelLibrary(JITCodeLibrary):
                 if not (self.constants or inlined) and function.name.startswith("_ZN9fecontact"):
                     function.add_function_attribute("noinline")
                 # Compiled laws hold functions of the same names that may be shared. The loader
-                # would give them these, which may have lost arguments.
-                function.name += ".inner"
+                # would give them these, which may have lost arguments. Names of numba's own
+                # runtime stay: its optimisation knows them.
+                if function.name.startswith("_ZN"):
+                    function.name += ".inner"
         super()._optimize_final_module()
 
 
