@@ -72,12 +72,12 @@ class _KernelLibrary(JITCodeLibrary):
                 inlined = b"alwaysinline" in b" ".join(function.attributes)
                 if not (self.constants or inlined) and function.name.startswith("_ZN9fecontact"):
                     function.add_function_attribute("noinline")
-                # Compiled laws hold functions of the same names that may be shared. The loader
-                # would give them these, which may have lost arguments. Names of numba's own
-                # runtime stay: its optimisation knows them.
-                if function.name.startswith("_ZN"):
-                    function.name += ".inner"
         super()._optimize_final_module()
+        # Compiled laws hold functions of the same names that may be shared. The loader would give
+        # them these, which may have lost arguments. Optimisation knows some by their names.
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.name not in entries:
+                function.name += ".inner"
 
 
 def kernel_compiler(constants: str) -> Any:
