@@ -14,9 +14,8 @@ from fecontact.bifurcation.continuation.points import special_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
 from fecontact.bifurcation.events.conditions import DURATION, Condition
-from fecontact.bifurcation.events.orbit import EventOrbit
+from fecontact.bifurcation.events.orbit import EventOrbit, anchor
 from fecontact.bifurcation.events.phases import Motion
-from fecontact.bifurcation.events.reduced import reduced
 from fecontact.bifurcation.events.tracing import Traced, traced
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import FecontactError
@@ -150,7 +149,7 @@ def _side(
         found = [point for point in found if point is last or not _is_turn(problem, point, ends)]
         if not options.locate:
             found = [point for point in found if point.kind is None]
-        stored = [reduced(problem, point) for point in found]
+        stored = [_reduced(problem, point) for point in found]
         if not ended:
             return Going([*points, *stored], piece.status if whole else BranchStatus.POINTS,
                          piece.message)
@@ -277,3 +276,24 @@ def _starts(
                 yield problem, found[0], ahead / norm(problem, ahead)
                 return
 
+
+def _reduced(problem: EventOrbit, point: BranchPoint) -> BranchPoint:
+    """A point of a branch with unknowns and tangent as by shooting with one segment."""
+    u, along, d, K = point.u, point.tangent, problem.dimension, problem.count
+    i, after = anchor(problem, u)
+    begin, start, phase = float(problem.begins(u)[i]), problem.starts(u)[i], problem.phases[i]
+    states, moved = problem.motion(u).run(begin, np.array([after]), start, phase, True)
+    rates = problem.motion(u).observed(np.array([begin + after]), states, phase)[1][0]
+    taus = along[K * d : K * d + K]
+    if problem.forced:
+        begun = float(along[K * d + K] + taus[:i].sum())
+        whole = np.ceil(problem.begins(u)[0] / problem.period(u))
+        later = whole * taus.sum() - begun if after > 0.0 else 0.0
+    else:
+        begun, later = 0.0, 0.5 * taus[i]
+    ahead = (moved[:, :d] @ along[i * d : (i + 1) * d] + moved[:, d] * begun
+             + moved[:, d + 1] * along[-1] + rates * later)
+    period = [] if problem.forced else [problem.period(u)]
+    change = [] if problem.forced else [taus.sum()]
+    return replace(point, u=np.concatenate([states[-1], period, u[-1:]]),
+                   tangent=np.concatenate([ahead, change, along[-1:]]))
