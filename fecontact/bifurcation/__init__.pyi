@@ -1,4 +1,5 @@
-from .attractors.basins import Attractor, Axis, Basins, basins
+from .attractors.attractor import Attractor
+from .attractors.basins import Axis, Basins, basins
 from .attractors.lyapunov import LyapunovExponents, lyapunov_exponents
 from .attractors.poincare_scan import PoincareScan, poincare_scan
 from .codim2 import codim2_curve

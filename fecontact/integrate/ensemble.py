@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from numbers import Integral, Real
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,8 @@ from fecontact.integrate.events import AnyEvent, Events, as_events
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.rodas5p import step_loop
-from fecontact.integrate.rodas5p.driver import ENDS
+from fecontact.integrate.rodas5p.driver import ENDS, again
+from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.simulate import require_max_step, require_rodas
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status
@@ -149,9 +151,15 @@ def ensemble(
 
     series = solver.series if isinstance(solver, Rodas5P) else "never"
 
-    def compiled(index: int, state: Array) -> None:
-        run = start_any(members[index], state, instants[index], rtol=float(rtol),
-                        max_step=max_step, events=watched, series=series)
+    def compiled(index: int, state: Array, before: "_Before") -> None:
+        system = members[index]
+        if before.run is not None and system is before.system and not watched and np.array_equal(
+                instants[index], before.run.times):
+            run: Any = again(before.run, before.system, state)
+        else:
+            run = start_any(system, state, instants[index], rtol=float(rtol), max_step=max_step,
+                            events=watched, series=series)
+        before.keep(system, run)
         result = step_loop.RUNNING
         while result == step_loop.RUNNING:
             if leave[0]:
@@ -161,7 +169,7 @@ def ensemble(
         seen[index] = run.events
         status[index], steps[index] = ENDS[result], run.statistics["steps"]
 
-    def other(index: int, state: Array) -> None:
+    def other(index: int, state: Array, before: "_Before") -> None:
         def look(time: float) -> None:
             if leave[0]:
                 raise _LeftError
@@ -181,19 +189,29 @@ def ensemble(
 
     run_one = compiled if isinstance(solver, Rodas5P) else other
 
-    def run_chain(first: int) -> None:
-        last: Array | None = None
-        for index in range(first, min(first + chain, count)):
-            try:
-                run_one(index, starts(index) if last is None else last)
-            except _LeftError:
-                return
-            last = states[index, -1] if np.isfinite(states[index, -1]).all() else None
-            done[0] += 1
+    firsts, turn = iter(range(0, count, chain)), Lock()
 
+    def run_chains() -> None:
+        before = _Before()
+        while True:
+            with turn:
+                first = next(firsts, count)
+            if first == count:
+                return
+            last: Array | None = None
+            for index in range(first, min(first + chain, count)):
+                try:
+                    run_one(index, starts(index) if last is None else last, before)
+                except _LeftError:
+                    return
+                last = states[index, -1] if np.isfinite(states[index, -1]).all() else None
+                with turn:
+                    done[0] += 1
+
+    threads = min(workers or os.cpu_count() or 1, -(-count // chain))
     with (shown(progress, lambda: progress_bar("Running", count)) as tell,
-          ThreadPoolExecutor(workers or os.cpu_count()) as pool):
-        pending = {pool.submit(run_chain, first) for first in range(0, count, chain)}
+          ThreadPoolExecutor(threads) as pool):
+        pending = {pool.submit(run_chains) for _ in range(threads)}
         try:
             while pending:
                 ended, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
@@ -205,6 +223,19 @@ def ensemble(
             leave[0] = True
             raise
     return Ensemble(instants, states, tuple(status), steps, tuple(seen) if watched else None)
+
+
+@dataclass
+class _Before:
+    """The last run of a thread, whose tables serve the next one of the same system."""
+
+    system: ContactSystem | None = None
+    run: Run | None = None
+
+    def keep(self, system: Moving, run: Any) -> None:
+        """Keep it if it is of a contact system."""
+        if isinstance(system, ContactSystem):
+            self.system, self.run = system, run
 
 
 class _LeftError(Exception):

@@ -1,7 +1,7 @@
 """The contact system: a modal basis, laws at its contact nodes, drive and load."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Literal, cast
@@ -137,6 +137,11 @@ class ContactSystem(Summarised):
                 object.__setattr__(self, name, value)
         self._check()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Without what is made of them: addresses of compiled laws differ between processes.
+        given = (getattr(self, one.name) for one in fields(self))
+        return type(self), tuple(dict(one) if isinstance(one, Mapping) else one for one in given)
+
     def _check(self) -> None:
         """Check all parts and bring them into their stored form."""
         if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
@@ -150,8 +155,8 @@ class ContactSystem(Summarised):
             object.__setattr__(self, "friction", ConstantFriction(0.0))
         for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} must be a "
-                                 f"{kind.__name__}.")
+                given = getattr(self, name)
+                raise InputError(f"ContactSystem: {name} = {given!r} must be a {kind.__name__}.")
         for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
             given = getattr(self, name)
             if isinstance(given, Mapping):
@@ -159,8 +164,7 @@ class ContactSystem(Summarised):
                 object.__setattr__(self, name, MappingProxyType(dict(given)))
             for one in getattr(self, name).values() if isinstance(given, Mapping) else (given,):
                 if not isinstance(one, law):
-                    raise InputError(f"ContactSystem: {name} = {one!r} must be a "
-                                     f"{law.__name__}.")
+                    raise InputError(f"ContactSystem: {name} = {one!r} must be a {law.__name__}.")
         if self.basis.dimension == 2:
             for what, needs in (("Ground", self.ground.in_space), ("Drive", self.drive.in_space)):
                 if needs:
@@ -342,8 +346,7 @@ class ContactSystem(Summarised):
         if times.ndim != 1 or states.shape != (len(times), self.size):
             raise InputError(f"The states at {times.size} times must have shape ({times.size}, "
                              f"{self.size}), not {states.shape}.")
-        out = np.empty((len(times), self.basis.contact_nodes,
-                        kernels.state_columns(self.arrays)))
+        out = np.empty((len(times), self.basis.contact_nodes, kernels.state_columns(self.arrays)))
         kernels.contact_history(times, states, self.arrays, out)
         return out
 
@@ -420,8 +423,7 @@ class ContactSystem(Summarised):
         names = (*self.parameters(), "gap", *PARTS)
         names = tuple(name for name in names if name != "sliding" or self.sliding)
         return InputError(f"The system has no parameter '{outer_name(self, name)}'"
-                          f"{nearest(name, names)}; "
-                          f"its parameters are: {choices(names)}.")
+                          f"{nearest(name, names)}; its parameters are: {choices(names)}.")
 
 
 def _sliding_speed(sliding: Sliding) -> str:

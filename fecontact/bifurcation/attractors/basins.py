@@ -1,13 +1,20 @@
 """Basins of attraction on a plane of initial states."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from numbers import Real
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from fecontact.bifurcation.attractors.attractor import Attractor, told_apart
+from fecontact.bifurcation.attractors.blocks import Found, Place, mark_of, work_off
+from fecontact.bifurcation.attractors.labels import Settled
 from fecontact.core.errors import InputError
+from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
@@ -18,6 +25,7 @@ from fecontact.system.fields.in_time import Moving, in_time, state_size
 
 # Looks at the second half of a run, in parts of the first.
 _LATE = (1.0 + 0.5 / np.sqrt(3.0), 1.0 + 1.0 / np.sqrt(2.0))
+_LARGEST = 4096  # starts in a block
 
 
 @dataclass(frozen=True)
@@ -55,25 +63,6 @@ class Axis:
 
 
 @dataclass(frozen=True, eq=False)
-class Attractor:
-    """A motion that others settle on.
-
-    Attributes
-    ----------
-    kind : 'equilibrium', 'periodic' or 'aperiodic'
-        The last where its section has more points than were kept, or none that repeat.
-    points : (k, size) array
-        States on its section, each once; its place for an equilibrium.
-    share : float
-        Part of the starts that lead to it.
-    """
-
-    kind: Literal["equilibrium", "periodic", "aperiodic"]
-    points: Array
-    share: float
-
-
-@dataclass(frozen=True, eq=False)
 class Basins:
     """Which attractor each start leads to.
 
@@ -107,6 +96,8 @@ def basins(
     solver: Solver = RODAS5P,
     rtol: float = 1e-6,
     workers: int | None = None,
+    folder: str | Path | None = None,
+    executor: Executor | None = None,
     progress: bool | Callable[[int], None] | None = None,
 ) -> Basins:
     """Run from a grid of initial states, and classify the motions on which they settle.
@@ -134,12 +125,20 @@ def basins(
         velocity, of all starts and sections; of a field each state in parts of its largest.
     solver, rtol, workers, progress
         As for :func:`fecontact.ensemble`.
+    folder : path, optional
+        Where finished blocks of runs are kept, some thousand starts each; a call that was ended
+        or killed goes on from there, with the same result.
+    executor : concurrent.futures.Executor, optional
+        What computes the blocks in place of this process: processes, or a cluster by
+        :func:`fecontact.sweeps.dask_executor`. Needs a folder.
 
     Raises
     ------
     InputError
-        For values out of range, for two quantities that no state has independently, and as
-        :func:`fecontact.ensemble`.
+        For values out of range, for two quantities that no state has independently, for a folder
+        that is in use or of other runs, and as :func:`fecontact.ensemble`.
+    AnalysisError
+        If the executor broke; finished blocks are kept.
     """
     moving = in_time("basins", system)
     size = state_size(moving)
@@ -159,36 +158,88 @@ def basins(
                          f"itself, as the modes of a body or the same state; take other axes.")
     wanted = np.stack(np.meshgrid(a, b, indexing="ij"), axis=-1).reshape(-1, 2)
     states = start + (wanted - rows @ start) @ np.linalg.pinv(rows).T
-    settings: dict[str, Any] = {"initial": states, "solver": solver, "rtol": rtol,
-                                "workers": workers, "progress": progress}
+    place = Place.checked("basins", folder, executor, workers)
     if section is None:
         if transient_periods is None or transient is not None:
             raise InputError("basins: without a section give transient_periods, the periods of "
                              "the excitation before states count, and no transient.")
-        found = strobe(moving, transient_periods=transient_periods, keep=keep, **settings)
-        sets: list[Array | None] = [
-            points if fine else None
-            for points, fine in zip(found.states, found.finished, strict=True)]
-        still = [False] * len(sets)
-    else:
-        if transient_periods is not None or not (
-                isinstance(transient, Real) and 0.0 < transient < np.inf):
-            raise InputError(f"basins: transient = {transient!r} must be a time above zero [s] "
-                             f"before passages of the section count, without "
-                             f"transient_periods.")
-        # At times without a common measure: no motion is at one place at all of them.
-        late = float(transient) * np.array([0.0, 1.0, *_LATE, 2.0])
-        found = ensemble(moving, late, events=section, **settings)
-        sets, still, farthest = [], [], np.abs(states).max(axis=0)[np.newaxis]
-        for events, ends, fine in zip(found.events or (), found.states, found.finished,
-                                      strict=True):
-            passed = events.states[events.time > transient][-keep:]
-            kept = np.vstack([ends[1:], passed])
-            still.append(len(passed) == 0 or bool(
-                (np.ptp(kept, axis=0) < tolerance * _scale(moving, farthest, [kept])).all()))
-            sets.append(None if not fine else ends[-1:] if still[-1] else passed)
-    labels, attractors = _told_apart(sets, still, _scale(moving, states, sets), tolerance)
+    elif transient_periods is not None or not (
+            isinstance(transient, Real) and 0.0 < transient < np.inf):
+        raise InputError(f"basins: transient = {transient!r} must be a time above zero [s] "
+                         f"before passages of the section count, without transient_periods.")
+    settle = _Settle(moving, solver, rtol, keep, transient_periods, float(transient or 0.0),
+                     section, tolerance, np.abs(states).max(axis=0))
+    size_of_block = int(np.clip(len(states) // 64, 16, _LARGEST))
+    blocks = [_Starts(settle, part) for part
+              in np.split(states, range(size_of_block, len(states), size_of_block))]
+    with shown(progress, lambda: progress_bar("Running", len(states))) as tell:
+        readers = work_off(blocks, place, mark_of(
+            moving, solver, rtol, keep, transient_periods, transient, section, tolerance, states,
+        ) if folder is not None else "", tell)
+    parts = [partial(_settled, read) for read in readers]
+    labels, attractors = told_apart(parts, _scale(moving, states, parts), tolerance)
     return Basins(a, b, labels.reshape(len(a), len(b)), attractors)
+
+
+@dataclass(frozen=True, eq=False)
+class _Settle:
+    """How runs are followed to where they settle; ``farthest`` (size,) of all starts."""
+
+    moving: Moving
+    solver: Solver
+    rtol: float
+    keep: int
+    transient_periods: int | None
+    transient: float
+    section: Crossing | None
+    tolerance: float
+    farthest: Array
+
+    def settled(self, states: Array, tell: Callable[[int], None] | None) -> Settled:
+        """Where runs from some states settle."""
+        settings: dict[str, Any] = {"initial": states, "solver": self.solver, "rtol": self.rtol,
+                                    "workers": 1, "progress": tell}
+        rows, still = np.full(len(states), -1), np.zeros(len(states), dtype=np.int64)
+        if self.section is None:
+            found = strobe(self.moving, transient_periods=self.transient_periods or 0,
+                           keep=self.keep, **settings)
+            rows[found.finished] = self.keep
+            return Settled(found.states, rows, still)
+        # At times without a common measure: no motion is at one place at all of them.
+        late = self.transient * np.array([0.0, 1.0, *_LATE, 2.0])
+        found = ensemble(self.moving, late, events=self.section, **settings)
+        points = np.full((len(states), self.keep, states.shape[1]), np.nan)
+        for e, (events, ends, fine) in enumerate(zip(found.events or (), found.states,
+                                                     found.finished, strict=True)):
+            passed = events.states[events.time > self.transient][-self.keep :]
+            kept = np.vstack([ends[1:], passed])
+            size = np.vstack([self.farthest, kept])
+            still[e] = len(passed) == 0 or bool(
+                (np.ptp(kept, axis=0) < self.tolerance * _size(self.moving, size)).all())
+            if fine:
+                own = ends[-1:] if still[e] else passed
+                points[e, : len(own)], rows[e] = own, len(own)
+        return Settled(points, rows, still)
+
+
+@dataclass(frozen=True, eq=False)
+class _Starts:
+    """A block of starts."""
+
+    settle: _Settle
+    states: Array
+
+    @property
+    def runs(self) -> int:
+        return len(self.states)
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        number, size = self.states.shape
+        return {"points": (number, self.settle.keep, size), "rows": (number,), "still": (number,)}
+
+    def found(self, tell: Callable[[int], None] | None = None) -> Found:
+        return self.settle.settled(self.states, tell)._asdict()
 
 
 def _values(name: str, given: Any) -> Array:
@@ -204,68 +255,29 @@ def _values(name: str, given: Any) -> Array:
     return found
 
 
-def _scale(moving: Moving, starts: Array, sets: list[Array | None]) -> Array:
+def _settled(read: Callable[[], Found]) -> Settled:
+    return Settled(**read())
+
+
+def _scale(moving: Moving, starts: Array, parts: Sequence[Callable[[], Settled]]) -> Array:
     """Size (size,) of displacements, velocities and internal variables, each the same for all.
 
     Of a field the size of each state.
     """
-    size = np.abs(np.vstack([starts, *(points for points in sets if points is not None)])).max(
-        axis=0)
+    farthest = np.abs(starts).max(axis=0)
+    for read in parts:
+        found = read()
+        settled = np.arange(found.points.shape[1]) < found.rows[:, None]
+        farthest = np.maximum(farthest, np.abs(found.points[settled]).max(axis=0, initial=0.0))
+    return _size(moving, farthest[np.newaxis])
+
+
+def _size(moving: Moving, states: Array) -> Array:
+    """The same of states (N, size)."""
+    size = np.abs(states).max(axis=0)
     if not isinstance(moving, ContactSystem):
         return np.where(size > 0.0, size, 1.0)
     m, scale = moving.basis.modes, np.ones(len(size))
     for part in (slice(0, m), slice(m, 2 * m), slice(2 * m, None)):
         scale[part] = size[part].max(initial=0.0) or 1.0
     return scale
-
-
-def _told_apart(
-    sets: list[Array | None], still: list[bool], scale: Array, tolerance: float
-) -> tuple[Integers, tuple[Attractor, ...]]:
-    """Label of each set of points, and the attractors by frequency."""
-    labels = np.full(len(sets), -1)
-    kinds: list[Literal["equilibrium", "periodic", "aperiodic"]] = []
-    prototypes: list[Array] = []
-    for index, points in enumerate(sets):
-        if points is None:
-            continue
-        period = None if still[index] else _period(points / scale, tolerance)
-        kind: Literal["equilibrium", "periodic", "aperiodic"] = (
-            "equilibrium" if still[index] else "aperiodic" if period is None else "periodic")
-        own = points[-(period or len(points)) :]
-        for label, (other, prototype) in enumerate(zip(kinds, prototypes, strict=True)):
-            if other == kind and _same(own / scale, prototype / scale, kind, tolerance):
-                labels[index] = label
-                break
-        else:
-            labels[index] = len(kinds)
-            kinds.append(kind)
-            prototypes.append(own)
-    counts = np.bincount(labels[labels >= 0], minlength=len(kinds))
-    order = np.argsort(-counts, kind="stable")
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    labels[labels >= 0] = rank[labels[labels >= 0]]
-    return labels, tuple(Attractor(kinds[k], prototypes[k], counts[k] / len(sets)) for k in order)
-
-
-def _period(points: Array, tolerance: float) -> int | None:
-    """Number of points after which they repeat, or None if they do not."""
-    for period in range(1, len(points) // 2 + 1):
-        if np.abs(points[period:] - points[:-period]).max() < tolerance:
-            return period
-    return None
-
-
-def _same(one: Array, other: Array, kind: str, tolerance: float) -> bool:
-    """Whether two motions are the same: every point of each near one of the other.
-
-    Aperiodic ones by the box that they fill, to a fifth of its size.
-    """
-    if kind == "aperiodic":
-        size = np.maximum(np.ptp(one, axis=0), np.ptp(other, axis=0))
-        low = np.abs(one.min(axis=0) - other.min(axis=0))
-        high = np.abs(one.max(axis=0) - other.max(axis=0))
-        return bool((np.maximum(low, high) <= 0.2 * size + tolerance).all())
-    distance = np.abs(one[:, None] - other[None]).max(axis=2)
-    return bool(max(distance.min(axis=0).max(), distance.min(axis=1).max()) < 2.0 * tolerance)

@@ -1,14 +1,17 @@
 """Poincare sections of runs over a parameter, swept up and down."""
 
-import os
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from fecontact.bifurcation.attractors.blocks import Found, Place, mark_of, work_off
 from fecontact.core.errors import InputError
+from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
@@ -17,6 +20,9 @@ from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import Moving, in_time, state_size
 from fecontact.system.forcing_period import forcing_period
+
+# Chains each way where their number is not given, and the longest of many values.
+_CHAINS, _LONGEST = 16, 1000
 
 Change = str | Callable[[Any, float], Moving]
 
@@ -77,6 +83,8 @@ def poincare_scan(
     solver: Solver = RODAS5P,
     rtol: float = 1e-5,
     workers: int | None = None,
+    folder: str | Path | None = None,
+    executor: Executor | None = None,
     progress: bool | Callable[[int], None] | None = None,
 ) -> PoincareScan:
     """Move a parameter up and down in small steps; keep states once per period or on a section.
@@ -107,18 +115,22 @@ def poincare_scan(
     down : bool
         Whether to go down again.
     chains : int, optional
-        Number of chains each way; default eight a core, at least eight values long.
+        Number of chains each way; default sixteen, of 8 to 1000 values, and more of more values.
     solver, rtol, workers, progress
         As for :func:`fecontact.ensemble`.
+    folder, executor
+        Where finished chains are kept, and what computes them; see
+        :func:`fecontact.bifurcation.basins`.
 
     Raises
     ------
     InputError
-        For values that do not ascend, or as :func:`fecontact.integrate.strobe`.
+        For values that do not ascend, for a folder that is in use or of other runs, or as
+        :func:`fecontact.integrate.strobe`.
+    AnalysisError
+        If the executor broke; finished chains are kept.
     """
     moving = in_time("poincare_scan", system)
-    settings: dict[str, Any] = {"initial": initial, "solver": solver, "rtol": rtol,
-                                "workers": workers, "progress": progress}
     if not (isinstance(keep, Integral) and keep >= 1):
         raise InputError(f"keep = {keep!r} must be a whole number from 1 on.")
     if section is None and transient is not None:
@@ -137,36 +149,89 @@ def poincare_scan(
         raise InputError("values must be finite numbers in ascending order.")
     if chains is not None and not (isinstance(chains, Integral) and chains >= 1):
         raise InputError(f"chains = {chains!r} must be a whole number from 1 on.")
-    if isinstance(parameter, str):
-        name, made = parameter, [in_time("poincare_scan", system.with_(**{parameter: float(p)}))
-                                 for p in points]
-    else:
-        if not callable(parameter):
-            raise InputError(f"poincare_scan: parameter must be a text or a function, not "
-                             f"{type(parameter).__name__}.")
-        name = getattr(parameter, "__name__", "parameter")
-        made = [parameter(system, float(p)) for p in points]
+    if not isinstance(parameter, str) and not callable(parameter):
+        raise InputError(f"poincare_scan: parameter must be a text or a function, not "
+                         f"{type(parameter).__name__}.")
+    place = Place.checked("poincare_scan", folder, executor, workers)
+    passes = None if section is None else (section, float(transient or 0.0))
+    task = _Task(system, parameter, 200 if transient_periods is None else transient_periods,
+                 passes, int(keep), initial, solver, rtol)
+    ends = [task.system_at(float(value)) for value in points[[0, -1]]]
     if section is None:
-        for one in made:
-            forcing_period(one)
+        for made in ends:
+            forcing_period(made)
     count = len(points)
-    most = chains or min(8 * (os.cpu_count() or 1), max(count // 8, 1))
+    most = chains or max(min(_CHAINS, count // 8), count // _LONGEST, 1)
     length = -(-count // min(most, count))
     # All chains have the same length; where the values do not divide, the last ones are run twice.
-    order = np.arange(length * -(-count // length))
+    order = np.arange(length * -(-count // length)).reshape(-1, length)
     order = np.minimum(order, count - 1)
-    both = [order] + ([count - 1 - order] if down else [])
-    index = np.concatenate(both)
-    runs = [made[k] for k in index]
+    ways = [order] + ([count - 1 - order] if down else [])
+    blocks = [_Chain(task, points[chain]) for way in ways for chain in way]
+    mark = "" if folder is None else "".join(
+        mark_of(made, *task.settings, points, length, down) for made in ends)
+    with shown(progress, lambda: progress_bar("Running", len(blocks) * length)) as tell:
+        readers = work_off(blocks, place, mark, tell)
     states = np.empty((2, count, keep, state_size(moving)))
-    if section is None:
-        periods = 200 if transient_periods is None else transient_periods
-        kept = strobe(runs, transient_periods=periods, keep=keep, chain=length, **settings).states
-    else:
-        kept = _passages(runs, section, float(transient or 0.0), keep, chain=length, **settings)
-    for way, part in enumerate(both):
-        states[way, part] = kept[way * len(order) : (way + 1) * len(order)]
+    for way, chains_of_way in enumerate(ways):
+        for number, chain in enumerate(chains_of_way):
+            states[way, chain] = readers[way * len(order) + number]()["states"]
+    name = parameter if isinstance(parameter, str) else getattr(parameter, "__name__", "parameter")
     return PoincareScan(moving, name, points, states[0], states[1] if down else states[1, :0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What is done at each value; ``passes`` are a section and the time before it counts."""
+
+    system: Any
+    parameter: Change
+    transient_periods: int
+    passes: tuple[Crossing, float] | None
+    keep: int
+    initial: Any
+    solver: Solver
+    rtol: float
+
+    def system_at(self, value: float) -> Moving:
+        """The system at a value of the parameter."""
+        if isinstance(self.parameter, str):
+            return in_time("poincare_scan", self.system.with_(**{self.parameter: value}))
+        return self.parameter(self.system, value)
+
+    @property
+    def settings(self) -> tuple[Any, ...]:
+        """All that results depend on beside the systems."""
+        return (self.transient_periods, self.passes, self.keep, self.initial, self.solver,
+                self.rtol)
+
+
+@dataclass(frozen=True, eq=False)
+class _Chain:
+    """Values that are run one after the other, each from where the one before it ended."""
+
+    task: _Task
+    values: Array
+
+    @property
+    def runs(self) -> int:
+        return len(self.values)
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        size = state_size(in_time("poincare_scan", self.task.system))
+        return {"states": (self.runs, self.task.keep, size)}
+
+    def found(self, tell: Callable[[int], None] | None = None) -> Found:
+        task = self.task
+        runs = [task.system_at(float(value)) for value in self.values]
+        settings: dict[str, Any] = {
+            "initial": task.initial, "solver": task.solver, "rtol": task.rtol, "workers": 1,
+            "progress": tell, "chain": self.runs}
+        if task.passes is not None:
+            return {"states": _passages(runs, *task.passes, task.keep, **settings)}
+        return {"states": strobe(runs, transient_periods=task.transient_periods, keep=task.keep,
+                                 **settings).states}
 
 
 def _passages(

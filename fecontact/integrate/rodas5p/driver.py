@@ -17,10 +17,17 @@ from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.run import Run
-from fecontact.integrate.rodas5p.state import Control, Output, Problem, progress_for, room_for
+from fecontact.integrate.rodas5p.state import (
+    Control,
+    Output,
+    Problem,
+    Progress,
+    progress_for,
+    room_for,
+)
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, propagate, variation_for
-from fecontact.integrate.series.branches import chosen_series
+from fecontact.integrate.series.branches import chosen_series, from_state
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
@@ -83,8 +90,7 @@ def start(
     series : 'auto', 'always' or 'never'
         Whether to expand the motion in power series; see :class:`fecontact.integrate.Rodas5P`.
     """
-    if not np.isfinite(state).all():
-        raise InputError("The initial state holds values that are not finite.")
+    _require_finite(state)
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)
@@ -98,8 +104,6 @@ def start(
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
     longest = longest_step(system, times, max_step)
-    with np.errstate(over="ignore", invalid="ignore"):
-        energy = energy_scale(system, state)
     breaks = np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float)
     above, below, width, columns = system, system, 0.0, 0
     if vary:
@@ -114,15 +118,11 @@ def start(
         largest=largest,
         breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
-        speed_scale=system.velocity_scale, energy_scale=energy,
+        speed_scale=system.velocity_scale, energy_scale=_energy_scale(system, state),
         work=int(work), unfelt=first_unfelt.address)
-    with np.errstate(over="ignore", invalid="ignore"):
-        acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
-    first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
-                0.01 * longest)
     return Run(
         Problem(system.arrays, blocks_of(basis, system.arrays), control),
-        progress_for(state, float(times[0]), first, m, n, basis.dimension),
+        _progress(system, control, float(times[0]), state),
         room_for(m, n, states, basis.dimension),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
@@ -134,6 +134,42 @@ def start(
         watch_for(system, events, bool(vary)),
         None if vary else chosen_series(
             system, state, times, rtol, max_step, events, work, series))
+
+
+def again(run: Run, system: ContactSystem, state: Array) -> Run:
+    """The run anew from another state of its system, without derivatives and watched events.
+
+    It shares the room to work in, and its tables, with the run before, which must have ended.
+    """
+    _require_finite(state)
+    control = run.problem.control._replace(energy_scale=_energy_scale(system, state))
+    output = run.output
+    return Run(
+        run.problem._replace(control=control),
+        _progress(system, control, float(run.times[0]), state), run.room,
+        Output(output.times, np.zeros_like(output.states), np.zeros_like(output.work)),
+        run.variation, run.watch,
+        None if run.series is None else from_state(run.series, system, state))
+
+
+def _require_finite(state: Array) -> None:
+    if not np.isfinite(state).all():
+        raise InputError("The initial state holds values that are not finite.")
+
+
+def _energy_scale(system: ContactSystem, state: Array) -> float:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return energy_scale(system, state)
+
+
+def _progress(system: ContactSystem, control: Control, time: float, state: Array) -> Progress:
+    """Before the first step, whose length the acceleration at the start limits."""
+    basis, m = system.basis, system.basis.modes
+    with np.errstate(over="ignore", invalid="ignore"):
+        acceleration = np.abs(system.rhs(time, state)[m : 2 * m]) * control.largest
+    first = min(0.1 * control.speed_scale / max(float(acceleration.max()), 1e-300),
+                0.01 * control.longest)
+    return progress_for(state, time, first, m, basis.contact_nodes, basis.dimension)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

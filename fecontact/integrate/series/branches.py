@@ -140,6 +140,11 @@ def _tables(
         np.zeros((DEPTH + 3, COEFFICIENTS)))
 
 
+def from_state(series: Series, system: ContactSystem, state: Array) -> Series:
+    """The tables at the start of a run of the same system from another state."""
+    return series._replace(states=_first_states(system, series.pieces, state))
+
+
 def law_pieces(system: ContactSystem) -> Array:
     """Pieces (n, p, 11) of the normal laws of all nodes, which must have some."""
     found = [law.pieces(share) for _, share, law in system.law_groups("normal")]

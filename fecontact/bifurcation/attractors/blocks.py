@@ -1,0 +1,271 @@
+"""Many runs in blocks, on threads or other processes, each block kept in a file where asked for.
+
+A folder of blocks belongs to one computation, by the mark in ``blocks.json``. Blocks are written
+whole or not at all; those that are there are not computed again.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from os import cpu_count
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact import __version__
+from fecontact.core.checks import as_path
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.files.atomic_write import clear_leftovers, output_folder, replaced, write_text
+from fecontact.core.files.locks import locked
+from fecontact.core.files.stored import DamagedError, from_json, npz_arrays, reading
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.in_time import Moving, state_size
+
+Found = dict[str, NDArray[Any]]
+_ABOUT = "blocks.json"
+_AHEAD = 1000  # blocks given to an executor that does not tell how many workers it has
+
+
+class Block(Protocol):
+    """Some runs that are computed together; others can pickle it."""
+
+    @property
+    def runs(self) -> int:
+        """How many."""
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of the arrays that are found, by name."""
+
+    def found(self, tell: Callable[[int], None] | None = None) -> Found:
+        """Compute them; ``tell`` is called with the number of runs done, and may raise."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where blocks are computed and kept.
+
+    Attributes
+    ----------
+    folder : Path or None
+        Where they are kept; None in memory.
+    executor : Executor or None
+        What computes them; None threads of this process, ``workers`` of them.
+    """
+
+    folder: Path | None
+    executor: Executor | None
+    workers: int | None
+
+    @classmethod
+    def checked(
+        cls, owner: str, folder: str | Path | None, executor: Executor | None, workers: int | None,
+    ) -> "Place":
+        """The place that arguments name.
+
+        Raises
+        ------
+        InputError
+            For what is no executor, one without a folder, and a number of workers beside it.
+        """
+        if executor is not None:
+            if not callable(getattr(executor, "submit", None)):
+                raise InputError(f"{owner}: executor = {executor!r} must have the methods of "
+                                 f"concurrent.futures.Executor.")
+            if folder is None:
+                raise InputError(f"{owner}: an executor needs a folder, where finished blocks are "
+                                 f"kept; give folder='runs' too.")
+            if workers is not None:
+                raise InputError(f"{owner}: workers = {workers!r} has no effect beside an "
+                                 f"executor, which has its own; leave it out.")
+        return cls(None if folder is None else as_path(folder, f"{owner}: folder"), executor,
+                   workers)
+
+
+def mark_of(moving: Moving, *settings: Any) -> str:
+    """A mark that tells computations of other systems or settings apart."""
+    mark = hashlib.sha256(__version__.encode())
+    if isinstance(moving, ContactSystem):
+        for kind in ("normal", "friction"):
+            for nodes, share, law in moving.law_groups(kind):
+                mark.update(f"{kind} {nodes} {type(law).__qualname__}".encode())
+                mark.update(np.ascontiguousarray(law.table(share)).tobytes())
+        for item in moving.arrays:
+            # Addresses of laws are integers, and differ from process to process.
+            if np.asarray(item).dtype.kind == "f":
+                mark.update(np.ascontiguousarray(item).tobytes())
+        settings = (*settings, sorted((name, repr(value)) for name, value
+                                      in moving.parameters().items()))
+    else:
+        # What a function does tells more of it than its name.
+        places = np.random.default_rng(0).normal(size=(3, state_size(moving)))
+        rates = moving.rates(np.array([0.0, 0.1, 0.2]), places * moving.state_scales(moving.values),
+                             moving.values)
+        mark.update(" ".join(f"{rate:.9e}" for rate in rates.ravel()).encode())
+        settings = (*settings, moving.state_names, dict(moving.parameters))
+    for one in settings:
+        mark.update(np.ascontiguousarray(one).tobytes() if isinstance(one, np.ndarray)
+                    else repr(one).encode())
+    return mark.hexdigest()
+
+
+def work_off(
+    blocks: Sequence[Block], place: Place, mark: str, tell: Callable[[int], None] | None,
+) -> list[Callable[[], Found]]:
+    """What all blocks found, in their order, each by a function that reads it.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, is in use, or holds another computation.
+    AnalysisError
+        If the executor broke; finished blocks are kept.
+    """
+    if place.folder is None:
+        kept: dict[int, Found] = {}
+        _compute(blocks, range(len(blocks)), place, kept.__setitem__, tell)
+        return [partial(kept.__getitem__, number) for number in range(len(blocks))]
+    files = [place.folder / f"{number:06d}.npz" for number in range(len(blocks))]
+    with _owned(place.folder, mark, len(blocks)):
+        missing = [number for number, file in enumerate(files) if not file.exists()]
+        _compute(blocks, missing, place,
+                 lambda number, found: _write(files[number], found), tell)
+    return [partial(_read, file, block.shapes) for file, block in zip(files, blocks, strict=True)]
+
+
+@contextmanager
+def _owned(folder: Path, mark: str, count: int) -> Iterator[None]:
+    """A folder that holds this computation, or nothing of any, and is not in use."""
+    busy = (f"Another process computes blocks in {folder}; wait for it, or choose another folder.")
+    with output_folder(folder), locked(folder / ".lock", busy, keep=True):
+        about = folder / _ABOUT
+        wanted = {"mark": mark, "blocks": count}
+        if about.exists():
+            with reading(about, "not of fecontact"):
+                stored = from_json(about.read_text(encoding="utf-8"), dict, "it")
+            if stored != wanted:
+                raise InputError(f"{folder} holds the runs of another system, grid or version; "
+                                 f"choose another folder, or remove it.")
+        else:
+            write_text(about, json.dumps(wanted) + "\n")
+        clear_leftovers(folder)
+        yield
+
+
+def _write(path: Path, found: Found) -> None:
+    with replaced(path) as part, part.open("wb") as file:
+        np.savez(file, **found)  # type: ignore[arg-type]
+
+
+def _read(path: Path, shapes: dict[str, tuple[int, ...]]) -> Found:
+    with reading(path, "damaged; remove it, and its runs are computed again"):
+        found = npz_arrays(path)
+        for name, shape in shapes.items():
+            if found[name].shape != shape or found[name].dtype.kind not in "fi":
+                raise DamagedError(f"'{name}' has shape {found[name].shape}, not {shape}")
+    return found
+
+
+def _compute(
+    blocks: Sequence[Block], numbers: Sequence[int], place: Place,
+    keep: Callable[[int, Found], None], tell: Callable[[int], None] | None,
+) -> None:
+    """Compute some of the blocks, and keep each when it is done."""
+    if place.executor is not None:
+        _on_executor(blocks, numbers, place.executor, keep, tell)
+        return
+    done = {number: blocks[number].runs for number in set(range(len(blocks))) - set(numbers)}
+    left = [False]
+
+    def run(number: int) -> Found:
+        def count(runs: int) -> None:
+            if left[0]:
+                raise _LeftError
+            done[number] = runs
+
+        return blocks[number].found(count)
+
+    with ThreadPoolExecutor(place.workers or cpu_count()) as pool:
+        pending = {pool.submit(run, number): number for number in numbers}
+        waiting: set[Future[Found]] = set(pending)
+        try:
+            while waiting:
+                ended, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    number = pending.pop(future)
+                    keep(number, future.result())
+                    done[number] = blocks[number].runs
+                if tell is not None:
+                    tell(sum(list(done.values())))
+        except BaseException:
+            left[0] = True
+            for future in waiting:
+                future.cancel()
+            raise
+
+
+class _LeftError(Exception):
+    """Raised in runs whose results are no longer wanted."""
+
+
+def _on_executor(
+    blocks: Sequence[Block], numbers: Sequence[int], executor: Executor,
+    keep: Callable[[int, Found], None], tell: Callable[[int], None] | None,
+) -> None:
+    workers = getattr(executor, "_max_workers", None)
+    window = 2 * workers + 2 if isinstance(workers, int) and workers > 0 else _AHEAD
+    ahead = list(numbers)[::-1]
+    done = sum(block.runs for block in blocks) - sum(blocks[number].runs for number in numbers)
+    flying: dict[Future[Found], int] = {}
+    try:
+        while ahead or flying:
+            while ahead and len(flying) < window:
+                try:
+                    flying[executor.submit(found_of, blocks[ahead[-1]])] = ahead[-1]
+                except RuntimeError as error:  # it was shut down
+                    raise _broken(error) from error
+                ahead.pop()
+            failed: BaseException | None = None
+            for future in wait(flying, timeout=0.2, return_when=FIRST_COMPLETED).done:
+                number = flying.pop(future)
+                try:
+                    keep(number, future.result())
+                except (Exception, CancelledError) as error:
+                    failed = failed or error
+                else:
+                    done += blocks[number].runs
+            if isinstance(failed, BrokenExecutor | CancelledError) or (
+                    type(failed).__name__ == "KilledWorker"):  # of Dask
+                raise _broken(failed) from failed
+            if failed is not None:
+                raise failed
+            if tell is not None:
+                tell(done)
+    finally:
+        for future in flying:
+            future.cancel()
+
+
+def _broken(error: BaseException | None) -> AnalysisError:
+    reason = str(error).partition("\n")[0].rstrip(".") or "its work was cancelled"
+    return AnalysisError(f"The executor broke ({reason}); finished blocks are kept: go on with a "
+                         f"new executor and the same folder.")
+
+
+def found_of(block: Block) -> Found:
+    """What a block finds, for an executor of other processes."""
+    return block.found()

@@ -1,0 +1,140 @@
+"""Labels of runs by the motions on which they settle, in compiled code."""
+
+from typing import NamedTuple
+
+from numba import types
+
+from fecontact.core.compiled import block, f8, helper, i8, integers, kernel, vector
+from fecontact.core.types import Array, Integers
+
+EQUILIBRIUM, PERIODIC, APERIODIC = range(3)
+_BOX = 0.2  # part of their size by which boxes of the same aperiodic motion may differ
+
+
+class Settled(NamedTuple):
+    """Where runs have settled.
+
+    Attributes
+    ----------
+    points : (E, K, size) array
+        Last states of each run on its section, the first ``rows`` of it.
+    rows : (E,) integer array
+        How many there are; -1 of runs that could not go on or had not settled.
+    still : (E,) integer array
+        Whether the run is at rest, at its one point.
+    """
+
+    points: Array
+    rows: Integers
+    still: Integers
+
+
+class Motions(NamedTuple):
+    """Motions found so far, ``number[0]`` of them, and room for more.
+
+    Attributes
+    ----------
+    points : (M, K, size) array
+        States of each on its section, the first ``rows`` of it.
+    rows, kind : (M,) integer arrays
+        How many there are; EQUILIBRIUM, PERIODIC or APERIODIC.
+    number : (1,) integer array
+    """
+
+    points: Array
+    rows: Integers
+    kind: Integers
+    number: Integers
+
+
+FOUND = types.NamedTuple([block, integers, integers], Settled)
+MOTIONS = types.NamedTuple([block, integers, integers, integers], Motions)
+
+
+@helper
+def _period(points, count, scale, tolerance):
+    """Number of points after which they repeat, or 0 if they do not."""
+    for period in range(1, count // 2 + 1):
+        repeats = True
+        for k in range(count - period):
+            for i in range(len(scale)):
+                if not abs(points[k + period, i] - points[k, i]) < tolerance * scale[i]:
+                    repeats = False
+                    break
+            if not repeats:
+                break
+        if repeats:
+            return period
+    return 0
+
+
+@helper
+def _all_near(one, first, last, other, begin, end, scale, most):
+    """Whether every point of one is near a point of the other."""
+    for k in range(first, last):
+        near = False
+        for j in range(begin, end):
+            near = True
+            for i in range(len(scale)):
+                if not abs(one[k, i] - other[j, i]) < most * scale[i]:
+                    near = False
+                    break
+            if near:
+                break
+        if not near:
+            return False
+    return True
+
+
+@helper
+def _same_box(one, first, last, other, count, scale, tolerance):
+    """Whether two motions fill the same box, to a fifth of its size."""
+    for i in range(len(scale)):
+        low, high = one[first, i], one[first, i]
+        for k in range(first, last):
+            low, high = min(low, one[k, i]), max(high, one[k, i])
+        lowest, highest = other[0, i], other[0, i]
+        for k in range(count):
+            lowest, highest = min(lowest, other[k, i]), max(highest, other[k, i])
+        allowed = _BOX * max(high - low, highest - lowest) + tolerance * scale[i]
+        if not max(abs(low - lowest), abs(high - highest)) <= allowed:
+            return False
+    return True
+
+
+@kernel(i8(i8, FOUND, vector, f8, integers, MOTIONS))
+def label_runs(first, found, scale, tolerance, label, motions):
+    """Label runs from ``first`` on, and add the motions that are new; the run reached."""
+    for e in range(first, len(found.rows)):
+        last = found.rows[e]
+        label[e] = -1
+        if last < 0:
+            continue
+        points, period, kind = found.points[e], 0, EQUILIBRIUM
+        if not found.still[e]:
+            period = _period(points, last, scale, tolerance)
+            kind = PERIODIC if period > 0 else APERIODIC
+        begin = last - period if period > 0 else 0
+        for p in range(motions.number[0]):
+            other, count = motions.points[p], motions.rows[p]
+            if motions.kind[p] != kind:
+                continue
+            if kind == APERIODIC:
+                same = _same_box(points, begin, last, other, count, scale, tolerance)
+            else:
+                same = _all_near(points, begin, last, other, 0, count, scale, 2.0 * tolerance) and (
+                    _all_near(other, 0, count, points, begin, last, scale, 2.0 * tolerance))
+            if same:
+                label[e] = p
+                break
+        if label[e] < 0:
+            p = motions.number[0]
+            if p == len(motions.rows):
+                return e
+            for k in range(begin, last):
+                for i in range(len(scale)):
+                    motions.points[p, k - begin, i] = points[k, i]
+            motions.rows[p], motions.kind[p] = last - begin, kind
+            motions.number[0] = p + 1
+            label[e] = p
+    return len(found.rows)
