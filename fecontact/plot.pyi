@@ -17,6 +17,7 @@ from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
 from .output.plots.responses.response import plot_response
 from .output.plots.run import plot_energies, plot_history, plot_phase
+from .output.plots.sections import plot_poincare_scan
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
 from .output.plots.wear import plot_wear
@@ -48,6 +49,7 @@ __all__ = [
     "plot_phase",
     "plot_phase_space",
     "plot_poincare",
+    "plot_poincare_scan",
     "plot_receptance",
     "plot_resonance_curve",
     "plot_response",

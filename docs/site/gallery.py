@@ -15,7 +15,7 @@ GROUPS = {
         "squeal", "disc_and_pads", "disc_brake", "beam_stick_slip", "friction_oscillator",
         "two_mass_friction", "sliding_beam", "sliding_borders"),
     "Impacts": ("impact_oscillator", "impact_figures", "impact_map", "impact_orbits",
-                "impact_calibration", "colliding_bars"),
+                "impact_calibration", "colliding_bars", "million_starts"),
     "Contact pressure and partial slip": (
         "line_contact", "two_bodies", "two_spheres", "pressed_sphere", "stacked_blocks",
         "contact_convergence"),

@@ -125,15 +125,13 @@ def test_labels_are_those_of_single_runs():
     found = two_motions()
     assert [len(one.points) for one in found.attractors] == [3, 1]
     assert [one.share for one in found.attractors] == pytest.approx([0.64, 0.36], abs=0.05)
-    shape, seen = system.basis.T[0, 1, 0], set()
-    for i, j in ((0, 0), (3, 9), (6, 5), (11, 2), (5, 8), (8, 8)):
+    shape = system.basis.T[0, 1, 0]
+    for i, j in [*np.argwhere(found.label == 0)[::20], *np.argwhere(found.label == 1)[::20]]:
         state = np.array([PLACES[i], SPEEDS[j]]) / shape
         alone = strobe(system, transient_periods=150, keep=8, initial=state).states[0]
         orbit = found.attractors[found.label[i, j]].points
         off = np.abs(alone[:, None] - orbit[None]) / np.abs(orbit).max(axis=0)
         assert off.max(axis=2).min(axis=1).max() < 2e-3
-        seen.add(int(found.label[i, j]))
-    assert seen == {0, 1}
 
 
 KILLED = """

@@ -1,10 +1,12 @@
 """Diagrams with runs and phase planes, and maps of basins: what is drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from systems import impact_oscillator
 
-from fecontact import InputError
+from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import (
     Attractor,
     Axis,
@@ -16,7 +18,7 @@ from fecontact.bifurcation import (
     contact_field,
     poincare_scan,
 )
-from fecontact.plot import Inset, phase_inset, plot_basins, plot_branches
+from fecontact.plot import Inset, phase_inset, plot_basins, plot_branches, plot_poincare_scan
 
 
 def orbit(p, section, stable=True):
@@ -100,6 +102,49 @@ def test_maps_of_basins(tmp_path):
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [m]", "v [m/s]")
     with pytest.raises(InputError, match="must end in"):
         plot_basins(found, path=tmp_path / "basins.gif")
+
+
+def test_densities_of_scans(tmp_path):
+    """Cells are dark where the states of their values lie, whatever is missing."""
+    system = impact_oscillator(1)
+    shape = system.basis.T[0, 1, 0]
+    y = np.array([[1e-4, 1e-4, 1e-4], [1e-4, 2e-4, 2e-4], [np.nan, np.nan, 3e-4]]) / shape
+    up = np.stack([y, np.zeros((3, 3))], axis=2)
+    found = PoincareScan(system, "drive.angular_frequency", np.array([60.0, 61.0, 63.0]), up,
+                         up[:1, :0])
+    for each in (replace(found, down=up), replace(found, down=up[:, :0])):
+        axis = plot_poincare_scan(each, "B", "y", y_label="y [m]").axes[0]
+        mesh = axis.collections[0]
+        cells = np.ma.filled(mesh.get_array(), np.nan)
+        corners = np.asarray(mesh.get_coordinates())
+        edges, rows = corners[0, :, 0], corners[:, 0, 1]
+        assert edges == pytest.approx([59.5, 60.5, 62.0, 64.0])
+        column, height = np.nonzero(np.isfinite(cells).T)
+        assert column.tolist() == [0, 1, 1, 2]
+        middles = 0.5 * (rows[1:] + rows[:-1])[height]
+        assert middles == pytest.approx([1e-4, 1e-4, 2e-4, 3e-4], abs=2e-7)
+        assert cells.T[column, height] == pytest.approx([1.0, 1.0 / 3.0, 2.0 / 3.0, 1.0])
+        assert (axis.get_xlabel(), axis.get_ylabel()) == ("drive angular frequency [rad/s]",
+                                                          "y [mm]")
+    with pytest.raises(AnalysisError, match="no run of the diagram could go on"):
+        plot_poincare_scan(replace(found, up=np.nan * up))
+    with pytest.raises(InputError, match="must end in"):
+        plot_poincare_scan(found, path=tmp_path / "scan.gif")
+
+
+def test_columns_hold_several_of_many_values():
+    """Five thousand values in 1600 columns at most; all states are counted."""
+    system = impact_oscillator(1)
+    values = np.linspace(60.0, 61.0, 5000)
+    up = np.tile((values - 60.0)[:, None, None] / system.basis.T[0, 1, 0], (1, 2, 2))
+    found = PoincareScan(system, "drive.angular_frequency", values, up, up[:, :0])
+    mesh = plot_poincare_scan(found).axes[0].collections[0]
+    cells = np.ma.filled(mesh.get_array(), 0.0)
+    assert 800 < cells.shape[1] <= 1600
+    assert cells.sum(axis=0) == pytest.approx(np.ones(cells.shape[1]))
+    corners = np.asarray(mesh.get_coordinates())
+    highest = corners[len(cells) - np.argmax(cells[::-1] > 0.0, axis=0), 0, 1]
+    assert highest == pytest.approx(corners[0, 1:, 0] - 60.0, abs=3e-3)
 
 
 def test_basins_of_a_system(tmp_path):

@@ -1,0 +1,101 @@
+"""Diagrams of brute force: states on a section over a parameter, as a density."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import AnalysisError
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.reduction.modal_basis import Component
+from fecontact.system.contact_system import ContactSystem
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
+
+_COLUMNS, _ROWS = 1600, 800  # cells of the picture, at most
+_DARKEST = 0.98  # part of the cells that are met which are not the darkest
+
+
+def plot_poincare_scan(
+    found: "PoincareScan", point: str | int = "B", component: Component | None = None,
+    of: Literal["displacement", "velocity"] = "displacement", *,
+    x_label: str | None = None, y_label: str | None = None, path: str | Path | None = None,
+) -> "Figure":
+    """Plot how often states on a section meet each value of a quantity, over the parameter.
+
+    The darker a cell, the more of the states at its parameter values lie in it, up and down taken
+    together; the scale is logarithmic. Periodic motions are lines, chaos shades.
+
+    Parameters
+    ----------
+    found : PoincareScan
+        Of :func:`fecontact.bifurcation.poincare_scan`.
+    point, component, of
+        The quantity; see :meth:`fecontact.bifurcation.PoincareScan.observed`.
+    x_label, y_label : str, optional
+        Labels of the axes, with SI units, such as ``y [m]``; ticks are in a unit that suits the
+        values.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, another suffix, or a file that cannot be written.
+    AnalysisError
+        If no run could go on.
+    """
+    from matplotlib.colors import LogNorm
+
+    from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
+
+    require_kind("plot_poincare_scan", PoincareScan, found=found)
+    seen = np.hstack([each for each in found.observed(point, component, of) if each.size])
+    values = np.repeat(found.values, seen.shape[1])[np.isfinite(seen).ravel()]
+    heights = seen[np.isfinite(seen)]
+    if not len(heights):
+        raise AnalysisError("plot_poincare_scan: no run of the diagram could go on.")
+    edges = _edges(found.values)
+    low, high = float(heights.min()), float(heights.max())
+    margin = 0.03 * (high - low) or 0.5 * abs(high) or 0.5
+    counts, _, rows = np.histogram2d(
+        values, heights, [edges, np.linspace(low - margin, high + margin, _ROWS + 1)])
+    # Columns may hold different numbers of values.
+    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
+    met = share[share > 0.0]
+    with new_figure(9.0, 5.2, path) as figure:
+        axis = figure.subplots()
+        axis.pcolormesh(edges, rows, np.where(share > 0.0, share, np.nan).T, cmap="Blues",
+                        norm=LogNorm(0.2 * float(met.min()),
+                                     float(np.quantile(met, _DARKEST))), rasterized=True)
+        name_axis(axis, "x", x_label or parameter_label(found.parameter), found.values)
+        name_axis(axis, "y", y_label or _named(found, point, component, of), heights)
+        axis.grid(False)
+    return figure
+
+
+def _edges(values: np.ndarray) -> np.ndarray:
+    """Edges of columns with one value or more each."""
+    if len(values) == 1:
+        return values[0] + 0.5 * max(abs(values[0]), 1.0) * np.array([-1.0, 1.0])
+    step = max(len(values) / _COLUMNS, 1.0)
+    first = np.unique(np.arange(0.0, len(values), step).astype(int))[1:]
+    between = 0.5 * (values[first - 1] + values[first])
+    return np.concatenate([values[:1] - 0.5 * (values[1] - values[0]), between,
+                           values[-1:] + 0.5 * (values[-1] - values[-2])])
+
+
+def _named(
+    found: "PoincareScan", point: str | int, component: Component | None, of: str,
+) -> str:
+    """The quantity, with its unit if it has one."""
+    if not isinstance(found.system, ContactSystem):
+        return str(point)
+    along = component or "y"
+    unit = "rad" if along.startswith("phi") else "m"
+    return f"{of} {along} of {point} [{unit}{'/s' if of == 'velocity' else ''}]"
