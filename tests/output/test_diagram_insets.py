@@ -125,7 +125,7 @@ def test_densities_of_scans(tmp_path):
         assert middles == pytest.approx([1e-4, 1e-4, 2e-4, 3e-4], abs=2e-7)
         assert cells.T[column, height] == pytest.approx([1.0, 1.0 / 3.0, 2.0 / 3.0, 1.0])
         assert (axis.get_xlabel(), axis.get_ylabel()) == ("drive angular frequency [rad/s]",
-                                                          "y [mm]")
+                                                          "y [µm]")
     with pytest.raises(AnalysisError, match="no run of the diagram could go on"):
         plot_poincare_scan(replace(found, up=np.nan * up))
     with pytest.raises(InputError, match="must end in"):
