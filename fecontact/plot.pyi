@@ -5,19 +5,18 @@ from .output.plots.analysis import (
     plot_spectrogram,
     plot_spectrum,
 )
-from .output.plots.basins import plot_basins
 from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.contact_map import plot_contact_map
 from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
+from .output.plots.many_runs import plot_basins, plot_poincare_scan
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.phase_space import plot_phase_space
 from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
 from .output.plots.responses.response import plot_response
 from .output.plots.run import plot_energies, plot_history, plot_phase
-from .output.plots.sections import plot_poincare_scan
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.style import COLOURS, STATE_COLOURS
 from .output.plots.wear import plot_wear

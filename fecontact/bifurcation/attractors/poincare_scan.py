@@ -116,11 +116,8 @@ def poincare_scan(
         Whether to go down again.
     chains : int, optional
         Number of chains each way; default sixteen, of 8 to 1000 values, and more of more values.
-    solver, rtol, workers, progress
-        As for :func:`fecontact.ensemble`.
-    folder, executor
-        Where finished chains are kept, and what computes them; see
-        :func:`fecontact.bifurcation.basins`.
+    solver, rtol, workers, progress, folder, executor
+        As for :func:`fecontact.bifurcation.basins`.
 
     Raises
     ------
