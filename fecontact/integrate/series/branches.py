@@ -1,10 +1,12 @@
 """Systems whose forces are polynomials of the state between switches, and their tables."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from fecontact.core.compiled import block, f8, i8, matrix, vector
 from fecontact.core.errors import InputError
@@ -239,8 +241,7 @@ def worthwhile(system: ContactSystem, pieces: Array) -> bool:
             rows = system.arrays.Ty
             stiffness = stiffness + rows.T @ (piece[:, :, 3].max(axis=1)[:, None] * rows)
             damping = damping + rows.T @ (piece[:, :, 5].max(axis=1)[:, None] * rows)
-        rates = np.linalg.eigvals(np.block([[np.zeros((m, m)), np.eye(m)],
-                                            [-stiffness, -damping]]))
+        rates = _rates(m, stiffness.tobytes(), damping.tobytes())
         size = np.abs(rates)
         if not closed:
             slow += size[size > 0.0].tolist()
@@ -252,3 +253,12 @@ def worthwhile(system: ContactSystem, pieces: Array) -> bool:
         if not closed and size.max() > _FASTEST * min(slow):
             return False
     return True
+
+
+@lru_cache(maxsize=64)
+def _rates(m: int, stiffness: bytes, damping: bytes) -> NDArray[np.complex128]:
+    """Eigenvalues (2 m,) of m modes; a diagram asks for the same ones at each value."""
+    K, D = (np.frombuffer(matrix).reshape(m, m) for matrix in (stiffness, damping))
+    rates = np.linalg.eigvals(np.block([[np.zeros((m, m)), np.eye(m)], [-K, -D]]))
+    rates.setflags(write=False)
+    return rates
