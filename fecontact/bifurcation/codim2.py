@@ -79,7 +79,7 @@ def codim2_curve(
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
         What the points have in common; 'period' takes any orbit of a system without excitation.
-    to : 'fold', 'period doubling', 'Neimark-Sacker' or 'homoclinic', optional
+    to : 'fold', 'other fold', 'period doubling', 'Neimark-Sacker' or 'homoclinic', optional
         Which curve, where several begin at the point; 'homoclinic' also from orbits of long period.
 
     Returns

@@ -279,7 +279,8 @@ class BranchPoint:
         coefficient, r' = w l2 r^5; 'a' and 'b' of a Bogdanov-Takens point, u'' = a u^2 + b u u',
         a > 0; 'b', 'c', 'd' and 'e' of a zero-Hopf point, u' = b u^2 + c r^2, r' = (d u + e u^2) r,
         b > 0; 'p11' to 'p22' of a double Hopf point, r1' = r1 (p11 r1^2 + p12 r2^2),
-        r2' = r2 (p21 r1^2 + p22 r2^2), first the pair that is followed. One that is not defined is left out, as 'e' is where b or c is zero.
+        r2' = r2 (p21 r1^2 + p22 r2^2), first the pair that is followed. One that is not defined is
+        left out, as 'e' is where b or c is zero.
 
         References
         ----------

@@ -120,23 +120,43 @@ class Expansion:
         """Size of the coefficient b of a fold; its sign is that of the direction of v."""
         term, = self._at.terms
         V, drift = term.states, -term.period / self._T
-        found = self._share(term.left, V, _applied(bends[0].first, V) / 2.0
-                            - drift * _applied(self._J, V))
-        size = self._size(V)
-        return Share(abs(found.value) / size, found.size / size)
+        found, size = self._share(term.left, V, _applied(bends[0].first, V) / 2.0
+                                  - drift * _applied(self._J, V))
+        unit = self._size(V)
+        return Share(abs(found.real) / unit, size / unit)
 
     def doubling(self, bends: Sequence[Bend]) -> Share:
         """Coefficient c of a period doubling."""
         term, = self._at.terms
         V, (first, second, _) = term.states, bends[0]
         h2, drift = self._response(_applied(first, V))
-        found = self._share(term.left, V, _applied(second, V) / 6.0 + _applied(first, h2) / 2.0
-                            - drift / 2.0 * _applied(self._J, V))
-        size = self._size(V) ** 2
-        return Share(found.value / size, found.size / size)
+        found, size = self._share(
+            term.left, V, _applied(second, V) / 6.0 + _applied(first, h2) / 2.0
+            - drift / 2.0 * _applied(self._J, V))
+        unit = self._size(V) ** 2
+        return Share(found.real / unit, size / unit)
 
     def torus(self, bends: Sequence[Bend]) -> Share:
         """Coefficient Re D of a Neimark-Sacker point, whose multipliers are complex."""
+        left, V, third, _ = self._turning(bends)
+        found, size = self._share(left, V, third)
+        unit = self._size(V) ** 2
+        return Share(found.real / unit, size / unit)
+
+    def quarter(self, step: float) -> tuple[complex, complex]:
+        """C and D of a resonance 1:4, z' = C z |z|^2 + D conj(z)^3, with v as it is."""
+        one, other = self._at.terms
+        along, across = self.bends(step)
+        left, V, third, h20 = self._turning((along, across))
+        mixed = (self._bend(one.states + other.states, step).second
+                 - self._bend(one.states - other.states, step).second) / 4.0
+        W = V.conj()
+        cube = (_applied(along.second - across.second - 2j * mixed, W) / 6.0
+                + _applied(along.first - 1j * across.first, h20.conj()) / 2.0)
+        return self._share(left, V, third)[0], self._share(left, V, cube)[0]
+
+    def _turning(self, bends: Sequence[Bend]) -> tuple[Any, Any, Any, Any]:
+        """Multiples of the equations, v, the terms of z |z|^2, and h of z^2 / 2, all complex."""
         assert self._at.pair is not None
         (p, pp, _), (q, qq, _) = bends
         one, other = self._at.terms
@@ -147,39 +167,35 @@ class Expansion:
         third = (_applied(pp + qq, V) / 2.0 + _applied(first, h11)
                  + _applied(first.conj(), h20) / 2.0
                  - drift * (_applied(self._J, V) - 1j * angle / self._T * V))
-        found = self._share(one.left - 1j * other.left, V, third)
-        size = self._size(V) ** 2
-        return Share(found.value / size, found.size / size)
+        return one.left - 1j * other.left, V, third, h20
 
     def bends(self, step: float) -> list[Bend]:
         """Differences of fourth order along v, over a step in ranges of the states."""
+        return [self._bend(term.states, step) for term in self._at.terms]
+
+    def _bend(self, direction: Array, step: float) -> Bend:
+        """Differences along a direction (N m, d)."""
         problem = self._problem
         nodes = problem.nodes(self._u)
         scales = problem.scales[: nodes.shape[1]]
         size = np.ptp(nodes, axis=0) / scales
         span = np.maximum(size, 0.1 * size.max()) * scales
-        found = []
-        for term in self._at.terms:
-            largest = float(np.max(np.abs(term.states) / span))
-            if largest == 0.0:
-                found.append(Bend(*(np.zeros_like(self._J) for _ in range(3))))
-                continue
-            h = step / largest
-            _, J, P = self._linearised.derivatives_beside(
-                [part * h * term.states for part in (1.0, -1.0, 2.0, -2.0)], states_alone=True)
-            odd, far_odd = J[0] - J[1], J[2] - J[3]
-            even, far_even = J[0] + J[1], J[2] + J[3]
-            found.append(Bend(
-                np.asarray((8.0 * odd - far_odd) / (12.0 * h)),
-                np.asarray((16.0 * even - far_even - 30.0 * self._J) / (12.0 * h * h)), P[0]))
-        return found
+        largest = float(np.max(np.abs(direction) / span))
+        if largest == 0.0:
+            return Bend(*(np.zeros_like(self._J) for _ in range(3)))
+        h = step / largest
+        _, J, P = self._linearised.derivatives_beside(
+            [part * h * direction for part in (1.0, -1.0, 2.0, -2.0)], states_alone=True)
+        odd, far_odd = J[0] - J[1], J[2] - J[3]
+        even, far_even = J[0] + J[1], J[2] + J[3]
+        return Bend(np.asarray((8.0 * odd - far_odd) / (12.0 * h)),
+                    np.asarray((16.0 * even - far_even - 30.0 * self._J) / (12.0 * h * h)), P[0])
 
-    def _share(self, left: Array, V: Array, g: Array) -> Share:
-        """The c, times T, for which w' - A w = T g - c v is solvable, its real part."""
+    def _share(self, left: Array, V: Array, g: Array) -> tuple[complex, float]:
+        """The c for which w' - A w = T g - c v is solvable, and the sum of the sizes in it."""
         weighted = self._h * left
         products, whole = weighted * g, (weighted * V).sum() / self._T
-        return Share(float((products.sum() / whole).real), float(np.abs(products).sum()
-                                                                 / abs(whole)))
+        return complex(products.sum() / whole), float(np.abs(products).sum() / abs(whole))
 
     def _size(self, V: Array) -> float:
         """Root of the mean square of the scaled states."""
