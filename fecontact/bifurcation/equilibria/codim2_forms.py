@@ -45,7 +45,10 @@ class _Forms:
         self._bent, self._place = bent, 0 if fine else 1
 
     def _along(self, direction: Array) -> Bend:
-        return self._bent(np.ascontiguousarray(direction))[self._place]
+        size = float(np.linalg.norm(direction)) or 1.0
+        bent = self._bent(direction / size)[self._place]
+        return Bend(size * bent.first, size**2 * bent.second, tuple(
+            size**order * part for order, part in enumerate(bent.higher, start=3)))
 
     def B(self, a: Any) -> ComplexArray:
         """Matrix of the form B with the argument a."""
