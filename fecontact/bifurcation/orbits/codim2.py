@@ -12,6 +12,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.linalg.bordered import Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.singularity import (
     Bend,
@@ -182,6 +183,7 @@ class CurveLinearised:
     def __init__(self, problem: OrbitCurve, u: Array, whole: bool = True) -> None:
         self.problem, self.u, self._whole = problem, u, whole
         self.orbit = CollocationLinearisation(problem.orbit, u, "all" if whole else "states")
+        self._last: tuple[Array, Bordered] | None = None
 
     @cached_property
     def residual(self) -> Array:
@@ -233,7 +235,9 @@ class CurveLinearised:
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs."""
-        return self.orbit.with_rows([self.gradient, row]).solve(rhs)
+        if self._last is None or self._last[0] is not row:
+            self._last = row, self.orbit.with_rows([self.gradient, row])
+        return self._last[1].solve(rhs)
 
 
 def orbit_curve(
