@@ -4,7 +4,8 @@
 
 The branch from the first Hopf point to B = 12, multipliers at each point, special points located,
 in intervals of 4 collocation points, and from these the curves of folds and of period doublings
-over the speed of the belt, also in the time of an orbit. Shown is the CPU time, the median of the
+over the speed of the belt, also in the time of an orbit; so is a curve of tori across a circle, a
+function of three states. Shown is the CPU time, the median of the
 repetitions; where AUTO-07p is installed, also its own for the same branch and curves, one thread,
 in the same run.
 """
@@ -23,11 +24,13 @@ from fecontact.bifurcation import (
     Branch,
     Collocation,
     ContinuationOptions,
+    PeriodicMotion,
     VectorField,
     codim2_curve,
     contact_field,
     equilibrium_branch,
     orbit_branch,
+    vector_field,
 )
 from fecontact.laws import PrescribedForce, ProductFriction
 
@@ -60,6 +63,16 @@ def chain(masses: int) -> VectorField:
                            friction=ProductFriction(), ground=Ground(speed=1.0))
     return contact_field(system, {"B": (0.5, lambda system, B: system.with_(
         **{"normal.force": np.full(masses, B)}))})
+
+
+def turning(t, x, p, out):
+    """A circle on which orbits take pi; across it w' = (lam - a^2 + 0.7 i) w - w |w|^2."""
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    C, S, a, z = x[0] / r, x[1] / r, r - 1.0, x[2]
+    growth = p[0] - p[1] * p[1] - a * a - z * z
+    radial = growth * a - 0.7 * z
+    out[0], out[1] = radial * C - 2.0 * r * S, radial * S + 2.0 * r * C
+    out[2] = growth * z + 0.7 * a
 
 
 def timed(task: Callable[[], Branch], repetitions: int) -> tuple[float, Branch]:
@@ -95,6 +108,27 @@ def curves(
                   f"its time")
 
 
+def tori(intervals: int, repetitions: int) -> None:
+    """Print the line of a curve of tori, lam = a^2."""
+    field = vector_field(turning, {"lam": -0.2, "a": 0.3}, 3)
+    t = np.linspace(0.0, np.pi, 400)
+    circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
+    settings = ContinuationOptions(step=0.002, largest_step=0.01, points=61)
+    follow = partial(orbit_branch, field, PeriodicMotion(t, circle, period=np.pi), "lam",
+                     method=Collocation(intervals=intervals), bounds=(-0.5, 0.5),
+                     scales=np.ones(3), options=settings)
+    point = follow().of_kind("Neimark-Sacker")[0]
+    trace = partial(codim2_curve, field, point, "a", both=False, direction=-1.0, options=settings,
+                    bounds={"lam": (-0.1, 0.5), "a": (-0.5, 0.5)})
+    trace()
+    seconds, branch = timed(follow, repetitions)
+    longer, curve = timed(trace, repetitions)
+    orbit, each = seconds / len(branch), longer / len(curve)
+    error = np.abs(curve.parameter - curve.column("a") ** 2).max()
+    print(f"{intervals:4} curve of tori: {len(curve)} points, {1e3 * each:.2f} ms per point, "
+          f"{each / orbit:.2f} of an orbit, error {error:.1e}")
+
+
 def row(name: str, seconds: float, points: int, fold: float, doubling: float) -> str:
     """A line of the table."""
     return (f"{name:14} {points:7}  {seconds:6.3f} s  {1e3 * seconds / points:6.2f} ms"
@@ -125,6 +159,7 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
                 other = peer.branch(intervals, repetitions)
                 print(row(f"{intervals:4} AUTO-07p", *other) + f"   {seconds / other.seconds:6.2f}")
             curves(field, branch, seconds / len(branch), repetitions, settings, peer)
+            tori(intervals, repetitions)
     large = chain(20)
     sliding = equilibrium_branch(large, parameter="B", bounds=(0.1, 3.0))
     hopf = sliding.of_kind("Hopf")[0]

@@ -1,6 +1,6 @@
 """Curves of special points over two parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -39,7 +39,7 @@ _ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("resonance 1:1", "reso
 # Points of curves of equilibria through which another one passes.
 _CROSSINGS = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")
 # Part of the first step at which a curve begins that leaves a point to one side.
-_BESIDE = 1e-3
+_BESIDE = 4e-4
 # Part of a range within which a start on its end may lie beside it.
 _ON_BOUND = 1e-9
 
@@ -79,7 +79,7 @@ def codim2_curve(
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
         What the points have in common; 'period' takes any orbit of a system without excitation.
-    to : 'fold', 'period doubling', 'Neimark-Sacker' or 'homoclinic', optional
+    to : 'fold', 'other fold', 'period doubling', 'Neimark-Sacker' or 'homoclinic', optional
         Which curve, where several begin at the point; 'homoclinic' also from orbits of long period.
 
     Returns
@@ -133,7 +133,7 @@ def codim2_curve(
     if point is not given and not given.is_orbit:
         widths = {**widths_of(given), **widths}
     problem: Problem
-    grows = None
+    grows: Callable[[Array], float] | None = None
     kind = "period" if keep == "period" else str(point.kind)
     if homoclinic:
         kind = "homoclinic"
@@ -141,7 +141,11 @@ def codim2_curve(
     elif isinstance(point, DiscontinuityPoint):
         problem, u, attributes = border_curve(field, point, parameter, widths, scales)
     elif point.is_orbit:
-        problem, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
+        curve, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
+        problem = curve
+        if given.kind == "resonance 1:1" and kind == "Neimark-Sacker":
+            # To the other side lie neutral saddles, whose multipliers are real.
+            grows = lambda u: -curve.linearise(u).singularity.cosine  # noqa: E731
     else:
         if crossing:
             begin, square = other_curve(field, point, parameter)
@@ -155,7 +159,7 @@ def codim2_curve(
         kind = "fold" if square is None else "Hopf"
         problem, u, attributes = equilibrium_curve(begin, names, square, widths, scales)
         # Beyond a Bogdanov-Takens point the curve is one of neutral saddles.
-        grows = field.dimension if square == 0.0 else None
+        grows = (lambda u: float(u[field.dimension])) if square == 0.0 else None
     attributes |= {"parameters": list(names), "kind": kind,
                    "state_names": list(field.state_names)}
     return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
@@ -186,11 +190,11 @@ def _ranges(
 def _followed(
     problem: Problem, u: Array, names: tuple[str, str], options: ContinuationOptions,
     second: tuple[float, float], direction: float, both: bool, attributes: dict[str, Any],
-    grows: int | None,
+    grows: Callable[[Array], float] | None,
 ) -> Branch:
     """The curve through u = [..., second parameter, first parameter], within both ranges.
 
-    It goes to the side alone on which the unknown with the index ``grows`` does, if there is one.
+    It goes to the side alone on which ``grows`` of the unknowns is larger, if that is given.
     """
     value, size = float(u[-2]), float(np.ptp(second)) if np.isfinite(second).all() else 1.0
     near = _ON_BOUND * size
@@ -203,7 +207,9 @@ def _followed(
     chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
     tangent = tangent_at(problem, u, direction)
     if grows is not None:
-        tangent, both = tangent * np.copysign(1.0, tangent[grows]), False
-        u = u + _BESIDE * options.step * tangent
+        beside = _BESIDE * options.step * tangent
+        if grows(u - beside) > grows(u + beside):
+            tangent, beside = -tangent, -beside
+        u, both = u + beside, False
     return continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
                            attributes=attributes)

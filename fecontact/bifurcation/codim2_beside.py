@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.codim2_quarter import folds_at_quarter
 from fecontact.bifurcation.codim2_switch import (
     other_curve,
     tangent_at,
@@ -286,6 +287,16 @@ def of_doubled(
                         f"these from a period doubling near it.") from last
 
 
+def of_quadrupled(
+    field: VectorField, point: BranchPoint, parameter: str, side: float
+) -> BranchPoint:
+    """A fold of orbits of four periods at a side; see :func:`folds_at_quarter`."""
+    single = over_first(point, "Neimark-Sacker")
+    found = folds_at_quarter(field, point, single, parameter, side)
+    first = point.branch.parameter_name
+    return _over(field, found, first, float(np.asarray(point.branch.attributes["scales"])[-1]))
+
+
 _Found = Callable[[VectorField, BranchPoint, str], BranchPoint]
 # Curves of orbits that begin at points of curves, by the kind of the point and of the curve; the
 # first of a point is that which is followed without being named, where no curve of equilibria is.
@@ -303,6 +314,9 @@ BEGIN: Mapping[str, Mapping[str, _Found]] = {
         "period doubling": lambda field, point, parameter: over_first(point, "period doubling"),
         "Neimark-Sacker": lambda field, point, parameter: of_doubled(
             field, point, parameter, "Neimark-Sacker")},
+    "resonance 1:4": {
+        "fold": lambda field, point, parameter: of_quadrupled(field, point, parameter, 1.0),
+        "other fold": lambda field, point, parameter: of_quadrupled(field, point, parameter, -1.0)},
 }
 # Points of which a curve of equilibria is followed without a curve being named.
 _OF_EQUILIBRIA = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")

@@ -80,7 +80,7 @@ def test_derivatives_are_those_of_another_function_with_the_same_zeros(case):
     """At the zero their derivatives are proportional along all directions."""
     problem, u = start_of_curve(case)
     at = problem.linearise(u)
-    v = at._critical.v
+    v = at.singularity.v
     direction = None if v is None else v / (problem.weights() @ v**2)
     assert abs(at.residual[-1]) < 1e-6
     rng, d = np.random.default_rng(3), problem.orbit.field.dimension

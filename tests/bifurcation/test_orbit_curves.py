@@ -15,6 +15,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
+from fecontact.bifurcation.orbits.normal_forms import Expansion
 
 
 def first_branch(**changes):
@@ -71,13 +72,17 @@ def torus(t, x, p, out):
     out[2] = growth * z + 0.7 * a
 
 
-def test_curve_of_tori():
+def test_curve_of_tori(monkeypatch):
+    """With one coefficient, which tells Chenciner points, for each point of the curve."""
+    formula, called = Expansion.torus, []
     field = vector_field(torus, {"lam": -0.2, "a": 0.3}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
                           method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     point, = branch.of_kind("Neimark-Sacker")
+    monkeypatch.setattr(Expansion, "torus", lambda self, bends: called.append(1) or formula(
+        self, bends))
     curve = codim2_curve(field, point, "a", direction=-1.0, both=False,
                          bounds={"lam": (-0.1, 0.5), "a": (-0.5, 0.5)},
                          options=ContinuationOptions(points=30))
@@ -87,6 +92,8 @@ def test_curve_of_tori():
     turning, = curve.special
     assert turning.kind == "turning point"
     assert turning.values["a"] == pytest.approx(0.0, abs=1e-6)
+    # Not where the turning point is sought.
+    assert len(called) == len(curve) - 1
 
 
 def circle_field(function, **parameters):

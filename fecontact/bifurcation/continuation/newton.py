@@ -1,7 +1,7 @@
 """Newton's method back to a branch, and what is made at the solution."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -81,6 +81,25 @@ class Solution:
     iterations: int
     values: Mapping[str, Any]
     tests: Mapping[str, float]
+
+
+class Tests(Mapping[str, float]):
+    """Test functions by name; those given as functions are called where they are asked for."""
+
+    def __init__(self, given: Mapping[str, float | Callable[[], float]]) -> None:
+        self._found = dict(given)
+
+    def __getitem__(self, name: str) -> float:
+        found = self._found[name]
+        if callable(found):
+            found = self._found[name] = found()
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
 
 
 def corrected(
@@ -187,12 +206,12 @@ def with_values(problem: Problem, at: Solution) -> Solution:
 def _tests(
     problem: Problem, u: Array, linearisation: Linearisation, tangent: Array,
     values: Mapping[str, Any], options: ContinuationOptions,
-) -> dict[str, float]:
-    found: dict[str, float] = {}
+) -> Tests:
+    found: dict[str, float | Callable[[], float]] = {}
     if options.locate:
         found |= {"fold": float(tangent[-1]), **problem.tests(u, linearisation, tangent)}
     known = {**values, "parameter": float(u[-1])}
-    return found | {name: float(event(known)) for name, event in options.events.items()}
+    return Tests(found | {name: float(event(known)) for name, event in options.events.items()})
 
 
 def norm(problem: Problem, vector: Array) -> float:

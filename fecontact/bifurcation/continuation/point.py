@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from fecontact.integrate.trajectory import Trajectory
 
 
+# Coefficients of points of codimension two, in the order in which they are stored.
+_NORMAL_FORMS: Mapping[str, tuple[str, ...]] = {
+    "cusp": ("c",), "Bautin": ("l2",), "Bogdanov-Takens": ("a", "b"),
+    "zero-Hopf": ("b", "c", "d", "e"), "double Hopf": ("p11", "p12", "p21", "p22")}
+
+
 @dataclass(frozen=True, eq=False)
 class BranchHeader:
     """Parameter and attributes of a branch, known to all its points.
@@ -263,6 +269,35 @@ class BranchPoint:
         """
         found = self._details.get("criticality")
         return None if found is None else str(found)
+
+    @property
+    def normal_form(self) -> dict[str, float]:
+        r"""Coefficients by name, of points of codimension two of equilibria; empty for others.
+
+        With amplitudes z of critical eigenvectors of length one, x = z q + conj(z q), u of real
+        ones and r = |z|: 'c' of a cusp, u' = c u^3; 'l2' of a Bautin point, the second Lyapunov
+        coefficient, r' = w l2 r^5; 'a' and 'b' of a Bogdanov-Takens point, u'' = a u^2 + b u u',
+        a > 0; 'b', 'c', 'd' and 'e' of a zero-Hopf point, u' = b u^2 + c r^2, r' = (d u + e u^2) r,
+        b > 0; 'p11' to 'p22' of a double Hopf point, r1' = r1 (p11 r1^2 + p12 r2^2),
+        r2' = r2 (p21 r1^2 + p22 r2^2), first the pair that is followed. One that is not defined is
+        left out, as 'e' is where b or c is zero.
+
+        References
+        ----------
+        Y. A. Kuznetsov, SIAM J. Numer. Anal. 36, 1104-1124 (1999).
+        """
+        return self._by_name("normal_form")
+
+    @property
+    def normal_form_errors(self) -> dict[str, float]:
+        """Errors of :attr:`normal_form`: differences of two formulas for the derivatives."""
+        return self._by_name("normal_form_error")
+
+    def _by_name(self, detail: str) -> dict[str, float]:
+        found = np.atleast_1d(self._details.get(detail, ()))
+        names = _NORMAL_FORMS[str(self.kind)] if len(found) else ()
+        return {name: value for name, value in zip(names, found.tolist(), strict=True)
+                if np.isfinite(value)}
 
     def _detail(self, name: str) -> Any:
         if name not in self._details:

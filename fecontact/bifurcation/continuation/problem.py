@@ -142,8 +142,14 @@ class Problem(Protocol):
         """What is to be told of the points of a branch besides its end."""
         return ""
 
-    def tests(self, u: Array, linearisation: Linearisation, tangent: Array) -> Mapping[str, float]:
-        """Test functions by kind; special points are their zeros. Folds need none."""
+    def tests(
+        self, u: Array, linearisation: Linearisation, tangent: Array
+    ) -> Mapping[str, float | Callable[[], float]]:
+        """Test functions by kind; special points are their zeros. Folds need none.
+
+        One that takes long may be given as a function without arguments, which is called at
+        points of the branch alone, and where its own zero is sought.
+        """
         return {}
 
     def ended(self, u: Array, linearisation: Linearisation, tangent: Array) -> BranchStatus | None:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.equilibria.codim2_forms import codim2_form
 from fecontact.bifurcation.equilibria.equilibrium import solution, sorted_eigenvalues
 from fecontact.bifurcation.equilibria.normal_forms import hopf, null_vectors
 from fecontact.bifurcation.equilibria.problem import pair_test
@@ -108,6 +109,11 @@ class PlaneCurve(Problem):
         return {"state": u[: self.field.dimension].copy(), **named,
                 **self.stored(u, linearisation)}
 
+    def form(self, kind: str, u: Array, w: float = 0.0, other: float = 0.0) -> dict[str, Any]:
+        """Normal form of a point of codimension two with pairs of these angular frequencies."""
+        x = np.ascontiguousarray(u[: self.field.dimension])
+        return codim2_form(kind, self.field, x, self.values(u), self.scales, w, other)
+
     @abstractmethod
     def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
         """Values stored at points besides state and parameters."""
@@ -152,8 +158,9 @@ class FoldCurve(PlaneCurve):
         if kind == "zero-Hopf":
             others = _others(linearisation.jacobian, 0.0, 1)
             nearest = others[np.argmin(np.abs(others.real))] if len(others) else 0.0
-            return {"frequency_hz": abs(nearest.imag) / (2.0 * np.pi)} if nearest.imag else None
-        return None if kind == "fold" else {}
+            w = float(abs(nearest.imag))
+            return {"frequency_hz": w / (2.0 * np.pi), **self.form(kind, u, w)} if w else None
+        return None if kind == "fold" else self.form(kind, u)
 
 
 class HopfCurve(PlaneCurve):
@@ -239,11 +246,13 @@ class HopfCurve(PlaneCurve):
         others = _others(linearisation.jacobian, square, 2)
         if kind == "zero-Hopf" and square < 1e-3 * np.abs(others).max(initial=0.0) ** 2:
             return None  # the end at a Bogdanov-Takens point
+        w = float(np.sqrt(max(square, 0.0)))
         if kind == "double Hopf":
             nearest = others[np.argmin(np.abs(others.real))]
-            return {"second_frequency_hz": abs(nearest.imag) / (2.0 * np.pi)} if nearest.imag \
-                else None
-        return None if kind == "fold" else {}
+            other = float(abs(nearest.imag))
+            return {"second_frequency_hz": other / (2.0 * np.pi),
+                    **self.form(kind, u, w, other)} if other else None
+        return None if kind == "fold" else self.form(kind, u, w)
 
 
 def scaled(J: Array, scales: Array) -> Array:

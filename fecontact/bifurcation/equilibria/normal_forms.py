@@ -150,11 +150,29 @@ def crossing_form(field: VectorField, x: Array, values: Array, scales: Array) ->
     ----------
     Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., sections 5.4 and 7.4.
     """
+    v, found = along_null_vector(field, x, values, scales)
+    if not found:
+        return {}
+    (quadratic, cubic, size, terms), (coarse, coarse_cubic, *_) = found
+    length = 1.0 / float(np.linalg.norm(v / scales))
+    if abs(quadratic) > abs(quadratic - coarse) + _ZERO * (size + terms * length):
+        return {"form": "transcritical", "coefficient": 0.5 * quadratic}
+    decided = abs(cubic) > abs(cubic - coarse_cubic) + _ZERO * (terms + size / length)
+    return {"form": "fork", "coefficient": cubic / 6.0, "criticality":
+            ("supercritical" if cubic < 0.0 else "subcritical") if decided else "undecided"}
+
+
+def along_null_vector(
+    field: VectorField, x: Array, values: Array, scales: Array
+) -> tuple[Array, list[tuple[float, float, float, float]]]:
+    """Null vector v of J, and w B(v, v) and w [C(v, v, v) - 3 B(v, J^+ B(v, v))], each with the
+    sum of the sizes of its terms, from two differences; none where zero is a double eigenvalue.
+    """
     d = len(x)
     _, J, _ = field.derivatives(np.zeros(1), x[None], values)
     v, w = null_vectors(J[0])
     if abs(w @ v) < _DEFECTIVE:
-        return {}
+        return v, []
     bordered = np.zeros((d + 1, d + 1))
     bordered[:d, :d], bordered[:d, d], bordered[d, :d] = J[0], w, v
     w = w / (w @ v)
@@ -166,13 +184,7 @@ def crossing_form(field: VectorField, x: Array, values: Array, scales: Array) ->
         found.append((float(w @ bent), float(w @ (part.second @ v - 3.0 * part.first @ inner)),
                       float(np.abs(w) @ np.abs(part.first) @ np.abs(v)),
                       float(np.abs(w) @ sizes)))
-    (quadratic, cubic, size, terms), (coarse, coarse_cubic, *_) = found
-    length = 1.0 / float(np.linalg.norm(v / scales))
-    if abs(quadratic) > abs(quadratic - coarse) + _ZERO * (size + terms * length):
-        return {"form": "transcritical", "coefficient": 0.5 * quadratic}
-    decided = abs(cubic) > abs(cubic - coarse_cubic) + _ZERO * (terms + size / length)
-    return {"form": "fork", "coefficient": cubic / 6.0, "criticality":
-            ("supercritical" if cubic < 0.0 else "subcritical") if decided else "undecided"}
+    return v, found
 
 
 def branching_tangents(

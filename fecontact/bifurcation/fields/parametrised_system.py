@@ -255,6 +255,9 @@ class _Corners:
         self.low, self.high = low, high
         first = corners[0]
         self._plain = first
+        # Rates of what does not vary.
+        self._still = [np.zeros_like(array) if isinstance(array, np.ndarray)
+                       and array.dtype.kind == "f" else array for array in first]
         # Of each parameter, with the values at which they hold.
         self._slopes: dict[int, tuple[bytes, SystemArrays]] = {}
         stacked: dict[str, Array] = {}
@@ -323,9 +326,8 @@ class _Corners:
                 x, rate = (value - low) / (high - low), 1.0 / (high - low)
                 below, above = (-rate, rate) if each == index else (1.0 - x, x)
                 weights = [w * below for w in weights] + [w * above for w in weights]
-            still = [np.zeros_like(array) if isinstance(array, np.ndarray)
-                     and array.dtype.kind == "f" else array for array in self._plain]
-            self._slopes[index] = key, self._with(np.array(weights) @ self._flat, still)
+            self._slopes[index] = key, self._with(np.array(weights) @ self._flat,
+                                                  list(self._still))
         return self._slopes[index][1]
 
     def agrees(self, arrays: SystemArrays, values: Array) -> bool:

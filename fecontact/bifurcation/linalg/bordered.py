@@ -45,6 +45,27 @@ def expand_open(factors: CondensedFactors, start: Array, end: Array) -> Array:
     return out
 
 
+def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> Array:
+    """All nodes (N m d,) with x(1) = closing x(0), the common unknowns zero.
+
+    ``rhs`` (N m d,) are the right-hand sides of the collocation rows; both are complex.
+    """
+    d, columns = factors.end.shape
+    parts = [np.ascontiguousarray(part, dtype=float) for part in (rhs.real, rhs.imag)]
+    reduced, side = np.empty((2, pivot_rows(factors))), np.empty((2, d))
+    for place, part in enumerate(parts):
+        bordered_kernels.reduce_side(factors, part, reduced[place], side[place])
+    start = np.linalg.solve(factors.end[:, :d] + closing * factors.end[:, d : 2 * d],
+                            side[0] + 1j * side[1])
+    ends = [(np.ascontiguousarray(of(start)), np.ascontiguousarray(of(closing * start)))
+            for of in (np.real, np.imag)]
+    out = np.empty((2, len(rhs)))
+    for place, both in enumerate(ends):
+        bordered_kernels.expand(factors, reduced[place], *both, np.zeros(columns - 2 * d),
+                                out[place])
+    return np.asarray(out[0] + 1j * out[1])
+
+
 class Bordered:
     """A bordered system, with x(1) = closing x(0)."""
 

@@ -3,30 +3,31 @@
 An orbit by collocation with two free parameters, and a test function at zero.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.linalg.bordered import Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
-from fecontact.bifurcation.orbits.curves.criticality import (
+from fecontact.bifurcation.orbits.curves.singularity import (
+    Bend,
     ContinuedSign,
-    Criticality,
-    Term,
+    Singularity,
     along_parameter,
+    bends,
     gradient,
     of_doubling,
     of_fold,
     of_torus,
 )
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
-from fecontact.bifurcation.orbits.floquet import Floquet, resting
-from fecontact.bifurcation.orbits.normal_forms import Expansion
+from fecontact.bifurcation.orbits.floquet import resting
+from fecontact.bifurcation.orbits.normal_forms import Expansion, Share
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import (
     HALVING,
@@ -40,6 +41,7 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
+_NEAR_ZERO = 1e-4  # part of the terms of a coefficient above which its sign needs no better ones
 _AT_RESONANCE = 1e-6  # distance of the cosine of the angle from 1 or -1 at these resonances
 _LEAST = 1e-200  # in place of zero
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
@@ -53,7 +55,7 @@ class OrbitCurve(Problem):
     """Orbits on which a test function vanishes, with two free parameters.
 
     The test functions and their derivatives are those of
-    :mod:`fecontact.bifurcation.orbits.curves.criticality`. For orbits of one period it is the
+    :mod:`fecontact.bifurcation.orbits.curves.singularity`. For orbits of one period it is the
     difference of their period from that, relative to it.
 
     The unknowns are those of the orbit, ``u = [nodes, T if it is unknown, second, first]``.
@@ -116,7 +118,9 @@ class OrbitCurve(Problem):
         return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
 
-    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+    def tests(
+        self, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, float | Callable[[], float]]:
         """Those of points of codimension two, and of orbits that shrink or become single ones."""
         found = self._codimension_two(u, linearisation)
         if self.orbit.autonomous:
@@ -124,39 +128,32 @@ class OrbitCurve(Problem):
         found[HALVING] = halves_apart(self.orbit, u)
         return found
 
-    def _codimension_two(self, u: Array, linearisation: Any) -> dict[str, float]:
+    def _codimension_two(
+        self, u: Array, linearisation: "CurveLinearised"
+    ) -> dict[str, float | Callable[[], float]]:
         if self.kind == "period":
             return {}
-        orbit = linearisation.orbit
-        floquet: Floquet = orbit.floquet
-        critical = self._critical(floquet)
-        flip, unit, pair = floquet.rest_products(*critical)
+        floquet = linearisation.orbit.floquet
+        flip, unit, pair = floquet.rest_products(*linearisation.critical)
         if self.kind == "fold":
             return {"cusp": linearisation.bend, "resonance 1:1": unit, "fold-flip": flip,
                     "fold-Neimark-Sacker": pair}
+        at = linearisation.singularity
+        expansion = Expansion(self.orbit, u, linearisation.orbit, at)
         if self.kind == "period doubling":
-            expansion = Expansion(self.orbit, u, orbit, linearisation.terms[0])
-            coefficient = expansion.doubling(_NORMAL_FORM_STEP)
             # At a resonance 1:2 the coefficient has a pole.
-            return {"generalised period doubling": coefficient * flip, "resonance 1:2": flip,
-                    "fold-flip": unit, "flip-Neimark-Sacker": pair}
-        mean = float(sum(critical).real) / 2.0
-        found = {f"resonance 1:{order}": mean - float(np.cos(2.0 * np.pi / order))
-                 for order in (1, 2, 3, 4)}
+            return {"generalised period doubling": lambda: flip * _coefficient(
+                        expansion, expansion.doubling, linearisation.bends),
+                    "resonance 1:2": flip, "fold-flip": unit, "flip-Neimark-Sacker": pair}
+        tests: dict[str, float | Callable[[], float]] = {
+            f"resonance 1:{order}": at.cosine - float(np.cos(2.0 * np.pi / order))
+            for order in (1, 2, 3, 4)}
         # Next to the resonances 1:1 and 1:2 the coefficient grows beyond all numbers.
-        if abs(mean) < 1.0 - _AT_RESONANCE:
-            found["Chenciner"] = Expansion(self.orbit, u, orbit).torus(
-                float(np.arccos(mean)), _NORMAL_FORM_STEP)
-        return found | {"fold-Neimark-Sacker": unit, "flip-Neimark-Sacker": flip,
+        if at.turns and abs(at.cosine) < 1.0 - _AT_RESONANCE:
+            tests["Chenciner"] = lambda: _coefficient(expansion, expansion.torus,
+                                                      linearisation.bends)
+        return tests | {"fold-Neimark-Sacker": unit, "flip-Neimark-Sacker": flip,
                         "double Neimark-Sacker": pair}
-
-    def _critical(self, floquet: Floquet) -> tuple[complex, ...]:
-        """The critical multipliers of the curve."""
-        if self.kind == "Neimark-Sacker":
-            mean = _critical_mean(floquet.others)
-            root = np.sqrt(complex(mean * mean - 1.0))
-            return complex(mean) + root, complex(mean) - root
-        return (1.0,) if self.kind == "fold" else (-1.0,)
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """Turns of the first parameter where it does not change but for rounding."""
@@ -169,7 +166,7 @@ class OrbitCurve(Problem):
         if kind != "fold":
             floquet, pair = linearisation.orbit.floquet, _PAIRS.get(self.kind)
             # The product of two real multipliers may be one too.
-            return {} if kind != pair or floquet.turning(*self._critical(floquet)) else None
+            return {} if kind != pair or floquet.turning(*linearisation.critical) else None
         both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
         return {"kind": "turning point"} if both.max() > _CUSP_RATE else None
 
@@ -184,37 +181,42 @@ class CurveLinearised:
     """Residual of the curve's equations, and solutions of systems with their derivative."""
 
     def __init__(self, problem: OrbitCurve, u: Array, whole: bool = True) -> None:
-        self.problem, self.u = problem, u
+        self.problem, self.u, self._whole = problem, u, whole
         self.orbit = CollocationLinearisation(problem.orbit, u, "all" if whole else "states")
+        self._last: tuple[Array, Bordered] | None = None
 
     @cached_property
     def residual(self) -> Array:
         """Residual of the orbit, and the test function."""
-        return np.append(self.orbit.residual, self._critical.value)
+        return np.append(self.orbit.residual, self.singularity.value)
 
     @cached_property
-    def _critical(self) -> Criticality:
-        """The test function."""
+    def singularity(self) -> Singularity:
+        """The test function, and what its derivative is made of."""
         kind = self.problem.kind
         if kind == "period":
-            return Criticality(self.orbit.period / self.problem.period - 1.0, ())
+            return Singularity(self.orbit.period / self.problem.period - 1.0, ())
         if kind == "Neimark-Sacker":
-            return of_torus(self.orbit)
+            return of_torus(self.orbit, whole=self._whole)
         found = of_fold(self.orbit) if kind == "fold" else of_doubling(self.orbit)
         return self.problem.sign.aligned(found, self.problem.orbit.widths)
 
     @property
-    def terms(self) -> tuple[Term, ...]:
-        """What the derivative of the test function is made of."""
-        return self._critical.terms
+    def critical(self) -> tuple[complex, ...]:
+        """The critical multipliers of the curve."""
+        if self.problem.kind == "Neimark-Sacker":
+            mean = self.singularity.cosine
+            root = np.sqrt(complex(mean * mean - 1.0))
+            return complex(mean) + root, complex(mean) - root
+        return (1.0,) if self.problem.kind == "fold" else (-1.0,)
 
     @property
     def bend(self) -> float:
         """Curvature -w G_uu v v / w G_p of the first parameter over the orbits, at folds."""
-        v = self._critical.v
+        v = self.singularity.v
         assert v is not None
         # Zero where a curve of doubled orbits begins.
-        slope = along_parameter(self.orbit, self.terms[0]) or _LEAST
+        slope = along_parameter(self.orbit, self.singularity.terms[0]) or _LEAST
         return float(self.gradient @ v / slope / (self.problem.weights() @ v**2))
 
     @cached_property
@@ -223,12 +225,19 @@ class CurveLinearised:
         if self.problem.kind == "period":
             return _unit(len(self.u), -3) / self.problem.period
         if self.problem.kind != "Neimark-Sacker":
-            self.problem.sign.keep(self.terms[0])
-        return gradient(self.orbit, self.terms)
+            self.problem.sign.keep(self.singularity.terms[0])
+        return gradient(self.orbit, self.singularity.terms, self.bends)
+
+    @cached_property
+    def bends(self) -> list[Bend]:
+        """Derivatives along the vectors of the test function."""
+        return bends(self.orbit, self.singularity.terms)
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs."""
-        return self.orbit.with_rows([self.gradient, row]).solve(rhs)
+        if self._last is None or self._last[0] is not row:
+            self._last = row, self.orbit.with_rows([self.gradient, row])
+        return self._last[1].solve(rhs)
 
 
 def orbit_curve(
@@ -268,14 +277,16 @@ def orbit_curve(
                           "intervals": problem.intervals}
 
 
+def _coefficient(
+    expansion: Expansion, formula: Callable[[Sequence[Bend]], Share], known: list[Bend]
+) -> float:
+    """A coefficient from the derivatives that are known, and from better ones where it is small."""
+    value, size = formula(known)
+    return value if abs(value) > _NEAR_ZERO * size else formula(
+        expansion.bends(_NORMAL_FORM_STEP)).value
+
+
 def _unit(size: int, place: int) -> Array:
     row = np.zeros(size)
     row[place] = 1.0
     return row
-
-
-def _critical_mean(multipliers: NDArray[np.complex128]) -> float:
-    """Mean of the two multipliers with product nearest to one: the cosine of their angle."""
-    first, second = np.triu_indices(len(multipliers), 1)
-    nearest = np.argmin(np.abs(multipliers[first] * multipliers[second] - 1.0))
-    return float((multipliers[first] + multipliers[second])[nearest].real / 2.0)

@@ -190,14 +190,14 @@ class CollocationLinearisation:
         if self._to != "nothing":
             f = self.derivatives[0]
         else:
-            f = problem.field.rates(self._times, self._x, problem.parameters(self.u))
+            f = problem.field.rates(self.times, self._x, problem.parameters(self.u))
         out = np.empty(problem.size + problem.autonomous)
         fill_residual(self._slopes, f, problem.widths, self.period,
                       problem.phase_border if problem.autonomous else self.u, self.u, out)
         return out
 
     @property
-    def _times(self) -> Array:
+    def times(self) -> Array:
         """Times (N m,) [s] of the Gauss points; all zero for autonomous systems."""
         if self.problem.autonomous:
             return np.zeros(len(self._x))
@@ -211,15 +211,19 @@ class CollocationLinearisation:
         T f(T tau, x, p), divided by T.
         """
         if self._to == "states":
-            f, J, _ = self.problem.field.derivatives(self._times, self._x,
+            f, J, _ = self.problem.field.derivatives(self.times, self._x,
                                                      self.problem.parameters(self.u), ())
             return f, J, np.zeros((*f.shape, len(self.problem.active)))
-        return self._derivatives_at(self._times, self._x)
+        return self._derivatives_at(self.times, self._x)
 
-    def derivatives_beside(self, shifts: list[Array]) -> tuple[Array, Array, Array]:
+    def derivatives_beside(
+        self, shifts: list[Array], *, states_alone: bool = False
+    ) -> tuple[Array, Array, Array]:
         """As :attr:`derivatives`, (k, N m, ...), beside the orbit by k shifts (N m, d)."""
         x = np.concatenate([self._x + shift for shift in shifts])
-        found = self._derivatives_at(np.tile(self._times, len(shifts)), x)
+        times = np.tile(self.times, len(shifts))
+        found = (self.problem.field.derivatives(times, x, self.problem.parameters(self.u), ())
+                 if states_alone else self._derivatives_at(times, x))
         f, J, P = (part.reshape(len(shifts), len(self._x), *part.shape[1:]) for part in found)
         return f, J, P
 

@@ -6,26 +6,29 @@ with the multiples w of the collocation rows that make up these, the derivative 
 
     dg = -w (G_uu d) v = sum h w [T f_xx v d_x + d_T f_x v + T f_xp v d_p + v_T (f_x d_x + f_p d_p)]
 
-over all Gauss points, with the interval widths h. One difference of the Jacobian along v at each
-point gives f_xx v and f_xp v; the condensed equations of the orbit serve for v and w, too. (These
-are minimally augmented systems: Govaerts, Kuznetsov and Dhooge, SIAM J. Sci. Comput. 27, 2005.)
+over all Gauss points, with the interval widths h. Differences of the Jacobian along v at each point
+give f_xx v and f_xp v, and f_xxx v v for normal forms; the condensed equations of the orbit serve
+for v and w, too. (These are minimally augmented systems: Govaerts, Kuznetsov and Dhooge, SIAM J.
+Sci. Comput. 27, 2005.)
 Where g is not zero, the derivative is wrong by a multiple of g, which leaves Newton's method
 quadratic.
 """
 
+from cmath import isfinite
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eig
+from scipy.linalg.lapack import dggev
 
 from fecontact.bifurcation.linalg.bordered import expand_open, original_rows
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.orbits.collocation_kernels import to_nodes
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ComplexArray
 
 # Step of the differences of the Jacobian, in ranges of the states over the orbit.
-_STEP = 1e-5
+_STEP = 1e-4
 # Smallest range of a state, in the largest one of all.
 _LEAST_RANGE = 0.1
 
@@ -42,12 +45,27 @@ class Term(NamedTuple):
     period: float = 0.0
 
 
-class Criticality(NamedTuple):
-    """Value of a test function, and what its derivative is made of; at folds v (n,) too."""
+class Singularity(NamedTuple):
+    """Value of a test function, and what its derivative is made of.
+
+    At folds v (n,) too, at tori the two multipliers.
+    """
 
     value: float
     terms: tuple[Term, ...]
     v: Array | None = None
+    pair: tuple[complex, complex] | None = None
+
+    @property
+    def cosine(self) -> float:
+        """Mean of the two multipliers at a torus: the cosine of their angle."""
+        assert self.pair is not None
+        return sum(self.pair).real / 2.0
+
+    @property
+    def turns(self) -> bool:
+        """Whether the multipliers of a torus are complex."""
+        return len(self.terms) == 2 and self.pair is not None and self.pair[0].imag != 0.0
 
 
 class ContinuedSign:
@@ -60,7 +78,7 @@ class ContinuedSign:
         """Let vectors that follow have the direction of these."""
         self._before = term
 
-    def aligned(self, found: Criticality, widths: Array) -> Criticality:
+    def aligned(self, found: Singularity, widths: Array) -> Singularity:
         """The test function for w and v of length one, in the direction of those before."""
         term, = found.terms
         h = np.repeat(widths, len(term.left) // len(widths))
@@ -71,19 +89,19 @@ class ContinuedSign:
                 factor = float(np.copysign(factor, (part * self._before[number]).sum()))
             factors.append(factor)
         one, other = factors
-        return Criticality(one * other * found.value,
+        return Singularity(one * other * found.value,
                            (Term(one * term.left, other * term.states, other * term.period),),
                            None if found.v is None else other * found.v)
 
 
-def of_fold(at: CollocationLinearisation) -> Criticality:
+def of_fold(at: CollocationLinearisation) -> Singularity:
     """Smallest singular value of the equations at fixed parameters."""
     problem = at.problem
     value, left, v = at.at_fixed_parameters().weakest()
     period = float(v[problem.size]) if problem.autonomous else 0.0
     nodes = v[: problem.size].reshape(-1, problem.field.dimension)
     term = Term(-left.reshape(nodes.shape), at_points(problem, nodes, nodes[0]), period)
-    return Criticality(value, (term,), v)
+    return Singularity(value, (term,), v)
 
 
 def along_parameter(at: CollocationLinearisation, term: Term) -> float:
@@ -92,39 +110,86 @@ def along_parameter(at: CollocationLinearisation, term: Term) -> float:
     return -float((h * term.left * at.derivatives[2][:, :, -1]).sum()) * at.period
 
 
-def of_doubling(at: CollocationLinearisation) -> Criticality:
+def of_doubling(at: CollocationLinearisation) -> Singularity:
     """Smallest singular value of the equations at the ends of v for v(1) = -v(0)."""
     start, end, balance = _ends(at.factors)
     lefts, sizes, rights = np.linalg.svd(start - end)
     v = rights[-1]
-    return Criticality(float(sizes[-1]), (_term(at, -lefts[:, -1] * balance, v, -v),))
+    return Singularity(float(sizes[-1]), (_term(at, -lefts[:, -1] * balance, v, -v),))
 
 
-def of_torus(at: CollocationLinearisation) -> Criticality:
-    """mu_1 mu_2 - 1 of the two multipliers whose product is nearest to one."""
+def of_torus(
+    at: CollocationLinearisation, angle: float | None = None, *, whole: bool = True
+) -> Singularity:
+    """mu_1 mu_2 - 1 of the two multipliers whose product is nearest to one.
+
+    With an ``angle`` those that are nearest to exp(+- i angle); the value alone if not ``whole``.
+    """
     start, end, balance = _ends(at.factors)
-    mu, lefts, rights = eig(start, -end, left=True, right=True)
-    one, other = _critical_pair(mu, at.problem.autonomous)
+    real, imag, size, lefts, rights, *_ = dggev(start, -end, compute_vl=whole, compute_vr=whole)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mu = (real + 1j * imag) / size
+    if angle is None:
+        one, other = _critical_pair(mu.tolist(), at.problem.autonomous)
+    else:
+        one, other = (int(np.argmin(np.abs(mu - np.exp(side * angle)))) for side in (1j, -1j))
+    pair = complex(mu[one]), complex(mu[other])
+    value = (pair[0] * pair[1]).real - 1.0
+    if not whole:
+        return Singularity(value, ())
     terms: list[Term] = []
-    conjugate = abs(mu[one].imag) > 0.0
+    conjugate = imag[one] != 0.0
     for place, partner in ((one, other), (other, one)):
-        left, v = lefts[:, place].conj(), rights[:, place]
+        left, v = (_vector(vectors, imag, place) for vectors in (lefts, rights))
+        left = left.conj()
         left = mu[partner] / (left @ end @ v) * left * balance
         if conjugate:
             terms.append(_term(at, 2.0 * left.real, v.real, (mu[place] * v).real))
             terms.append(_term(at, -2.0 * left.imag, v.imag, (mu[place] * v).imag))
             break
         terms.append(_term(at, left.real, v.real, (mu[place] * v).real))
-    return Criticality(float((mu[one] * mu[other]).real - 1.0), tuple(terms))
+    return Singularity(value, tuple(terms), pair=pair)
 
 
-def gradient(at: CollocationLinearisation, terms: tuple[Term, ...]) -> Array:
-    """Derivative (n,) of a test function to all unknowns."""
+def _vector(vectors: Array, imag: Array, place: int) -> ComplexArray:
+    """One eigenvector (d,); of a complex pair LAPACK gives both parts of the first one."""
+    if imag[place] == 0.0:
+        return vectors[:, place].astype(complex)
+    first = place if imag[place] > 0.0 else place - 1
+    side = 1j if imag[place] > 0.0 else -1j
+    return np.asarray(vectors[:, first] + side * vectors[:, first + 1], dtype=complex)
+
+
+class Bend(NamedTuple):
+    """First and second derivative of df/dx (N m, d, d) along a direction, first one of df/dp."""
+
+    first: Array
+    second: Array
+    shift: Array
+
+
+def bends(at: CollocationLinearisation, terms: tuple[Term, ...]) -> list[Bend]:
+    """Derivatives along the states of each term at the Gauss points."""
+    span = np.ptp(at.problem.nodes(at.u), axis=0)
+    span = np.maximum(span, _LEAST_RANGE * span.max())
+    steps = [_STEP / max(float(np.abs(term.states / span).max()), 1e-300) for term in terms]
+    moves = [step * term.states for step, term in zip(steps, terms, strict=True)]
+    _, J, P = at.derivatives_beside([move * sign for move in moves for sign in (1.0, -1.0)])
+    twice = 2.0 * at.derivatives[1]
+    return [Bend((J[2 * k] - J[2 * k + 1]) / (2.0 * step),
+                 (J[2 * k] + J[2 * k + 1] - twice) / step**2,
+                 (P[2 * k] - P[2 * k + 1]) / (2.0 * step)) for k, step in enumerate(steps)]
+
+
+def gradient(
+    at: CollocationLinearisation, terms: tuple[Term, ...], bent: list[Bend]
+) -> Array:
+    """Derivative (n,) of a test function to all unknowns, with the :func:`bends` of its terms."""
     problem, T = at.problem, at.period
     _, J, P = at.derivatives
     h = np.repeat(problem.widths, problem.degree)[:, None]
     points, out = np.zeros(J.shape[:2]), np.zeros(len(at.u))
-    for term, (bend, shift) in zip(terms, _bends(at, [term.states for term in terms]), strict=True):
+    for term, (bend, _, shift) in zip(terms, bent, strict=True):
         points += (term.left[:, None, :] @ (T * bend + term.period * J))[:, 0, :]
         weighted = (h * term.left).ravel()
         if problem.autonomous:
@@ -136,17 +201,6 @@ def gradient(at: CollocationLinearisation, terms: tuple[Term, ...]) -> Array:
     return out
 
 
-def _bends(at: CollocationLinearisation, directions: list[Array]) -> list[tuple[Array, Array]]:
-    """Derivatives of df/dx and df/dp at the Gauss points along directions (N m, d)."""
-    span = np.ptp(at.problem.nodes(at.u), axis=0)
-    span = np.maximum(span, _LEAST_RANGE * span.max())
-    steps = [_STEP / max(float(np.abs(one / span).max()), 1e-300) for one in directions]
-    moves = [step * one for step, one in zip(steps, directions, strict=True)]
-    _, J, P = at.derivatives_beside([move * sign for move in moves for sign in (1.0, -1.0)])
-    return [((J[2 * k] - J[2 * k + 1]) / (2.0 * step), (P[2 * k] - P[2 * k + 1]) / (2.0 * step))
-            for k, step in enumerate(steps)]
-
-
 def _ends(factors: CondensedFactors) -> tuple[Array, Array, Array]:
     """Equations (d, d) of x_0 and x_N, in rows of the same size, and the factors (d,) for that."""
     d = len(factors.end)
@@ -155,17 +209,12 @@ def _ends(factors: CondensedFactors) -> tuple[Array, Array, Array]:
     return even[:, :d], even[:, d:], balance
 
 
-def _critical_pair(mu: Array, autonomous: bool) -> tuple[int, int]:
+def _critical_pair(mu: list[complex], autonomous: bool) -> tuple[int, int]:
     """Places of the two multipliers with product nearest to one, the trivial one left out."""
-    size = np.where(np.isfinite(mu), mu, np.inf)
-    off = np.abs(np.outer(size, size) - 1.0)
-    off[~np.isfinite(off)] = np.inf
-    np.fill_diagonal(off, np.inf)
+    places = [place for place, each in enumerate(mu) if isfinite(each)]
     if autonomous:
-        trivial = int(np.argmin(np.abs(size - 1.0)))
-        off[trivial] = off[:, trivial] = np.inf
-    one, other = np.unravel_index(np.argmin(off), off.shape)
-    return int(one), int(other)
+        places.remove(min(places, key=lambda place: abs(mu[place] - 1.0)))
+    return min(combinations(places, 2), key=lambda both: abs(mu[both[0]] * mu[both[1]] - 1.0))
 
 
 def _term(at: CollocationLinearisation, left: Array, start: Array, end: Array) -> Term:
