@@ -2,7 +2,15 @@
 
 import numpy as np
 import pytest
-from test_sliding_bifurcations import DAMPING, FILIPPOV, STOPS, forced, gain, impacting
+from test_sliding_bifurcations import (
+    DAMPING,
+    FILIPPOV,
+    STOPS,
+    events_of,
+    forced,
+    gain,
+    impacting,
+)
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -75,6 +83,43 @@ def test_time_stepping_is_differenced():
     known = np.exp(np.linalg.eigvals(matrix) * branch.points[0].values["period"])
     found = branch.points[0].values["multipliers"]
     assert found[np.argsort(found.imag)] == pytest.approx(known[np.argsort(known.imag)], abs=1e-7)
+
+
+@pytest.mark.parametrize(("nodes", "instead"), [
+    (1, r"SetValued\(scheme='events'\)"), (2, r"smoothing_slope and Rodas5P\(\)")])
+def test_time_stepping_of_stick_slip_names_what_to_take(nodes, instead):
+    """Its runs know transitions to first order: Newton's method finds no orbit."""
+    system = forced(speed=0.45)
+    motion = periodic_motion(system, solver=FILIPPOV, rtol=1e-8)
+    if nodes > 1:  # with slip velocities that depend on each other
+        rows = np.array([[[1.0], [0.0], [0.0]], [[1.01], [0.0], [0.0]]])
+        basis = fc.basis_from_matrices([[1.0]], [[0.5]], {
+            "contact": rows, "B": rows[0], "C": rows[0]}, damping=[[2.0 * DAMPING]])
+        system = system.with_(basis=basis)
+    solver = SetValued(scheme="stepping")
+    with pytest.raises(fc.AnalysisError, match=f"runs by time stepping .* take .*{instead}"):
+        orbit_branch(contact_field(system, "ground.speed"), motion,
+                     method=Shooting(1, solver=solver), bounds=(0.4, 0.5))
+
+
+def test_static_friction_above_the_kinetic_one():
+    """Stick that begins where it just lets go grows from nothing; stick that lasts jumps in."""
+    solver = SetValued(static_coefficient=0.5)
+    branch = orbit_branch(
+        contact_field(forced(speed=1.0), "ground.speed"),
+        periodic_motion(forced(speed=1.0), solver=solver, rtol=1e-9), bounds=(0.75, 1.5),
+        method=Shooting(1, solver=solver), both=True, options=ContinuationOptions(step=0.02))
+    crossing, switching = branch.special
+    assert (crossing.kind, crossing.persists) == ("crossing-sliding", True)
+    assert (switching.kind, switching.persists) == ("switching-sliding", False)
+    at, end = crossing.parameter, switching.parameter
+    short = [sum(events_of(forced(speed=at + off), solver)) for off in (-1e-3, 1e-3, 2e-3)]
+    assert short[0] == 0.0
+    assert short[2] / short[1] == pytest.approx(2.0, abs=0.01)
+    lasting = [sum(events_of(forced(speed=end + off), solver))
+               for off in (-2e-3, -1e-3, 1e-3, 2e-3)]
+    steps = np.abs(np.diff(lasting))
+    assert steps[1] > 20.0 * max(steps[0], steps[2])
 
 
 def test_messages_say_why_runs_are_differenced():

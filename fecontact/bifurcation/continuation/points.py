@@ -188,7 +188,7 @@ class DoubleHopfPoint(BranchPoint):
 
 
 _BORDERS = ("grazing", "grazing-sliding", "crossing-sliding", "switching-sliding",
-            "adding-sliding", "lift-off", "corner")
+            "adding-sliding", "impact-sliding", "lift-off", "corner")
 _KINDS: Mapping[str | None, type[BranchPoint]] = {
     **dict.fromkeys(_BORDERS, DiscontinuityPoint),
     "fold": FoldPoint, "Hopf": HopfPoint, "period doubling": PeriodDoublingPoint,

@@ -10,18 +10,21 @@ from fecontact.bifurcation.events.conditions import (
     CROSSING,
     DURATION,
     RATE,
+    STRIKE,
     WITHIN,
     Condition,
     crosses,
 )
 from fecontact.bifurcation.events.orbit import EventOrbit
-from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase, Strike
-from fecontact.bifurcation.events.tracing import order_of, released_sense
+from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase
+from fecontact.bifurcation.events.tracing import jumps, order_of, released_sense
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.problem import STICK
 
 # Part of the period below which a phase vanishes together with another condition.
 _VANISHING = 1e-5
+# Part of the period after which a force is seen to grow or fall.
+_SOON = 1e-4
 
 
 def border_of(problem: EventOrbit, u: Array, condition: Condition) -> str:
@@ -31,9 +34,13 @@ def border_of(problem: EventOrbit, u: Array, condition: Condition) -> str:
     k = len(phase.status)
     if condition.what == DURATION:
         return _of_duration(before, phase, behind)
+    if condition.what == STRIKE:
+        return "impact-sliding" if condition.event < 2 * k else "lift-off"
     if condition.event >= 2 * k:
         closed = phase.closed[condition.event - 2 * k]
-        return "corner" if condition.what == BEGIN else ("lift-off" if closed else "grazing")
+        if condition.what == BEGIN and condition.event != before.event:
+            return "corner"
+        return "lift-off" if closed else "grazing"
     cluster = condition.event // 2
     if condition.what in (RATE, WITHIN):
         if phase.status[cluster] == STICK:
@@ -43,31 +50,61 @@ def border_of(problem: EventOrbit, u: Array, condition: Condition) -> str:
         return "corner"
     if condition.what == BEGIN and before.status[cluster] == released_sense(condition.event):
         return "grazing-sliding"
+    stays = condition.what == CROSSING
+    if stays and jumps(motion := problem.motion(u), cluster):
+        return "switching-sliding" if _holds(problem, u, condition, motion) else "crossing-sliding"
     # What begins there soon ends, or goes on.
     short = problem.durations(u)[i] < _VANISHING * problem.period(u)
-    stays = condition.what == CROSSING
     return "crossing-sliding" if short != stays else "switching-sliding"
+
+
+def _holds(problem: EventOrbit, u: Array, condition: Condition, motion: Motion) -> bool:
+    """Whether the force that slip through zero would stick with leaves its limit."""
+    i, cluster = condition.phase, condition.event // 2
+    held = _with(problem.phases[i], cluster, STICK, condition.event)
+    begin, start = float(problem.begins(u)[i]), problem.starts(u)[i]
+    times = np.array([0.0, _SOON * problem.period(u)])
+    states = np.vstack([start, motion.run(begin, times[1:], start, held)[0]])
+    here, there = motion.observed(begin + times, states, held)[0][:, condition.event]
+    return bool(there > here)
 
 
 def _of_duration(before: Phase, phase: Phase, behind: Phase) -> str:
     k, cluster = len(phase.status), phase.cluster()
-    if cluster != before.cluster() or (cluster is None and before.event != phase.event):
+    if _of_others(before, phase):
         return "corner"
     if cluster is None:
-        return "lift-off" if phase.closed[phase.event - 2 * k] else "grazing"
+        stop = phase.event - 2 * k
+        return "lift-off" if phase.closed[stop] or before.closed[stop] else "grazing"
     first, here, last = (each.status[cluster] for each in (before, phase, behind))
     if here == STICK:
         return "grazing-sliding" if first == last else "crossing-sliding"
     return "adding-sliding" if first == last == STICK else "switching-sliding"
 
 
-def nodes_of(problem: EventOrbit, motion: Motion, condition: Condition) -> tuple[int, ...]:
-    """Contact nodes to which a condition belongs."""
-    k = motion.clusters
-    event = condition.event if condition.event != PERIOD else 0
-    if event >= 2 * k:
-        return (event - 2 * k,)
-    return tuple(np.flatnonzero(motion.problem.cluster == event // 2).tolist())
+def _of_others(before: Phase, phase: Phase) -> bool:
+    """Whether the events at both ends of a phase are those of different contacts."""
+    cluster = phase.cluster()
+    return cluster != before.cluster() or (cluster is None and before.event != phase.event)
+
+
+def nodes_of(
+    problem: EventOrbit, motion: Motion, condition: Condition, kind: str
+) -> tuple[int, ...]:
+    """Contact nodes to which the condition of a border belongs; at a corner those of both."""
+    phase, before = problem.phases[condition.phase], problem.phases[condition.phase - 1]
+    events = [condition.event]
+    if kind == "corner":
+        events.append(before.event)
+    return tuple(sorted({node for event in events for node in _of_event(motion, phase, event)}))
+
+
+def _of_event(motion: Motion, phase: Phase, event: int) -> list[int]:
+    cluster = phase.cluster(max(event, 0))
+    if cluster is None:
+        return [event - 2 * motion.clusters]
+    found: list[int] = np.flatnonzero(motion.problem.cluster == cluster).tolist()
+    return found
 
 
 class Successor:
@@ -88,12 +125,29 @@ class Successor:
         """Take out a phase without duration; its neighbours join if their states are the same."""
         count = len(self.phases)
         before, behind = (i - 1) % count, (i + 1) % count
-        if self.phases[before].state == self.phases[behind].state:
-            self._delete(i)
-            self.join((i - 1) % (count - 1))
-            return
-        self.phases[before] = self.phases[before].ending(self.phases[before].event)
+        join = (self.phases[before].state == self.phases[behind].state
+                and self.phases[before].strike is None)
         self._delete(i)
+        if join:
+            self.join((i - 1) % (count - 1))
+
+    def swap(self, i: int) -> None:
+        """Exchange the events at both ends of a phase without duration."""
+        count = len(self.phases)
+        before, phase, behind = (self.phases[(i + step) % count] for step in (-1, 0, 1))
+        first = before.ending(phase.event, phase.strike)
+        status = tuple(there if there != here else old for old, here, there in zip(
+            before.status, phase.status, behind.status, strict=True))
+        closed = tuple(there if there != here else old for old, here, there in zip(
+            before.closed, phase.closed, behind.closed, strict=True))
+        t, last = self.begin(i), (i - 1) % count
+        state = self.motion.run(t - self.durations[last], np.array([self.durations[last]]),
+                                self.starts[last], before)[0][-1]
+        if first.strike is not None:
+            state = self.motion.struck(t, state, first)
+        self.phases[last] = first
+        self.phases[i] = Phase(status, closed, before.event, before.strike)
+        self.starts[i] = state
 
     def _delete(self, i: int) -> None:
         if i == 0:
@@ -170,21 +224,21 @@ def _with(phase: Phase, cluster: int, status: int, event: int) -> Phase:
 def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Successor]:
     """Orbits that may go on where a condition has nothing left."""
     i, event = condition.phase, condition.event
-    phase = problem.phases[i]
+    phase, before = problem.phases[i], problem.phases[i - 1]
     k = len(phase.status)
     cluster = event // 2 if 0 <= event < 2 * k else None
     found = Successor(problem, u)
-    if condition.what == DURATION and problem.count > 1:
+    if condition.what == STRIKE:
+        if cluster is not None:
+            yield from _other_impacts(problem, u, condition, cluster)
+    elif cluster is None and condition.what != DURATION:
+        yield from _at_stop(problem, found, condition)
+    elif condition.what == DURATION and problem.count > 1:
         found.drop(i)
         yield found
-    elif condition.what == RATE and cluster is None and not phase.closed[event - 2 * k]:
-        if phase.state == problem.phases[(i + 1) % problem.count].state:
-            found.join(i)
-            yield found
-    elif condition.what == WITHIN and cluster is None and not phase.closed[event - 2 * k]:
-        rubs = found.motion.rubbing[found.motion.problem.cluster[event - 2 * k]]
-        if not rubs:
-            found.split(i, condition.after, phase.ending(event, _touch(found.motion, event)))
+        if _of_others(before, phase):
+            found = Successor(problem, u)
+            found.swap(i)
             yield found
     elif condition.what == WITHIN and cluster is not None:
         sense = phase.status[cluster]
@@ -199,7 +253,7 @@ def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Succ
             found.insert(i + 1, begun)
         yield found
     elif condition.what == BEGIN and cluster is not None and not crosses(
-            problem.phases[i - 1], phase) and problem.phases[i - 1].cluster() == cluster:
+            before, phase) and before.cluster() == cluster:
         found.insert(i, _with(phase, cluster, released_sense(event), 2 * cluster))
         yield found
     elif condition.what == CROSSING and cluster is not None:
@@ -207,6 +261,41 @@ def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Succ
         yield found
 
 
-def _touch(motion: Motion, event: int) -> Strike:
-    """The impact of a stop without friction that is only touched."""
-    return Strike((event - 2 * motion.clusters,), (0,) * motion.clusters)
+def _at_stop(
+    problem: EventOrbit, found: Successor, condition: Condition
+) -> Iterator[Successor]:
+    """Orbits behind a touch without speed."""
+    i, event, count = condition.phase, condition.event, problem.count
+    phase, motion = problem.phases[i], found.motion
+    stop = event - 2 * motion.clusters
+    if condition.what == RATE and not phase.closed[stop]:
+        if phase.state == problem.phases[(i + 1) % count].state:
+            found.join(i)
+            yield found
+    elif condition.what == WITHIN and not phase.closed[stop]:
+        begin, after = found.begin(i), condition.after
+        state = motion.run(begin, np.array([after]), found.starts[i], phase)[0][-1]
+        touch = motion.touch(begin + after, state, phase.ending(event))
+        if touch is not None:
+            found.split(i, after, phase.ending(event, touch))
+            yield found
+
+
+def _other_impacts(
+    problem: EventOrbit, u: Array, condition: Condition, cluster: int
+) -> Iterator[Successor]:
+    """Orbits whose impact stops the slip that it did not stop, or the other way round.
+
+    Where its contact stays closed, what it stops no more slips for a moment before it sticks.
+    """
+    i = condition.phase
+    phase, behind = problem.phases[i], problem.phases[(i + 1) % problem.count]
+    assert phase.strike is not None
+    modes, stopped = list(phase.strike.modes), phase.strike.modes[cluster] == STICK
+    sense = released_sense(condition.event)
+    modes[cluster] = sense if stopped else STICK
+    found = Successor(problem, u)
+    found.phases[i] = phase.ending(phase.event, replace(phase.strike, modes=tuple(modes)))
+    if stopped and behind.status[cluster] in (STICK, -sense):
+        found.insert((i + 1) % problem.count, _with(behind, cluster, sense, 2 * cluster))
+    yield found

@@ -13,7 +13,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
-from fecontact.bifurcation.events.conditions import DURATION, Condition
+from fecontact.bifurcation.events.conditions import DURATION, STRIKE, Condition
 from fecontact.bifurcation.events.orbit import EventOrbit, anchor
 from fecontact.bifurcation.events.phases import Motion
 from fecontact.bifurcation.events.tracing import Traced, traced
@@ -199,7 +199,7 @@ def _border(
                         [1, *(int(j in phase.strike.nodes) for j in range(motion.nodes)),
                          *phase.strike.modes] for phase in problem.phases], dtype=np.int64)
     return special_point(stored.u, stored.tangent, stored.values, kind, {
-        "time": time, "nodes": np.array(nodes_of(problem, motion, condition)),
+        "time": time, "nodes": np.array(nodes_of(problem, motion, condition, kind)),
         "persists": persists, "unknowns": last.u, "phases": phases, "strikes": strikes,
         "margins": problem.margins,
         "condition": np.array([condition.what, condition.phase, condition.event])})
@@ -240,12 +240,13 @@ def _following(
 
 
 def nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
-    """The conditions that have nothing left at a border, those of durations first."""
+    """The conditions that have nothing left at a border, those of impacts and durations first."""
     found = problem.linearise(u).conditions
     least = min(abs(condition.left) for condition in found)
     return sorted((condition for condition in found
                    if abs(condition.left) < max(_NOTHING, 10.0 * least)),
-                  key=lambda condition: (condition.what != DURATION, abs(condition.left)))
+                  key=lambda condition: (condition.what != STRIKE, condition.what != DURATION,
+                                         abs(condition.left)))
 
 
 def _null_vector(problem: EventOrbit, matrix: Array) -> Array:

@@ -2,7 +2,8 @@
 
 An orbit stops being of its kind where one of them has nothing left: a phase has no duration, what
 ends it vanishes without any rate (the orbit only touches there), something else vanishes within a
-phase or at its begin, or what slips through zero could stick there.
+phase or at its begin, what slips through zero could stick there, or an impact begins or ceases to
+stop the slip of a contact.
 """
 
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.problem import STICK
 
 # What has nothing left.
-DURATION, RATE, WITHIN, BEGIN, CROSSING = range(5)
+DURATION, RATE, WITHIN, BEGIN, CROSSING, STRIKE = range(6)
 # Parts of a phase at which conditions are looked at, closer together at its ends, and places of the
 # polynomial about a minimum.
 _NEAR = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
@@ -32,8 +33,8 @@ _CLOSE = 0.3
 class Condition(NamedTuple):
     """What is left of a condition, in parts of its scale, and which one it is.
 
-    ``what`` is DURATION, RATE, WITHIN, BEGIN or CROSSING, of the phase with this number, ``event``
-    what vanishes and ``after`` when, from the begin of the phase [s].
+    ``what`` is DURATION, RATE, WITHIN, BEGIN, CROSSING or STRIKE, of the phase with this number,
+    ``event`` what vanishes and ``after`` when, from the begin of the phase [s].
     """
 
     left: float
@@ -81,6 +82,11 @@ def of_phase(course: Course, i: int, rate: float) -> Iterator[Condition]:
     if duration > 0.0:
         yield from _within(course, i)
     yield from _at_begin(course, i)
+    if phase.strike is not None:
+        begin = float(course.begins[i])
+        state = course.motion.run(begin, np.array([duration]), course.starts[i], phase)[0][-1]
+        for event, left in course.motion.strike_left(begin + duration, state, phase):
+            yield Condition(left, STRIKE, i, event, duration)
 
 
 def sampled(course: Course, i: int, after: Array) -> Array:
@@ -137,14 +143,21 @@ def _at_begin(course: Course, i: int) -> Iterator[Condition]:
     k, event = course.motion.clusters, before.event
     margins = sampled(course, i, np.zeros(1))[0]
     cluster = before.cluster()
+    turning = [cluster] if cluster is not None and crosses(before, phase) else []
     for place in np.flatnonzero(np.isfinite(margins)).tolist():
-        if cluster is not None and phase.cluster(place) == cluster:
+        own = phase.cluster(place)
+        if cluster is not None and own == cluster:
             if phase.status[cluster] != STICK or before.status[cluster] == STICK:
                 continue
         elif cluster is None and place == event and not phase.closed[event - 2 * k]:
             continue
+        elif own is not None and place == 2 * own and before.strike is not None and (
+                before.strike.modes[own] == STICK and phase.status[own] in (1, -1)):
+            # What an impact has stopped slips again at once.
+            turning.append(own)
+            continue
         yield Condition(float(margins[place]), BEGIN, i, place)
-    if cluster is not None and crosses(before, phase):
+    for cluster in turning:
         held = Phase((*phase.status[:cluster], STICK, *phase.status[cluster + 1 :]), phase.closed,
                      PERIOD)
         start, begin = course.starts[i], course.begins[i : i + 1]

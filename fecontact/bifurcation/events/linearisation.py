@@ -1,6 +1,6 @@
 """Linearised equations of an orbit from event to event: residual, saltation, multipliers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -61,8 +61,26 @@ class EventLinearisation:
     @cached_property
     def _ends(self) -> list[End]:
         starts, durations = self.problem.starts(self.u), self.problem.durations(self.u)
-        return [self.end(phase, begin, start, duration) for phase, begin, start, duration in zip(
+        found = [self.end(phase, begin, start, duration) for phase, begin, start, duration in zip(
             self.problem.phases, self.begins, starts, durations, strict=False)]
+        found[-1] = self._settled(found[-1])
+        return found
+
+    def _settled(self, end: End) -> End:
+        """The end of the period with stops that are always closed where they are held.
+
+        Their equations tell accelerations alone, which would leave place and speed free.
+        """
+        stops, phase, t = self.problem.resting, self.problem.phases[-1], float(self.begins[-1])
+        if not stops:
+            return end
+        after, d = end.after, len(end.state)
+        motion = self.motion
+        slopes = motion.slopes_of(
+            lambda t, state, problem: motion.settled(t, state, phase, stops, problem), t, after)
+        jumped = slopes[:, :d] @ end.jumped
+        jumped[:, d:] += slopes[:, d:]
+        return replace(end, after=motion.settled(t, after, phase, stops), jumped=jumped)
 
     def end(
         self, phase: Phase, begin: float, start: Array, duration: float,
@@ -81,7 +99,8 @@ class EventLinearisation:
         after, jumped = state, np.eye(d, d + 2)
         if phase.strike is not None:
             after = motion.struck(t, state, phase)
-            jumped = motion.strike_slopes(t, state, phase)
+            jumped = motion.slopes_of(
+                lambda t, state, problem: motion.struck(t, state, phase, problem), t, state)
         return End(state, rates[0], moved, after, jumped, margin, slopes)
 
     def _event(self, i: int) -> tuple[float, Array]:

@@ -84,6 +84,14 @@ class EventOrbit(FloquetTests, Problem):
         """Whether something is given in time."""
         return self.field.forcing_period(self.values) is not None
 
+    @cached_property
+    def resting(self) -> tuple[int, ...]:
+        """Stops that are closed all the time."""
+        if self.solver.restitution is None:
+            return ()
+        closed = np.array([phase.closed for phase in self.phases], dtype=bool)
+        return tuple(np.flatnonzero(closed.all(axis=0)).tolist())
+
     @property
     def count(self) -> int:
         """Number of phases K."""
@@ -170,8 +178,7 @@ class EventOrbit(FloquetTests, Problem):
         off = float((np.abs(end - start) / self.scales[: self.dimension]).max())
         if off > _RETURNS * max(1.0, growth):
             raise AnalysisError("A run from the orbit does not come back: an event between its "
-                                "phases was not seen, or an impact with friction begins or ceases "
-                                "to stick.")
+                                "phases was not seen.")
 
     def runs_from(self, u: Array) -> Array:
         """The state (d,) from which runs of the orbit start; see :func:`anchor`."""

@@ -1,5 +1,6 @@
 """Phases of set-valued orbits: contact states between events, their motion, and impacts."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, product
@@ -236,31 +237,65 @@ class Motion:
         assert phase.strike is not None
         return self._impact(t, state, phase, phase.strike, problem)[0]
 
-    def strike_slopes(self, t: float, state: Array, phase: Phase) -> Array:
-        """Slopes (d, d + 2) of the state after an impact by the state, time and parameter."""
+    def settled(
+        self, t: float, state: Array, phase: Phase, stops: tuple[int, ...],
+        problem: NonsmoothProblem | None = None,
+    ) -> Array:
+        """The state with closed stops at no height and without speed, to first order."""
+        m = self.modes
+        held, _, speeds, _ = self._strike_rows(t, state, phase, problem)
+        closed = tuple(0 if j in stops else each for j, each in enumerate(phase.closed))
+        heights = self.observed(np.array([t]), state[None], replace(phase, closed=closed),
+                                problem)[0][0, 2 * self.clusters :]
+        rows, each = held[list(stops)], list(stops)
+        after = state.copy()
+        after[:m] -= rows.T @ np.linalg.solve(rows @ rows.T, heights[each])
+        after[m:] += rows.T @ np.linalg.solve(rows @ rows.T, speeds[each])
+        return after
+
+    def slopes_of(
+        self, change: Callable[[float, Array, NonsmoothProblem], Array], t: float, state: Array
+    ) -> Array:
+        """Slopes (d, d + 2) of a changed state by the state, time and parameter."""
         d = len(state)
         times, states = self._around(t, state)
-        found = np.array([self.struck(time, each, phase)
+        found = np.array([change(time, each, self.problem)
                           for time, each in zip(times, states, strict=True)]).reshape(-1, 4, d)
         steps = np.append(PART * self.sizes, self.tick)[: len(found)]
         slopes = np.zeros((d, d + 2))
         slopes[:, : len(found)] = (np.einsum("ikj,k->ij", found, _WEIGHTS) / steps[:, None]).T
-        above, below, change = self._beside
-        slopes[:, -1] = (self.struck(t, state, phase, above)
-                         - self.struck(t, state, phase, below)) / (2.0 * change)
+        above, below, width = self._beside
+        slopes[:, -1] = (change(t, state, above) - change(t, state, below)) / (2.0 * width)
         return slopes
+
+    def _strike_rows(
+        self, t: float, state: Array, phase: Phase, problem: NonsmoothProblem | None
+    ) -> tuple[Array, Array, Array, Array]:
+        """See :func:`fecontact.bifurcation.events.flow.strike_rows`."""
+        k, n, m = self.clusters, self.nodes, self.modes
+        found = (np.empty((n + k, m)), np.empty((n + k, m)), np.empty(n + k), np.empty(n))
+        strike_rows(self.problem if problem is None else problem, self._workspace, t,
+                    np.ascontiguousarray(state), *phase.arrays, self._full, self._rate, *found)
+        return found
+
+    def strike_left(self, t: float, state: Array, phase: Phase) -> list[tuple[int, float]]:
+        """What the impact at the end of a phase has left: places of events, and parts."""
+        assert phase.strike is not None
+        return self._impact(t, state, phase, phase.strike)[1]
 
     def _impact(
         self, t: float, state: Array, phase: Phase, strike: Strike,
         problem: NonsmoothProblem | None = None,
-    ) -> tuple[Array, bool]:
-        """The state after an impact of a given kind, and whether its conditions hold."""
+    ) -> tuple[Array, list[tuple[int, float]]]:
+        """The state after an impact of a given kind, and what its conditions have left.
+
+        The events of clusters whose slip it stops tell how far their impulse is from either edge of
+        the cone, those of others by what they slip in their sense, those of stops by what presses
+        or parts them; in parts of the largest impulse or speed.
+        """
         k, n, m = self.clusters, self.nodes, self.modes
-        held, pushing = np.empty((n + k, m)), np.empty((n + k, m))
-        speeds, coefficients = np.empty(n + k), np.empty(n)
         chosen = self.problem if problem is None else problem
-        strike_rows(chosen, self._workspace, t, np.ascontiguousarray(state), *phase.arrays,
-                    self._full, self._rate, held, pushing, speeds, coefficients)
+        held, pushing, speeds, coefficients = self._strike_rows(t, state, phase, chosen)
         for j in strike.nodes:
             sense = strike.modes[chosen.cluster[j]]
             if sense in (1, -1):
@@ -272,24 +307,48 @@ class Motion:
         wanted = np.concatenate([(1.0 + e) * speeds[list(strike.nodes)],
                                  -(1.0 + across) * speeds[stopped]])
         try:
-            impulses = np.linalg.solve(matrix, wanted)
+            found = np.linalg.solve(matrix, wanted)
         except np.linalg.LinAlgError:
-            return state, False
+            return state, [(phase.event, -np.inf)]
+        impulses = np.zeros(n + k)
+        impulses[active] = found
         after = state.copy()
-        after[m:] += pushing[active].T @ impulses
-        normal = dict(zip(strike.nodes, impulses, strict=False))
-        near = _ROUNDING * (np.abs(impulses).max() + 1e-300)
-        fits = min(normal.values()) >= -near
+        after[m:] += pushing[active].T @ found
         moved = held @ (after[m:] - state[m:])
+        most = np.abs(found).max() or 1.0
+        fastest = np.abs(np.concatenate([speeds, moved])).max() or 1.0
+        # Stops and clusters that nothing reaches meet their conditions with nothing left.
+        sizes = np.linalg.norm(held, axis=1), np.linalg.norm(pushing, axis=1)
+        near = np.abs(held @ pushing.T) > _ROUNDING * np.outer(*sizes)
+        np.fill_diagonal(near, False)
+        struck = phase.event - 2 * k
+        idle = np.array([j != struck and not near[j, active].any() for j in range(n)])
+        left = [(2 * k + j, float(impulses[j] / most)) for j in strike.nodes if not idle[j]]
+        left += [(2 * k + j, float((moved[j] - speeds[j]) / fastest)) for j in range(n)
+                 if phase.closed[j] and j not in strike.nodes and not idle[j]]
         for c, mode in enumerate(strike.modes):
-            limit = sum(coefficients[j] * impulse for j, impulse in normal.items()
-                        if chosen.cluster[j] == c)
-            if mode == STICK:
-                fits &= abs(impulses[active.index(n + c)]) <= limit + near
-            elif mode:
+            own = [j for j in strike.nodes if chosen.cluster[j] == c and not idle[j]]
+            if mode == STICK and own:
+                limit, given = float(coefficients[own] @ impulses[own]), float(impulses[n + c])
+                left += [(2 * c, (limit - given) / most), (2 * c + 1, (limit + given) / most)]
+            elif mode in (1, -1) and own:
                 # The sense is that of s+ + e_T s-.
-                fits &= mode * ((1.0 + across) * speeds[n + c] + moved[n + c]) >= -near
-        return after, bool(fits)
+                left.append((2 * c, float(mode * ((1.0 + across) * speeds[n + c] + moved[n + c])
+                                          / fastest)))
+        return after, left
+
+    def touch(self, t: float, state: Array, phase: Phase) -> Strike | None:
+        """The impact of the stop at the end of a phase that is only touched; None in stick."""
+        node = phase.event - 2 * self.clusters
+        own = int(self.problem.cluster[node])
+        for mode in (1, -1) if self.rubbing[own] else (0,):
+            modes = [0] * self.clusters
+            modes[own] = mode
+            strike = Strike((node,), tuple(modes))
+            if all(part > 0.0 for event, part in self._impact(t, state, phase, strike)[1]
+                   if event < 2 * self.clusters):
+                return strike
+        return None
 
     def strike_at(
         self, t: float, state: Array, phase: Phase, wanted: Array
@@ -313,8 +372,9 @@ class Motion:
                     for c, mode in zip(rubbed, modes, strict=True):
                         given[c] = mode
                     strike = Strike(nodes, tuple(given))
-                    after, fits = self._impact(t, state, phase, strike)
+                    after, left = self._impact(t, state, phase, strike)
                     size = np.abs(np.concatenate([state, wanted])[self.modes :]).max()
+                    fits = all(part >= -_ROUNDING for _, part in left)
                     if fits and np.abs(after[self.modes :] - wanted).max() <= 1e-6 * size:
                         return strike
         raise AnalysisError("An impact of the orbit is of a kind that has no derivative.")

@@ -76,7 +76,11 @@ def order_of(motion: Motion, before: Phase, phase: Phase) -> int:
     if phase.event == PERIOD or phase.cluster() != cluster:
         return 0
     if cluster is None:
-        return int(phase.event == before.event and not phase.closed[_stop(motion, phase)])
+        stop = _stop(motion, phase)
+        if phase.event != before.event or phase.closed[stop]:
+            return 0
+        # Behind a lift-off, and an impact without rebound, the speed vanishes too.
+        return 2 if before.closed[stop] or motion.problem.restitution == 0.0 else 1
     if phase.status[cluster] == STICK or before.status[cluster] == OPEN:
         return 0
     if before.status[cluster] != STICK:

@@ -91,15 +91,42 @@ def from_motion(
     branch, why = _from_event_to_event(problem, u, options, direction=direction, both=both)
     if branch is not None:
         return branch
+    stepping = _of_stepping(problem, values)
     try:
-        return _noted(why, continue_branch(
+        branch = continue_branch(
             problem, u, options, name=_name(problem), direction=direction, both=both,
-            attributes=_attributes(problem)))
+            attributes=_attributes(problem))
     except (AnalysisError, InputError) as error:
+        remedy = stepping or (f"run it longer until it has settled, or take more than {segments} "
+                              f"segments.")
         raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {values[free]:.6g} "
-                            f"near the motion: Newton's method does not converge; run it longer "
-                            f"until it has settled, or take more than {segments} segments."
+                            f"near the motion: Newton's method does not converge; {remedy}"
                             ) from error
+    if stepping and branch.status is BranchStatus.STALLED:
+        why = f"{stepping[0].upper()}{stepping[1:]}"
+    return _noted(why, branch)
+
+
+def _of_stepping(problem: ShootingProblem, values: Array) -> str:
+    """Why Newton's method may fail on runs by time stepping, and what to take; else empty."""
+    solver = problem.solver
+    if not isinstance(solver, SetValued):
+        return ""
+    from fecontact.integrate.nonsmooth.driver import by_events
+
+    def goes(scheme: str) -> bool:
+        try:
+            return by_events(problem.field.system(values), scheme, solver.restitution, "newton",
+                             solver.static_coefficient)
+        except InputError:
+            return False
+
+    if goes(solver.scheme):
+        return ""
+    instead = ("SetValued(scheme='events'), whose orbits go from event to event"
+               if goes("events") else "a law with a finite smoothing_slope and Rodas5P()")
+    return ("runs by time stepping are exact to first order only where contacts begin to stick and "
+            f"slip, and have no derivatives there; take {instead}.")
 
 
 def _from_event_to_event(

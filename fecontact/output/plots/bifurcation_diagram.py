@@ -51,7 +51,7 @@ SPECIAL = {
     # Borders of contact states: one marker for all.
     "grazing": ("G", "d"), "grazing-sliding": ("GS", "d"), "crossing-sliding": ("CS", "d"),
     "switching-sliding": ("SS", "d"), "adding-sliding": ("AS", "d"), "lift-off": ("LO", "d"),
-    "corner": ("CC", "d"),
+    "impact-sliding": ("IS", "d"), "corner": ("CC", "d"),
 }
 # Letters alone, for diagrams of other kinds.
 LETTERS = {kind: letters for kind, (letters, _) in SPECIAL.items()}
