@@ -172,7 +172,15 @@ def finished(
     if not (np.isfinite(size) and size > 0.0):
         raise AnalysisError("The branch has no direction there: its equations grow beyond all "
                             "numbers.")
-    tangent = tangent / size
+    return completed(problem, u, linearisation, tangent / size, iterations, options,
+                     stored=stored)
+
+
+def completed(
+    problem: Problem, u: Array, linearisation: Linearisation, tangent: Array, iterations: int,
+    options: ContinuationOptions, *, stored: bool = True,
+) -> Solution:
+    """As :func:`finished` with a tangent that is known."""
     values = (problem.point(u, linearisation, tangent) if stored or options.events else {})
     return Solution(u, linearisation, tangent, iterations, values,
                     _tests(problem, u, linearisation, tangent, values, options))

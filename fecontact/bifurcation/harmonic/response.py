@@ -19,7 +19,7 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.bifurcation.harmonic import branches, starts
-from fecontact.bifurcation.harmonic.layout import layout_from
+from fecontact.bifurcation.harmonic.layout import Layout, layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_of_orbits, observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -176,14 +176,15 @@ def frequency_response(
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:
-            branch = branch_of_response(field, given, field.index(name), level_name, first,
-                                        method or HarmonicBalance(), chosen, held,
-                                        both=low < first < high)
+            branch = branch_of_response(
+                field, given, field.index(name), level_name, first, method or HarmonicBalance(),
+                chosen, held, both=low < first < high, row=row,
+                further=_told(observed, level_name, float(value)))
         except KeyboardInterrupt:
             if not found:
                 raise
             break
-        found.append(with_observed(branch, row, observed, level_name, float(value)))
+        found.append(branch)
         if branch.status is BranchStatus.INTERRUPTED:
             break
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
@@ -219,9 +220,12 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
 def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
     method: HarmonicBalance, options: ContinuationOptions, held: Array | None = None, *,
-    both: bool,
+    both: bool, row: Array | None = None, further: Mapping[str, Any] | None = None,
 ) -> Branch:
-    """The branch at one level; ``held`` (d,) is the state of a preload."""
+    """The branch at one level; ``held`` (d,) is the state of a preload.
+
+    ``row`` (d,) is what is observed, if anything, ``further`` are attributes of the branch.
+    """
     ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
     told: FecontactError = AnalysisError("No orbit was found to start from.")
     for begin in ends:
@@ -242,10 +246,14 @@ def branch_of_response(
             except FecontactError as error:
                 told = error
                 continue
+            if row is not None:
+                _require_observable(problem.layout, row)
+                problem = replace(problem, row=row)
             direction = 1.0 if begin < options.bounds[1] else -1.0
-            branch = branches.follow(problem, u, None, method, options, direction=direction,
-                                     both=both)
-            return replace(branch, message=stall_reason(field, branch))
+            branch = branches.follow(problem, u, None, method, options, further,
+                                     direction=direction, both=both)
+            message = stall_reason(field, branch)
+            return branch if message == branch.message else replace(branch, message=message)
     raise told
 
 
@@ -298,8 +306,7 @@ def rest_state(field: ContactField, values: Array) -> Array:
 
 def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
     """The problem with scales of the size of an orbit, which is found again to their precision."""
-    low, high = problem.extremes(u, problem.linearise(u).memory)
-    sizes = (high - low) / 2.0
+    sizes = np.ptp(problem.linearise(u).states, axis=0) / 2.0
     largest = float(sizes.max()) or 1.0
     sizes = np.maximum(sizes, 1e-3 * largest)
     scales = np.concatenate([sizes, problem.scales[-2:]])
@@ -354,19 +361,28 @@ def with_observed(
 ) -> Branch:
     """The branch with what is observed at its points, and its level as attributes."""
     layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
-    if row[layout.states - layout.memory :].any():
-        raise InputError("Internal variables of friction cannot be observed; choose a displacement "
-                         "or a velocity.")
+    _require_observable(layout, row)
     b = layout.harmonic
     X = np.array([point.u[: (2 * H + 1) * b] for point in branch.points]).reshape(-1, 2 * H + 1, b)
     seen = observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
-    attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
-                                  "level_name": level_name or ""}
+    attributes = {**branch.attributes, **_told(observed, level_name, level)}
     header = BranchHeader(branch.parameter_name, attributes)
-    points = [special_point(point.u, point.tangent, {**point.values, **each}, point.kind,
+    points = [special_point(point.u, point.tangent, {
+        **point.values, **{name: values[k] for name, values in seen.items()}}, point.kind,
                             details_of(point), header)
-              for point, each in zip(branch.points, seen, strict=True)]
+              for k, point in enumerate(branch.points)]
     return replace(branch, points=tuple(points), attributes=attributes)
+
+
+def _require_observable(layout: Layout, row: Array) -> None:
+    if row[layout.states - layout.memory :].any():
+        raise InputError("Internal variables of friction cannot be observed; choose a displacement "
+                         "or a velocity.")
+
+
+def _told(observed: str, level_name: str | None, level: float) -> dict[str, Any]:
+    """Attributes of a branch of responses."""
+    return {"observed": observed, "level": level, "level_name": level_name or ""}
 
 
 def continued(

@@ -137,6 +137,9 @@ def corrected(
     """
     row = np.zeros_like(u)
     row[-1] = 1.0
+    found = problem.found(u, row, tolerance)
+    if found is not None:
+        return problem, found[0]
     name = list(problem.field.parameters)[problem.free]
     where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
     weights = problem.weights()
@@ -156,17 +159,17 @@ def corrected(
         while True:
             try:
                 trial = problem.linearise(u + factor * step)
-                found = float(np.linalg.norm(trial.residual))
+                left = float(np.linalg.norm(trial.residual))
             except AnalysisError:
-                found = np.inf
-            if found < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(found)):
+                left = np.inf
+            if left < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(left)):
                 break
             factor /= 2.0
             if factor < 1e-4:
                 raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does "
                                     f"not converge (residual {norm:.3g}); start nearer to it, or "
                                     f"take other than {problem.harmonics} harmonics.")
-        u, linearised, norm = u + factor * step, trial, found
+        u, linearised, norm = u + factor * step, trial, left
         if small:
             if problem.autonomous and motion(u) <= 1e-4 * begin:
                 raise AnalysisError(f"No periodic orbit was found {where}: the iteration ends "

@@ -88,7 +88,7 @@ class CompiledBalance:
     ) -> arrays.Equations:
         layout, series = problem.layout, problem.series
         m, L = layout.displacements, 2 * problem.harmonics + 1
-        numbers = np.zeros(arrays.ROUNDING + 1)
+        numbers = np.zeros(arrays.FOLDS + 1)
         if problem.turn is not None:
             numbers[arrays.TURN] = problem.periods * problem.turn
         else:
@@ -104,6 +104,8 @@ class CompiledBalance:
             contact = _contact_alone(contact)
             body, given = found
             numbers[arrays.STEADY] = self._steady(near)
+            numbers[arrays.PLAIN] = (numbers[arrays.STEADY] and problem.size <= MOST_UNKNOWNS
+                                     and not layout.memory and self._plain(near))
         return arrays.Equations(
             contact, near.flat, near.base, near.slope, series.times, series.values,
             series.projection, series.cosines, series.sines, body, given,
@@ -138,6 +140,11 @@ class CompiledBalance:
             np.shares_memory(array, near.flat)
             for name, array in near.arrays._asdict().items()
             if isinstance(array, np.ndarray) and name not in _OF_BODY)
+
+
+    def _plain(self, near: AffineArrays) -> bool:
+        """Whether contact forces are those of plane bodies on ground of constant speed."""
+        return not len(near.arrays.T2) and self.contact_field.system().prescribed_motion.constant
 
 
 def _affine(places: Array, found: list[Array]) -> tuple[Array, Array]:
