@@ -1,6 +1,6 @@
 """The contact system: a modal basis, laws at its contact nodes, drive and load."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -23,23 +23,23 @@ from fecontact.reduction.basis_parameters import basis_parameter, with_basis_par
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
-from fecontact.system.arrays import system_arrays
+from fecontact.system.arrays import excited, system_arrays
 from fecontact.system.friction_memory import bristle_history
 from fecontact.system.gap import Gap, gap_values
 from fecontact.system.interfaces import (
     Interface,
     PrescribedMotion,
     Sliding,
-    SlidingRotation,
     checked_sliding,
     inner_name,
     motion_sources,
     outer_name,
     prescribed_motion,
     slides,
+    sliding_speed,
     system_fields,
 )
-from fecontact.system.loads import require_motion
+from fecontact.system.loads import load_summary, require_motion
 from fecontact.system.nodes import SystemArrays
 
 NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a rough "
@@ -112,7 +112,7 @@ class ContactSystem(Summarised):
         their point.
     """
 
-    # Basis and normal are required; the error message is more helpful than Python's own.
+    # Basis and normal are required, with a message more helpful than Python's own.
     basis: ModalBasis = None  # type: ignore[assignment]
     normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
     friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]
@@ -148,10 +148,6 @@ class ContactSystem(Summarised):
             if isinstance(self.basis, ModalBasis) and needs_friction(self.basis):
                 raise InputError(NO_FRICTION_LAW.format("ContactSystem lacks friction"))
             object.__setattr__(self, "friction", ConstantFriction(0.0))
-        for name, kind in _KINDS.items():
-            if not isinstance(getattr(self, name), kind):
-                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} must be a "
-                                 f"{kind.__name__}.")
         for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
             given = getattr(self, name)
             if isinstance(given, Mapping):
@@ -159,14 +155,8 @@ class ContactSystem(Summarised):
                 object.__setattr__(self, name, MappingProxyType(dict(given)))
             for one in getattr(self, name).values() if isinstance(given, Mapping) else (given,):
                 if not isinstance(one, law):
-                    raise InputError(f"ContactSystem: {name} = {one!r} must be a "
-                                     f"{law.__name__}.")
-        if self.basis.dimension == 2:
-            for what, needs in (("Ground", self.ground.in_space), ("Drive", self.drive.in_space)):
-                if needs:
-                    raise InputError(f"ContactSystem: the {what.lower()} acts or moves along a "
-                                     f"third direction, but the body is plane; leave that out, or "
-                                     f"make a solid.")
+                    raise InputError(f"ContactSystem: {name} = {one!r} must be a {law.__name__}.")
+        self._require_parts(_KINDS)
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
         _ = self.prescribed_motion
@@ -177,6 +167,27 @@ class ContactSystem(Summarised):
         require_motion(self.basis, self.drive, self.load)
         _ = self.arrays
 
+    def _require_parts(self, names: Iterable[str]) -> None:
+        for name in names:
+            if not isinstance(getattr(self, name), _KINDS[name]):
+                raise InputError(f"ContactSystem: {name} = {getattr(self, name)!r} must be a "
+                                 f"{_KINDS[name].__name__}.")
+        if self.basis.dimension == 2:
+            for what, needs in (("Ground", self.ground.in_space), ("Drive", self.drive.in_space)):
+                if needs:
+                    raise InputError(f"ContactSystem: the {what.lower()} acts or moves along a "
+                                     f"third direction, but the body is plane; leave that out, or "
+                                     f"make a solid.")
+
+    def _excited(self, parts: Mapping[str, Any]) -> "ContactSystem":
+        """A copy with another drive or load; all else has been checked, and keeps its arrays."""
+        made = object.__new__(type(self))
+        made.__dict__.update(self.__dict__, **parts)
+        made._require_parts(parts)
+        require_motion(made.basis, made.drive, made.load)
+        made.__dict__["arrays"] = excited(self.arrays, made.basis, parts)
+        return made
+
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
         names = [group for group, _ in self.basis.groups]
         for group in given:
@@ -186,8 +197,8 @@ class ContactSystem(Summarised):
                                  f"the basis are: {choices(names)}.")
         missing = [group for group in names if group not in given]
         if missing:
-            raise InputError(f"ContactSystem: {name} lacks a law for the "
-                             f"interface{'s' * (len(missing) > 1)} {choices(missing)}.")
+            raise InputError(f"ContactSystem: {name} lacks a law for the interface"
+                             f"{'s' * (len(missing) > 1)} {choices(missing)}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes and contact nodes, laws, ground, drive and load."""
@@ -203,13 +214,13 @@ class ContactSystem(Summarised):
             *((kind, names) for kind in ("normal", "friction")
               if (names := _law_names(getattr(self, kind),
                                       self.basis.springs if kind == "friction" else ()))),
-            *([("sliding", listed([f"{name} {_sliding_speed(one)}"
+            *([("sliding", listed([f"{name} {sliding_speed(one)}"
                                    for name, one in self.sliding.items()]))]
               if self.sliding else []),
             ("ground", quantity(ground.speed, "m/s")
              + (f", {quantity(high - low, 'm')} from valley to peak" if ground.wavy else "")),
             ("drive", listed(stiffness) + (f", {moved:.5g} Hz" if moved else "")),
-            ("load", _load_summary(self.load)),
+            ("load", load_summary(self.load)),
         ]
 
     def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
@@ -380,9 +391,12 @@ class ContactSystem(Summarised):
         for name in changes:
             if "." in name and inner_name(name).partition(".")[0] not in PARTS:
                 raise self._unknown(name)
+        wanted = {name: changes[given] for name, given in inner.items()}
+        parts = {part: getattr(self, part, None) for part in {n.partition(".")[0] for n in inner}}
         try:
-            return cast("ContactSystem", with_parameters(self, {
-                name: changes[given] for name, given in inner.items()}))
+            if parts and parts.keys() <= {"drive", "load"}:
+                return self._excited(with_parameters(parts, wanted))
+            return cast("ContactSystem", with_parameters(self, wanted))
         except KeyError as error:
             raise self._unknown(inner.get(error.args[0], error.args[0])) from None
 
@@ -407,7 +421,11 @@ class ContactSystem(Summarised):
         """
         if name.startswith("basis."):
             return basis_parameter(self.basis, name.removeprefix("basis."))
-        return self.gap if name == "gap" else self.parameters().get(name)
+        part, _, inner = name.partition(".")
+        own = vars(getattr(self, part)) if part in _KINDS and name not in IN_SPACE_ONLY else {}
+        value = self.gap if name == "gap" else own.get(inner)
+        found = name == "gap" or isinstance(value, float)
+        return value if found else self.parameters().get(name)
 
     def _checked(self, y: Array) -> Array:
         state = np.ascontiguousarray(y, dtype=float)
@@ -422,22 +440,6 @@ class ContactSystem(Summarised):
         return InputError(f"The system has no parameter '{outer_name(self, name)}'"
                           f"{nearest(name, names)}; "
                           f"its parameters are: {choices(names)}.")
-
-
-def _sliding_speed(sliding: Sliding) -> str:
-    return quantity(sliding.speed, "rad/s" if isinstance(sliding, SlidingRotation) else "m/s") + (
-        "" if sliding.motion is None else " in time")
-
-
-def _load_summary(load: Load) -> str:
-    parts = [quantity(load.normal, "N")]
-    if load.gravity is not None:
-        parts.append(f"gravity ({', '.join(f'{g:.4g}' for g in load.gravity)}) m/s²")
-    if load.boundaries:
-        parts.append(f"on {listed([one.boundary for one in load.boundaries])}")
-    if load.signals:
-        parts.append(f"{len(load.signals)} in time")
-    return ", ".join(parts)
 
 
 def _law_names(law: Any, without: tuple[str, ...]) -> str:

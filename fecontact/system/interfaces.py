@@ -17,7 +17,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
-from fecontact.core.units import listed
+from fecontact.core.units import listed, quantity
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
@@ -288,6 +288,12 @@ def checked_sliding(
                          f"{(*upright[:-1], 1)}, but some on the ground have others; make the "
                          f"ground flat.")
     return MappingProxyType(dict(sliding))
+
+
+def sliding_speed(sliding: Sliding) -> str:
+    """Speed of a sliding side, for people."""
+    return quantity(sliding.speed, "rad/s" if isinstance(sliding, SlidingRotation) else "m/s") + (
+        "" if sliding.motion is None else " in time")
 
 
 def prescribed_motion(

@@ -199,8 +199,10 @@ def _tests(
     found: dict[str, float] = {}
     if options.locate:
         found |= {"fold": float(tangent[-1]), **problem.tests(u, linearisation, tangent)}
-    known = {**values, "parameter": float(u[-1])}
-    return found | {name: float(event(known)) for name, event in options.events.items()}
+    if options.events:
+        known = {**values, "parameter": float(u[-1])}
+        found |= {name: float(event(known)) for name, event in options.events.items()}
+    return found
 
 
 def norm(problem: Problem, vector: Array) -> float:

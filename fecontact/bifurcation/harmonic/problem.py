@@ -1,7 +1,7 @@
 """Continuation problem of periodic orbits by harmonic balance."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution, completed, weighted_norm
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -291,6 +292,10 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             found[VANISHING] = shrunk(np.ones(1), self.coefficients(u)[1:] / self._sizes,
                                       self.reference[1:] / self._sizes)
         return found
+
+    def note(self, points: Sequence[BranchPoint]) -> str:
+        """Where multipliers are lost, if they are asked for."""
+        return "" if self.stability is None else super().note(points)
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""

@@ -38,6 +38,8 @@ from fecontact.system.quasistatic.rest_state import RestState
 
 # Points of a branch at most, and largest step, unless options say so.
 _POINTS, _LARGEST = 2000, 0.03
+# Part of all forces below which their means are nothing.
+_NOTHING = 1e-14
 _FREQUENCY = "drive.angular_frequency"
 
 
@@ -265,15 +267,15 @@ def _problem(
 
     Elements that never slide keep the deflection of the state ``held``, or of rest.
     """
-    period = field.forcing_period(values)
-    if period is None:
+    name = list(field.parameters)[free]
+    scales = np.ones(field.dimension + 2)
+    scales[-1] = width_of(None, options, float(values[free]))
+    problem = starts.problem_for(field, values, free, method, scales)
+    if problem.autonomous:
         raise InputError("Nothing excites the system with a period; a frequency response needs a "
                          "harmonic drive or load.")
-    name = list(field.parameters)[free]
-    width = width_of(None, options, float(values[free]))
-    problem = starts.problem_for(field, values, free, method,
-                                 np.concatenate([np.ones(field.dimension), [period, width]]))
-    if not np.isfinite(period):
+    scales[-2] = problem.period(values[[free]])
+    if not np.isfinite(scales[-2]):
         raise InputError(f"At {name} = {values[free]:g} the excitation has no period.")
     if isinstance(field, ContactField) and problem.layout.memory:
         state = rest_state(field, values) if held is None else held
@@ -287,10 +289,19 @@ def _from_rest(
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit that Newton's method finds from rest, and scales of its size."""
     problem = _problem(field, values, free, method, options, held)
-    state = (rest_state(field, values) if isinstance(field, ContactField)
-             else np.zeros(field.dimension))
-    u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
+    u = np.append(np.zeros(problem.size), values[free])
+    if isinstance(field, ContactField) and not _rests_at_zero(problem, field, u):
+        state = rest_state(field, values)
+        u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
     return _scaled(*starts.corrected(problem, u))
+
+
+def _rests_at_zero(problem: HarmonicProblem, field: ContactField, u: Array) -> bool:
+    """Whether the means of all forces are zero without displacement."""
+    if problem.layout.memory or field.system().basis.springs:
+        return False
+    residual = np.abs(problem.evaluate(u).residual)
+    return bool(residual[: problem.layout.displacements].max() <= _NOTHING * residual.max())
 
 
 def rest_state(field: ContactField, values: Array) -> Array:
@@ -306,7 +317,12 @@ def rest_state(field: ContactField, values: Array) -> Array:
 
 def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
     """The problem with scales of the size of an orbit, which is found again to their precision."""
-    sizes = np.ptp(problem.linearise(u).states, axis=0) / 2.0
+    here = problem.linearise(u)
+    if problem.layout.memory:
+        low, high = problem.extremes(u, here.memory)
+        sizes = (high - low) / 2.0
+    else:
+        sizes = np.ptp(here.states, axis=0) / 2.0
     largest = float(sizes.max()) or 1.0
     sizes = np.maximum(sizes, 1e-3 * largest)
     scales = np.concatenate([sizes, problem.scales[-2:]])

@@ -143,6 +143,8 @@ def steps(u, tangent, bend, scales, e, out, why):
     for k in range(n + 1):
         bend[k], third[k] = 0.5 * bend[k], 0.0
     step, count, halvings, last_turn, alike, far = out.step[0], 0, 0, 0.0, 0, 0.0
+    # With internal variables of friction branches have kinks, too many for a cubic.
+    smooth = 0.0 if len(e.offsets) > 0 else 1.0
     why[0] = FULL
     while count < len(out.u):
         for k in range(n + 1):
@@ -214,7 +216,7 @@ def steps(u, tangent, bend, scales, e, out, why):
         way, bent = inner(row, chord), 1.0 if last_turn == 0.0 else 0.0
         for k in range(n + 1):
             new = out.tangent[last, k]
-            third[k] = bent * (way * (tangent[k] + new) - 2.0 * chord[k]) / (way * way * way)
+            third[k] = smooth * bent * (way * (tangent[k] + new) - 2.0 * chord[k]) / (way * way * way)
             bend[k] = bent * 0.5 * (new - tangent[k]) / way + 1.5 * way * third[k]
             tangent[k], u[k] = new, there[k]
         factor = 2.0 if made == 1 else (1.5 if made == 2 else 0.7)

@@ -71,7 +71,7 @@ class Strides:
             self.waits -= 1
             return None
         e = problem.equations(float(here.u[-1]))
-        if e is None:
+        if e is None or (here is start and problem.layout.memory):
             return None
         options = self.options
         stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
@@ -142,7 +142,8 @@ class Strides:
             return None
         values = problem.stored(u, out.z[:made], out.forces[:made], out.mean[:made],
                                 out.scales[:made, :m], known)
-        points = branch_points(u[:whole], tangents[:whole], values, folds, header)
+        points = branch_points(u[:whole], tangents[:whole], values[:whole], folds[:whole],
+                               header)
         count = whole - sum(folds[:whole])
         if bound and whole == made:
             return Stride(points, count, problem, here, here, float(out.step[0]),
