@@ -78,7 +78,7 @@ def system_arrays(
 def drive_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
     """Those of the arrays that depend on the drive, by name."""
     d = basis.dimension
-    B, motions = basis.T[0, :d], drive.motions[:d]
+    B = basis.T[0, :d]
     stiffness, damping = np.array(basis.stiffness_matrix), basis.damping.copy()
     for row, c, b in zip(B, drive.stiffness, drive.damping, strict=False):
         stiffness += c * np.outer(row, row)
@@ -88,7 +88,13 @@ def drive_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
             "drive_stiffness": np.array(drive.stiffness[:d], dtype=float),
             "drive_damping": (np.array(drive.damping[:d], dtype=float)
                               if drive.dashpots == "relative" else np.zeros(d)),
-            "drive_parameters": _rows([motion.parameters() for motion in motions]),
+            **_motion_arrays(basis, drive)}
+
+
+def _motion_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
+    """Those that depend on the motions of the drive."""
+    motions = drive.motions[: basis.dimension]
+    return {"drive_parameters": _rows([motion.parameters() for motion in motions]),
             "drive": _addresses(motion.kernel for motion in motions)}
 
 
@@ -101,11 +107,14 @@ def load_arrays(basis: ModalBasis, load: Load) -> dict[str, Any]:
             "load": _addresses(signal.kernel for signal in signals)}
 
 
-def excited(arrays: SystemArrays, basis: ModalBasis, parts: Mapping[str, Any]) -> SystemArrays:
-    """The arrays with another 'drive' or 'load'."""
-    changed = {}
-    if "drive" in parts:
-        changed |= drive_arrays(basis, parts["drive"])
+def excited(
+    arrays: SystemArrays, basis: ModalBasis, drive: Drive, parts: Mapping[str, Any]
+) -> SystemArrays:
+    """The arrays with another 'drive' than the one given, or another 'load'."""
+    changed, new = {}, parts.get("drive", drive)
+    if new is not drive:
+        supports = [(one.stiffness, one.damping, one.dashpots) for one in (drive, new)]
+        changed |= (_motion_arrays if supports[0] == supports[1] else drive_arrays)(basis, new)
     if "load" in parts:
         changed |= load_arrays(basis, parts["load"])
     return arrays._replace(**changed)

@@ -185,7 +185,7 @@ class ContactSystem(Summarised):
         made.__dict__.update(self.__dict__, **parts)
         made._require_parts(parts)
         require_motion(made.basis, made.drive, made.load)
-        made.__dict__["arrays"] = excited(self.arrays, made.basis, parts)
+        made.__dict__["arrays"] = excited(self.arrays, self.basis, self.drive, parts)
         return made
 
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:

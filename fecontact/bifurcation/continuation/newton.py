@@ -178,10 +178,11 @@ def finished(
 
 def completed(
     problem: Problem, u: Array, linearisation: Linearisation, tangent: Array, iterations: int,
-    options: ContinuationOptions, *, stored: bool = True,
+    options: ContinuationOptions, values: Mapping[str, Any] | None = None, *, stored: bool = True,
 ) -> Solution:
-    """As :func:`finished` with a tangent that is known."""
-    values = (problem.point(u, linearisation, tangent) if stored or options.events else {})
+    """As :func:`finished` with a tangent, and perhaps values, that are known."""
+    if values is None:
+        values = (problem.point(u, linearisation, tangent) if stored or options.events else {})
     return Solution(u, linearisation, tangent, iterations, values,
                     _tests(problem, u, linearisation, tangent, values, options))
 

@@ -263,16 +263,20 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         found = self.found(u, row, options.tolerance)
         if found is None:
             return None
-        u, along = found
+        u, along, forces, mean, z = found
+        values = None if self.stability is not None else self.stored(
+            u[None], z[None], forces[None], mean[None], self.scales[None, self.layout.columns],
+            {})[0]
         return completed(self, u, self.linearise(u), along / weighted_norm(self.weights(), along),
-                         1, options)
+                         1, options, values)
 
     def found(
         self, u: Array, row: Array, tolerance: float
-    ) -> tuple[Array, Array] | None:
+    ) -> tuple[Array, ...] | None:
         """The orbit near u at right angles to a row, by compiled code; None where it finds none.
 
-        With the direction x of the branch, ``row @ x = 1``.
+        With the direction x of the branch, ``row @ x = 1``, accelerations at the samples, their
+        mean derivatives, and internal variables, as :meth:`stored` takes them.
         """
         e = self.equations(float(u[-1])) if type(self) is HarmonicProblem else None
         if e is None:
@@ -283,7 +287,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         if not (evaluate(u, ORBIT, e, forces, mean, row, self.weights(), along)
                 and math.isfinite(weighted_norm(self.weights(), along))):
             return None
-        return u, along
+        return u, along, forces, mean, e.room.z.copy()
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, if known, and of orbits that shrink to rest."""

@@ -19,7 +19,8 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.bifurcation.harmonic import branches, starts
-from fecontact.bifurcation.harmonic.layout import Layout, layout_from
+from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
+from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_of_orbits, observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -38,8 +39,6 @@ from fecontact.system.quasistatic.rest_state import RestState
 
 # Points of a branch at most, and largest step, unless options say so.
 _POINTS, _LARGEST = 2000, 0.03
-# Part of all forces below which their means are nothing.
-_NOTHING = 1e-14
 _FREQUENCY = "drive.angular_frequency"
 
 
@@ -230,6 +229,8 @@ def branch_of_response(
     """
     ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
     told: FecontactError = AnalysisError("No orbit was found to start from.")
+    if row is not None:
+        _require_observable(layout_of(field), row)
     for begin in ends:
         values = values.copy()
         values[free] = begin
@@ -249,7 +250,6 @@ def branch_of_response(
                 told = error
                 continue
             if row is not None:
-                _require_observable(problem.layout, row)
                 problem = replace(problem, row=row)
             direction = 1.0 if begin < options.bounds[1] else -1.0
             branch = branches.follow(problem, u, None, method, options, further,
@@ -270,7 +270,8 @@ def _problem(
     name = list(field.parameters)[free]
     scales = np.ones(field.dimension + 2)
     scales[-1] = width_of(None, options, float(values[free]))
-    problem = starts.problem_for(field, values, free, method, scales)
+    problem = starts.problem_for(field, values, free, method, scales,
+                                 limits=np.full(field.dimension, 1e4))
     if problem.autonomous:
         raise InputError("Nothing excites the system with a period; a frequency response needs a "
                          "harmonic drive or load.")
@@ -280,7 +281,7 @@ def _problem(
     if isinstance(field, ContactField) and problem.layout.memory:
         state = rest_state(field, values) if held is None else held
         problem = replace(problem, kept=problem.kept.left_by(state[None]))
-    return replace(problem, limits=np.full(field.dimension, 1e4))
+    return problem
 
 
 def _from_rest(
@@ -297,11 +298,10 @@ def _from_rest(
 
 
 def _rests_at_zero(problem: HarmonicProblem, field: ContactField, u: Array) -> bool:
-    """Whether the means of all forces are zero without displacement."""
-    if problem.layout.memory or field.system().basis.springs:
-        return False
-    residual = np.abs(problem.evaluate(u).residual)
-    return bool(residual[: problem.layout.displacements].max() <= _NOTHING * residual.max())
+    """Whether all forces without displacement are known to have no mean."""
+    e = problem.equations(float(u[-1]))
+    return (e is not None and not problem.layout.memory and e.numbers[RESTS] != 0.0
+            and not field.system().basis.springs)
 
 
 def rest_state(field: ContactField, values: Array) -> Array:
@@ -316,17 +316,19 @@ def rest_state(field: ContactField, values: Array) -> Array:
 
 
 def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
-    """The problem with scales of the size of an orbit, which is found again to their precision."""
-    here = problem.linearise(u)
+    """The problem with scales of the size of an orbit; it is found again to their precision."""
     if problem.layout.memory:
-        low, high = problem.extremes(u, here.memory)
+        low, high = problem.extremes(u, problem.linearise(u).memory)
         sizes = (high - low) / 2.0
     else:
-        sizes = np.ptp(here.states, axis=0) / 2.0
+        states = problem.states(u, problem.period(u), np.zeros((problem.samples, 0)))
+        sizes = (states.max(axis=0) - states.min(axis=0)) / 2.0
     largest = float(sizes.max()) or 1.0
     sizes = np.maximum(sizes, 1e-3 * largest)
     scales = np.concatenate([sizes, problem.scales[-2:]])
-    return starts.corrected(replace(problem, scales=scales, limits=1e4 * sizes), u)
+    scaled = replace(problem, scales=scales, limits=1e4 * sizes)
+    # A branch begins so by itself where that is quick.
+    return (scaled, u) if scaled.equations(float(u[-1])) else starts.corrected(scaled, u)
 
 
 def _raised(

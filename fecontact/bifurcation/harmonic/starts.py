@@ -34,10 +34,11 @@ _INTERVALS, _DEGREE = 200, 4
 
 def problem_for(
     field: VectorField, values: Array, free: int, method: HarmonicBalance, scales: Array,
-    periods: int = 1, offsets: Array | None = None,
+    periods: int = 1, offsets: Array | None = None, limits: Array | None = None,
 ) -> HarmonicProblem:
     """The problem of a field; ``scales`` (d + 2,) of states, period and parameter.
 
+    The former grow with the orbit up to the limits (d,), if there are any.
     ``offsets`` (c,) are those of elements that never slide, see :class:`Kept`.
     """
     layout = layout_of(field)
@@ -46,7 +47,7 @@ def problem_for(
     found = HarmonicProblem(
         field, values.copy(), free, method.harmonics, method.count,
         np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout, periods,
-        *timing_of(field, values, free), kept, stability=method.stability)
+        *timing_of(field, values, free), kept, stability=method.stability, limits=limits)
     return replace(found, compiled=CompiledBalance.of(found))
 
 

@@ -68,8 +68,10 @@ class Equations(NamedTuple):
     which internal variables return. Numbers are the period times p or 0, the period, least and
     largest p for which this holds, whether contact forces do not depend on p and t, whether they
     are plain, of displacements and velocities in the plane alone, bounds of the branch, tolerance,
-    largest step, largest turn, Newton's rounding, whether folds are located. ``limits`` (m,) bound
-    the scales of the displacements; ``nodes`` have internal variables.
+    largest step, largest turn, Newton's rounding, whether folds are located, whether all
+    forces at rest have no mean; and of Newton's method the size of a second step over the square
+    of the first, negative if unknown, with the number of times it was relied on. ``limits`` (m,)
+    bound the scales of the displacements; ``nodes`` have internal variables.
     """
 
     contact: SystemArrays
@@ -93,7 +95,7 @@ class Equations(NamedTuple):
 
 
 (TURN, PERIOD, LOW, HIGH, STEADY, PLAIN, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP,
- LARGEST_TURN, ROUNDING, FOLDS) = range(13)
+ LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED) = range(16)
 
 _blocks = types.Array(f8, 4, "C")
 ROOM = types.NamedTuple(

@@ -219,12 +219,18 @@ def _by_parameter(u, T, e):
     for j in range(m):
         for n in range(N):
             row[n] = 0.0
+        moves = not plain
         for i in range(m):
             by_speed = room.rows[(m + j) * m + i]
             for n in range(N):
-                row[n] -= rise * room.motion[m + i, n] * (by_speed[n] if plain
-                                                          else room.J[n, m + j, m + i])
-        project(e.projection, row, pushed[j])
+                slope = by_speed[n] if plain else room.J[n, m + j, m + i]
+                moves = moves or slope != 0.0
+                row[n] -= rise * room.motion[m + i, n] * slope
+        if moves:
+            project(e.projection, row, pushed[j])
+        else:
+            for k in range(L):
+                pushed[j, k] = 0.0
     for k in range(L):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
@@ -371,16 +377,24 @@ def take_forces(p, e, forces):
     """Fill forces (N, m) with the accelerations at the samples that were evaluated last."""
     room, linear = e.room, e.room.linear
     m, N = e.springs.shape[1], len(e.tau)
-    plain = e.numbers[PLAIN] != 0.0
-    for n in range(N):
+    if e.numbers[PLAIN] != 0.0:
         for j in range(m):
-            forces[n, j] = ((room.pushes[j, n] if plain else room.f[n, m + j])
-                            + e.given[0, n, j] + p * e.given[1, n, j])
-        for i in range(m):
-            place = room.motion[i, n] if plain else room.x[n, i]
-            speed = room.motion[m + i, n] if plain else room.x[n, m + i]
+            push = room.pushes[j]
+            for n in range(N):
+                forces[n, j] = push[n] + e.given[0, n, j] + p * e.given[1, n, j]
+            for i in range(m):
+                places, speeds = room.motion[i], room.motion[m + i]
+                stiffness, damping = linear[0, i, j], linear[1, i, j]
+                for n in range(N):
+                    forces[n, j] -= stiffness * places[n] + damping * speeds[n]
+    else:
+        for n in range(N):
             for j in range(m):
-                forces[n, j] -= linear[0, i, j] * place + linear[1, i, j] * speed
+                forces[n, j] = room.f[n, m + j] + e.given[0, n, j] + p * e.given[1, n, j]
+            for i in range(m):
+                place, speed = room.x[n, i], room.x[n, m + i]
+                for j in range(m):
+                    forces[n, j] -= linear[0, i, j] * place + linear[1, i, j] * speed
 
 
 @helper

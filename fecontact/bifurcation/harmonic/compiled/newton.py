@@ -4,7 +4,13 @@ import math
 
 import numpy as np
 
-from fecontact.bifurcation.harmonic.compiled.arrays import ROUNDING, TOLERANCE
+from fecontact.bifurcation.harmonic.compiled.arrays import (
+    PLAIN,
+    ROUNDING,
+    SQUARE,
+    TOLERANCE,
+    TRUSTED,
+)
 from fecontact.bifurcation.harmonic.compiled.evaluation import condense, evaluate_at
 from fecontact.bifurcation.harmonic.compiled.linear_systems import (
     PRECISE,
@@ -19,6 +25,9 @@ from fecontact.core.compiled import helper, routine
 # Newton steps before a step fails, and largest factor by which a step with kept factors may leave
 # the error of the one before.
 _STEPS, _SERVES = 8, 0.2
+# First Newton steps up to this relative size may be the only ones, so many times before one is
+# measured again, if the next one is so many times shorter than it need be.
+_SHORT, _RELIED, _MARGIN = 1e-5, 3, 10.0
 # Relative errors of tangents and of Newton steps where they are found by iteration.
 _TANGENT, _INEXACT = 1e-7, 1e-3
 # Relative size of the last Newton step at special points and bounds, and most such steps.
@@ -52,6 +61,20 @@ def _take_along(row, weights, T, tolerance, e):
         along[k] = 0.0
     along[len(along) - 1] = 1.0
     return solve_with(row, weights, T, tolerance, e, along)
+
+
+@helper
+def _relies(size, scale, e):
+    """Whether a first Newton step ends the iteration: the next one is known to be short enough.
+
+    It is proportional to the square of this one, where laws have no memory; the factor is that of
+    steps before, measured again after some.
+    """
+    if e.numbers[PLAIN] == 0.0 or not e.numbers[SQUARE] >= 0.0 or size > _SHORT * scale:
+        return False
+    e.numbers[TRUSTED] += 1.0
+    following = _MARGIN * e.numbers[SQUARE] * size * size
+    return following <= 0.1 * e.numbers[TOLERANCE] * scale and e.numbers[TRUSTED] <= _RELIED
 
 
 @routine
@@ -88,8 +111,10 @@ def corrected(u, guess, row, weights, e):
             return 0
         for k in range(n + 1):
             u[k] += change[k]
-        if fresh and size <= tolerance * scale:
+        if fresh and (size <= tolerance * scale or (count == 1 and _relies(size, scale, e))):
             return made
+        if count == 2 and made == 1:
+            e.numbers[SQUARE], e.numbers[TRUSTED] = size / (before * before), 0.0
         falls = size / before
         if count > 1 and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
             return made

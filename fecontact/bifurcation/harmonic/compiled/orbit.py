@@ -1,6 +1,6 @@
 """Equations of harmonic balance at one orbit, and the orbit nearby, in compiled code."""
 
-from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, TOLERANCE
+from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, STEADY, TOLERANCE
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
     condense,
     evaluate_at,
@@ -39,8 +39,10 @@ def evaluate(u, wanted, e, forces, mean, row, weights, x):
             return 0
         for k in range(len(x)):
             x[k] = e.room.along[k]
-        take_forces(u[len(u) - 1], e, forces)
         take_mean(e, mean)
+        if e.numbers[STEADY] == 0.0:
+            evaluate_at(u, False, e)
+        take_forces(u[len(u) - 1], e, forces)
         return 1
     T = evaluate_at(u, wanted != RESIDUAL, e)
     if not T > 0.0:

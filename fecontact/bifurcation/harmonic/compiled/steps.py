@@ -22,6 +22,7 @@ from fecontact.bifurcation.harmonic.compiled.arrays import (
     LAST_BOUND,
     LOW,
     REACHED,
+    SQUARE,
 )
 from fecontact.bifurcation.harmonic.compiled.evaluation import take_forces, take_mean
 from fecontact.bifurcation.harmonic.compiled.linear_systems import inner, length
@@ -146,6 +147,7 @@ def steps(u, tangent, bend, scales, e, out, why):
     # With internal variables of friction branches have kinks, too many for a cubic.
     smooth = 0.0 if len(e.offsets) > 0 else 1.0
     why[0] = FULL
+    e.numbers[SQUARE] = -1.0
     while count < len(out.u):
         for k in range(n + 1):
             row[k] = weights[k] * tangent[k]
@@ -214,9 +216,10 @@ def steps(u, tangent, bend, scales, e, out, why):
             _keep(count, found, room.along, weights, 1.0, scales, far, e, out)
             out.folds[count] = 1
         way, bent = inner(row, chord), 1.0 if last_turn == 0.0 else 0.0
+        cubic = smooth * bent / (way * way * way)
         for k in range(n + 1):
             new = out.tangent[last, k]
-            third[k] = smooth * bent * (way * (tangent[k] + new) - 2.0 * chord[k]) / (way * way * way)
+            third[k] = cubic * (way * (tangent[k] + new) - 2.0 * chord[k])
             bend[k] = bent * 0.5 * (new - tangent[k]) / way + 1.5 * way * third[k]
             tangent[k], u[k] = new, there[k]
         factor = 2.0 if made == 1 else (1.5 if made == 2 else 0.7)

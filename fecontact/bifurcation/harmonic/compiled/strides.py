@@ -75,7 +75,7 @@ class Strides:
             return None
         options = self.options
         stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
-        e.numbers[arrays.FIRST_BOUND :] = [
+        e.numbers[arrays.FIRST_BOUND : arrays.RESTS] = [
             *options.bounds, options.tolerance, options.largest_step, options.largest_turn,
             problem.rounding,
             options.locate and problem.stability is None and "fold" not in stops]
@@ -188,14 +188,14 @@ class Strides:
             ends = np.append(abs(float(here.u[-1] - start.u[-1])) / width, distances)
             near = near[np.minimum(ends[near], ends[near + 1]) <= lengths[near]]
             return int(near[0]) if len(near) else len(u)
-        for k in near.tolist():
-            before = u[k - 1] if k else here.u
-            weights, off = _weights(problem, scales[k : k + 1])[0], start.u - before
-            chord = float(np.sqrt(weights @ (u[k] - before) ** 2))
-            if (np.sqrt(weights @ off**2) < 3.0 * chord
-                    and weights @ ((u[k] - before) * off) > -0.1 * chord**2):
-                return k
-        return len(u)
+        if not len(near):
+            return len(u)
+        before = np.where(near[:, None] > 0, u[near - 1], here.u)
+        weights, chord, off = _weights(problem, scales[near]), u[near] - before, start.u - before
+        square = (weights * chord**2).sum(axis=1)
+        met = near[((weights * off**2).sum(axis=1) < 9.0 * square)
+                   & ((weights * chord * off).sum(axis=1) > -0.1 * square)]
+        return int(met[0]) if len(met) else len(u)
 
     def _before_changes(
         self, problem: Any, here: Solution, found: list[Floquet], tangents: Array, most: int
