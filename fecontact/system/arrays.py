@@ -111,7 +111,8 @@ def excited(
     arrays: SystemArrays, basis: ModalBasis, drive: Drive, parts: Mapping[str, Any]
 ) -> SystemArrays:
     """The arrays with another 'drive' than the one given, or another 'load'."""
-    changed, new = {}, parts.get("drive", drive)
+    changed: dict[str, Any] = {}
+    new = parts.get("drive", drive)
     if new is not drive:
         supports = [(one.stiffness, one.damping, one.dashpots) for one in (drive, new)]
         changed |= (_motion_arrays if supports[0] == supports[1] else drive_arrays)(basis, new)

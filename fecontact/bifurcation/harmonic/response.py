@@ -16,8 +16,11 @@ from fecontact.bifurcation.continuation.problem import (
     width_of,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
-from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
-from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
+from fecontact.bifurcation.fields.contact_field import (
+    ContactField,
+    contact_field,
+    field_between,
+)
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
@@ -163,11 +166,10 @@ def frequency_response(
     level_name, values = levels_of(levels)
     if isinstance(system, ContactSystem):
         name = parameter or _FREQUENCY
-        names = dict.fromkeys([name] + ([level_name] if level_name else []))
-        ranges = {name: chosen.bounds}
+        ranges = {name: (float(chosen.bounds[0]), float(chosen.bounds[1]))}
         if level_name:
             ranges[level_name] = (float(values.min()), float(values.max()))
-        field: VectorField = ContactField(ParametrisedSystem(system, names, ranges))
+        field: VectorField = field_between(system, tuple(ranges.items()))
     else:
         field, name = system, system.parameter_or_only(parameter)
     row, observed = observed_row(field, observe)

@@ -151,8 +151,8 @@ class CompiledBalance:
         return not len(near.arrays.T2) and self.contact_field.system().prescribed_motion.constant
 
 
-def _affine(places: Array, found: list[Array]) -> tuple[Array, Array]:
-    """Value at zero and slope from the first two of arrays at places."""
+def _affine(places: Array, found: Array) -> tuple[Array, Array]:
+    """Value at zero and slope from the first two of arrays (P, ...) at places (P,)."""
     slope = (found[1] - found[0]) / (places[1] - places[0])
     return found[0] - places[0] * slope, slope
 

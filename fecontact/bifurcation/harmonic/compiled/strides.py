@@ -1,8 +1,8 @@
 """Plain steps of a branch of forced orbits, made by compiled code, with all that points store.
 
 What a call of :func:`~fecontact.bifurcation.harmonic.compiled.steps.steps` returns is looked at as
-a whole; it ends before the first step that needs more: a special point, a start met again. Without
-stability folds and the bound at the end are among its points.
+a whole; it ends before the first step that needs more: a special point but a fold, a start met
+again. Folds and the bound at the end are among its points.
 """
 
 from dataclasses import dataclass, replace
@@ -77,8 +77,7 @@ class Strides:
         stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
         e.numbers[arrays.FIRST_BOUND : arrays.RESTS] = [
             *options.bounds, options.tolerance, options.largest_step, options.largest_turn,
-            problem.rounding,
-            options.locate and problem.stability is None and "fold" not in stops]
+            problem.rounding, options.locate and "fold" not in stops]
         if problem.limits is not None:
             e.limits[:] = problem.limits[: len(e.limits)]
         else:
@@ -130,7 +129,7 @@ class Strides:
                            out.scales[: made - 1]])
         whole = self._before_start(problem, here, start, u, sizes, out.lengths[:made])
         if problem.stability is not None and self.options.locate:
-            whole = self._before_changes(problem, here, found, tangents, whole)
+            whole = self._before_changes(problem, here, found, tangents, folds, whole)
         later = _LATER if problem.stability is not None else _WITHOUT_STABILITY
         self.count = later if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
         # The last tangent is made exact: what lies behind it relies on its signs.
@@ -198,17 +197,24 @@ class Strides:
         return int(met[0]) if len(met) else len(u)
 
     def _before_changes(
-        self, problem: Any, here: Solution, found: list[Floquet], tangents: Array, most: int
+        self, problem: Any, here: Solution, found: list[Floquet], tangents: Array,
+        folds: list[int], most: int,
     ) -> int:
-        """Number of points before the first step on which a test or the stability changes."""
-        previous, unstable = here.tests, here.values["unstable"]
+        """Number of points before the first step on which a test or the stability changes.
+
+        At a fold one multiplier passes one.
+        """
+        previous, unstable, turn = here.tests, here.values["unstable"], None
         for k in range(most):
+            if folds[k]:
+                turn = k
+                continue
             tested = _tests(problem, found[k], tangents[k])
-            if any(previous.get(name, 0.0) * value <= 0.0 for name, value in tested.items()):
-                return k
-            if found[k].unstable != unstable:
-                return k
-            previous = tested
+            changed = any(previous.get(name, 0.0) * value <= 0.0 for name, value in tested.items()
+                          if turn is None or name != "fold")
+            if changed or abs(found[k].unstable - unstable) != (turn is not None):
+                return k if turn is None else turn
+            previous, unstable, turn = tested, found[k].unstable, None
         return most
 
     def _made_exact(
