@@ -1,6 +1,6 @@
 """Arrays of a contact system for its compiled kernels."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -30,31 +30,18 @@ def system_arrays(
     the law; see :meth:`fecontact.ContactSystem.law_groups`.
     """
     d, n, m = basis.dimension, basis.contact_nodes, basis.modes
-    B = basis.T[0, :d]
-    stiffness, damping = np.array(basis.stiffness_matrix), basis.damping.copy()
-    for row, c, b in zip(B, drive.stiffness, drive.damping, strict=False):
-        stiffness += c * np.outer(row, row)
-        damping += b * np.outer(row, row)
     friction_groups = list(friction_groups)
     normal, normal_parameters = _law_table(normal_groups)
     friction, friction_parameters = _law_table(friction_groups)
     memory = [np.full(nodes.stop - nodes.start, (d - 1) * law.memory, dtype=np.int64)
               for nodes, _, law in friction_groups]
-    constant_load, load_shapes = load_rows(basis, load)
-    signals, motions = load.signals.values(), drive.motions[:d]
     scale, surface = ground.friction_scale_kernel, ground.surface_kernel
     first, second = motion.motions[0], motion.motions[-1]
     rows = basis.contact_T
     return with_sides(SystemArrays(
-        stiffness=stiffness,
-        damping=damping,
+        **drive_arrays(basis, drive),
+        **load_arrays(basis, load),
         modal_damping=basis.damping.copy(),
-        constant_load=basis.centrifugal_load + constant_load,
-        drive_shapes=np.array(B, dtype=float),
-        drive_stiffness=np.array(drive.stiffness[:d], dtype=float),
-        drive_damping=(np.array(drive.damping[:d], dtype=float)
-                       if drive.dashpots == "relative" else np.zeros(d)),
-        load_shapes=load_shapes,
         Tx=rows[:, 0].copy(),
         Ty=rows[:, d - 1].copy(),
         T2=rows[:, 1].copy() if d == 3 else np.zeros((0, m)),
@@ -73,15 +60,11 @@ def system_arrays(
         ground_motion_parameters=first.motion_parameters(),
         second_motion_parameters=(second.motion_parameters() if second is not first
                                   else np.zeros(1)),
-        drive_parameters=_rows([motion.parameters() for motion in motions]),
-        load_parameters=_rows([signal.parameters() for signal in signals]),
         normal=normal,
         friction=friction,
         planar=_planar(friction_groups) if d == 3 else np.zeros(0, dtype=np.int64),
         memory=np.concatenate(memory),
         on_ground=basis.ground_nodes.astype(np.int64),
-        drive=_addresses(motion.kernel for motion in motions),
-        load=_addresses(signal.kernel for signal in signals),
         profile=ground.profile_kernel.address,
         surface=0 if surface is None else surface.address,
         friction_scale=0 if scale is None else scale.address,
@@ -90,6 +73,52 @@ def system_arrays(
         leans=int(ground.normal == "surface"),
         space_node=0,
     ))
+
+
+def drive_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
+    """Those of the arrays that depend on the drive, by name."""
+    d = basis.dimension
+    B = basis.T[0, :d]
+    stiffness, damping = np.array(basis.stiffness_matrix), basis.damping.copy()
+    for row, c, b in zip(B, drive.stiffness, drive.damping, strict=False):
+        stiffness += c * np.outer(row, row)
+        damping += b * np.outer(row, row)
+    return {"stiffness": stiffness, "damping": damping,
+            "drive_shapes": np.array(B, dtype=float),
+            "drive_stiffness": np.array(drive.stiffness[:d], dtype=float),
+            "drive_damping": (np.array(drive.damping[:d], dtype=float)
+                              if drive.dashpots == "relative" else np.zeros(d)),
+            **_motion_arrays(basis, drive)}
+
+
+def _motion_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
+    """Those that depend on the motions of the drive."""
+    motions = drive.motions[: basis.dimension]
+    return {"drive_parameters": _rows([motion.parameters() for motion in motions]),
+            "drive": _addresses(motion.kernel for motion in motions)}
+
+
+def load_arrays(basis: ModalBasis, load: Load) -> dict[str, Any]:
+    """Those of the arrays that depend on the loads, by name."""
+    constant_load, load_shapes = load_rows(basis, load)
+    signals = load.signals.values()
+    return {"constant_load": basis.centrifugal_load + constant_load, "load_shapes": load_shapes,
+            "load_parameters": _rows([signal.parameters() for signal in signals]),
+            "load": _addresses(signal.kernel for signal in signals)}
+
+
+def excited(
+    arrays: SystemArrays, basis: ModalBasis, drive: Drive, parts: Mapping[str, Any]
+) -> SystemArrays:
+    """The arrays with another 'drive' than the one given, or another 'load'."""
+    changed: dict[str, Any] = {}
+    new = parts.get("drive", drive)
+    if new is not drive:
+        supports = [(one.stiffness, one.damping, one.dashpots) for one in (drive, new)]
+        changed |= (_motion_arrays if supports[0] == supports[1] else drive_arrays)(basis, new)
+    if "load" in parts:
+        changed |= load_arrays(basis, parts["load"])
+    return arrays._replace(**changed)
 
 
 def with_sides(arrays: SystemArrays) -> SystemArrays:

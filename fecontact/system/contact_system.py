@@ -1,6 +1,6 @@
 """The contact system: a modal basis, laws at its contact nodes, drive and load."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
@@ -23,23 +23,24 @@ from fecontact.reduction.basis_parameters import basis_parameter, with_basis_par
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
-from fecontact.system.arrays import system_arrays
+from fecontact.system.arrays import excited, system_arrays
 from fecontact.system.friction_memory import bristle_history
 from fecontact.system.gap import Gap, gap_values
 from fecontact.system.interfaces import (
     Interface,
     PrescribedMotion,
     Sliding,
-    SlidingRotation,
     checked_sliding,
     inner_name,
     motion_sources,
+    names_of_laws,
     outer_name,
     prescribed_motion,
     slides,
+    sliding_speed,
     system_fields,
 )
-from fecontact.system.loads import require_motion
+from fecontact.system.loads import load_summary, require_motion
 from fecontact.system.nodes import SystemArrays
 
 NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a rough "
@@ -112,7 +113,7 @@ class ContactSystem(Summarised):
         their point.
     """
 
-    # Basis and normal are required; the error message is more helpful than Python's own.
+    # Basis and normal are required, with a message more helpful than Python's own.
     basis: ModalBasis = None  # type: ignore[assignment]
     normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
     friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]
@@ -153,10 +154,7 @@ class ContactSystem(Summarised):
             if isinstance(self.basis, ModalBasis) and needs_friction(self.basis):
                 raise InputError(NO_FRICTION_LAW.format("ContactSystem lacks friction"))
             object.__setattr__(self, "friction", ConstantFriction(0.0))
-        for name, kind in _KINDS.items():
-            if not isinstance(getattr(self, name), kind):
-                given = getattr(self, name)
-                raise InputError(f"ContactSystem: {name} = {given!r} must be a {kind.__name__}.")
+        self._require_parts(_KINDS)
         for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
             given = getattr(self, name)
             if isinstance(given, Mapping):
@@ -165,12 +163,6 @@ class ContactSystem(Summarised):
             for one in getattr(self, name).values() if isinstance(given, Mapping) else (given,):
                 if not isinstance(one, law):
                     raise InputError(f"ContactSystem: {name} = {one!r} must be a {law.__name__}.")
-        if self.basis.dimension == 2:
-            for what, needs in (("Ground", self.ground.in_space), ("Drive", self.drive.in_space)):
-                if needs:
-                    raise InputError(f"ContactSystem: the {what.lower()} acts or moves along a "
-                                     f"third direction, but the body is plane; leave that out, or "
-                                     f"make a solid.")
         object.__setattr__(self, "gap", gap_values(self.gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
         _ = self.prescribed_motion
@@ -181,6 +173,27 @@ class ContactSystem(Summarised):
         require_motion(self.basis, self.drive, self.load)
         _ = self.arrays
 
+    def _require_parts(self, names: Iterable[str]) -> None:
+        for name in names:
+            given, kind = getattr(self, name), _KINDS[name]
+            if not isinstance(given, kind):
+                raise InputError(f"ContactSystem: {name} = {given!r} must be a {kind.__name__}.")
+        if self.basis.dimension == 2:
+            for what, needs in (("Ground", self.ground.in_space), ("Drive", self.drive.in_space)):
+                if needs:
+                    raise InputError(
+                        f"ContactSystem: the {what.lower()} acts or moves along a third direction, "
+                        f"but the body is plane; leave that out, or make a solid.")
+
+    def _excited(self, parts: Mapping[str, Any]) -> "ContactSystem":
+        """A copy with another drive or load; all else has been checked, and keeps its arrays."""
+        made = object.__new__(type(self))
+        made.__dict__.update(self.__dict__, **parts)
+        made._require_parts(parts)
+        require_motion(made.basis, made.drive, made.load)
+        made.__dict__["arrays"] = excited(self.arrays, self.basis, self.drive, parts)
+        return made
+
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
         names = [group for group, _ in self.basis.groups]
         for group in given:
@@ -190,8 +203,8 @@ class ContactSystem(Summarised):
                                  f"the basis are: {choices(names)}.")
         missing = [group for group in names if group not in given]
         if missing:
-            raise InputError(f"ContactSystem: {name} lacks a law for the "
-                             f"interface{'s' * (len(missing) > 1)} {choices(missing)}.")
+            raise InputError(f"ContactSystem: {name} lacks a law for the interface"
+                             f"{'s' * (len(missing) > 1)} {choices(missing)}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes and contact nodes, laws, ground, drive and load."""
@@ -204,16 +217,14 @@ class ContactSystem(Summarised):
         return [
             *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
               if name in own),
-            *((kind, names) for kind in ("normal", "friction")
-              if (names := _law_names(getattr(self, kind),
-                                      self.basis.springs if kind == "friction" else ()))),
-            *([("sliding", listed([f"{name} {_sliding_speed(one)}"
-                                   for name, one in self.sliding.items()]))]
-              if self.sliding else []),
+            *((kind, names) for kind in ("normal", "friction") if (names := names_of_laws(
+                getattr(self, kind), self.basis.springs if kind == "friction" else ()))),
+            *([("sliding", listed([f"{name} {sliding_speed(one)}" for name, one
+                                   in self.sliding.items()]))] if self.sliding else []),
             ("ground", quantity(ground.speed, "m/s")
              + (f", {quantity(high - low, 'm')} from valley to peak" if ground.wavy else "")),
             ("drive", listed(stiffness) + (f", {moved:.5g} Hz" if moved else "")),
-            ("load", _load_summary(self.load)),
+            ("load", load_summary(self.load)),
         ]
 
     def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
@@ -383,9 +394,12 @@ class ContactSystem(Summarised):
         for name in changes:
             if "." in name and inner_name(name).partition(".")[0] not in PARTS:
                 raise self._unknown(name)
+        wanted = {name: changes[given] for name, given in inner.items()}
+        parts = {part: getattr(self, part, None) for part in {n.partition(".")[0] for n in inner}}
         try:
-            return cast("ContactSystem", with_parameters(self, {
-                name: changes[given] for name, given in inner.items()}))
+            if parts and parts.keys() <= {"drive", "load"}:
+                return self._excited(with_parameters(parts, wanted))
+            return cast("ContactSystem", with_parameters(self, wanted))
         except KeyError as error:
             raise self._unknown(inner.get(error.args[0], error.args[0])) from None
 
@@ -410,7 +424,12 @@ class ContactSystem(Summarised):
         """
         if name.startswith("basis."):
             return basis_parameter(self.basis, name.removeprefix("basis."))
-        return self.gap if name == "gap" else self.parameters().get(name)
+        if name == "gap":
+            return self.gap
+        part, _, inner = name.partition(".")
+        own = vars(getattr(self, part)) if part in _KINDS and name not in IN_SPACE_ONLY else {}
+        value = own.get(inner)
+        return value if isinstance(value, float) else self.parameters().get(name)
 
     def _checked(self, y: Array) -> Array:
         state = np.ascontiguousarray(y, dtype=float)
@@ -420,31 +439,7 @@ class ContactSystem(Summarised):
         return state
 
     def _unknown(self, name: str) -> InputError:
-        names = (*self.parameters(), "gap", *PARTS)
-        names = tuple(name for name in names if name != "sliding" or self.sliding)
+        names = tuple(one for one in (*self.parameters(), "gap", *PARTS)
+                      if one != "sliding" or self.sliding)
         return InputError(f"The system has no parameter '{outer_name(self, name)}'"
                           f"{nearest(name, names)}; its parameters are: {choices(names)}.")
-
-
-def _sliding_speed(sliding: Sliding) -> str:
-    return quantity(sliding.speed, "rad/s" if isinstance(sliding, SlidingRotation) else "m/s") + (
-        "" if sliding.motion is None else " in time")
-
-
-def _load_summary(load: Load) -> str:
-    parts = [quantity(load.normal, "N")]
-    if load.gravity is not None:
-        parts.append(f"gravity ({', '.join(f'{g:.4g}' for g in load.gravity)}) m/s²")
-    if load.boundaries:
-        parts.append(f"on {listed([one.boundary for one in load.boundaries])}")
-    if load.signals:
-        parts.append(f"{len(load.signals)} in time")
-    return ", ".join(parts)
-
-
-def _law_names(law: Any, without: tuple[str, ...]) -> str:
-    """Class of a law, or those of the interfaces."""
-    if isinstance(law, Mapping):
-        return listed([f"{type(one).__name__} ({group})" for group, one in law.items()
-                       if group not in without]) if set(law) - set(without) else ""
-    return type(law).__name__

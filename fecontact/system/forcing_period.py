@@ -98,6 +98,8 @@ def _repeat_length(name: str, shape: Profile) -> float:
 def _common(periods: list[float]) -> float | None:
     if not periods:
         return None
+    if len(periods) == 1:
+        return periods[0]
     longest = max(periods)
     for count in range(1, 1001):
         ratios = np.array([count * longest / period for period in periods])

@@ -17,7 +17,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
-from fecontact.core.units import listed
+from fecontact.core.units import listed, quantity
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
@@ -290,6 +290,12 @@ def checked_sliding(
     return MappingProxyType(dict(sliding))
 
 
+def sliding_speed(sliding: Sliding) -> str:
+    """Speed of a sliding side, for people."""
+    return quantity(sliding.speed, "rad/s" if isinstance(sliding, SlidingRotation) else "m/s") + (
+        "" if sliding.motion is None else " in time")
+
+
 def prescribed_motion(
     basis: ModalBasis, ground: Ground, sliding: Mapping[str, Sliding]
 ) -> PrescribedMotion:
@@ -357,3 +363,11 @@ def outer_name(system: Any, name: str) -> str:
     if group in system.basis.springs and kind == "normal":
         return f"links.{group}.{last}" if last else f"links.{group}"
     return f"interfaces.{group}.{kind}.{last}" if last else f"interfaces.{group}.{kind}"
+
+
+def names_of_laws(law: Any, without: tuple[str, ...]) -> str:
+    """Class of a law, or those of the interfaces."""
+    if isinstance(law, Mapping):
+        return listed([f"{type(one).__name__} ({group})" for group, one in law.items()
+                       if group not in without]) if set(law) - set(without) else ""
+    return type(law).__name__

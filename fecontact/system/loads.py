@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
+from fecontact.core.units import listed, quantity
 from fecontact.laws.excitation import (
     AXES,
     BOUNDARY_STRESSES,
@@ -119,6 +120,18 @@ def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
         if not row.any():
             raise InputError(f"{what} has no effect, as {still} in no mode of the basis; leave it "
                              f"out, or give the basis rows for that point.")
+
+
+def load_summary(load: Load) -> str:
+    """Constant forces and the number of loads in time, for people."""
+    parts = [quantity(load.normal, "N")]
+    if load.gravity is not None:
+        parts.append(f"gravity ({', '.join(f'{g:.4g}' for g in load.gravity)}) m/s²")
+    if load.boundaries:
+        parts.append(f"on {listed([one.boundary for one in load.boundaries])}")
+    if load.signals:
+        parts.append(f"{len(load.signals)} in time")
+    return ", ".join(parts)
 
 
 def _inertia(basis: ModalBasis, what: str) -> Array:

@@ -8,6 +8,7 @@ from meshes_for_tests import rectangle
 
 import fecontact as fc
 from fecontact import BoundaryLoad, Load, PointLoad
+from fecontact.core.errors import InputError
 from fecontact.integrate import SetValued
 from fecontact.laws import (
     Constant,
@@ -253,6 +254,50 @@ def test_loads_are_parameters_of_the_system():
         changed.arrays.constant_load,
         4e4 * system.basis.boundary_row("top")[0] - 1.6 * system.basis.inertia_rows[1])
     assert "gravity (0, -1.6) m/s²" in repr(changed)
+
+
+def driven_mass():
+    """A mass that moves along x and y, on springs whose ends move, pressed."""
+    rows = np.zeros((3, 2))
+    rows[:2] = np.eye(2)
+    basis = fc.basis_from_matrices(MASS * np.eye(2), np.diag([STIFFNESS, 300.0]),
+                                   {"contact": rows[None], "B": rows, "C": rows},
+                                   damping=DASHPOT * np.eye(2))
+    return fc.ContactSystem(
+        basis, normal=LinearContact(1e3, 0.0), friction=ConstantFriction(0.2, smoothing_slope=9.0),
+        load=Load(2.0), drive=fc.Drive(stiffness_x=2.0, amplitude_x=0.1, angular_frequency=5.0))
+
+
+@pytest.mark.parametrize("changes", [
+    {"drive.angular_frequency": 31.0}, {"drive.stiffness_x": 7.0, "drive.amplitude_x": 0.2},
+    {"drive": fc.Drive(stiffness_y=3.0, damping_x=2.0, dashpots="relative", amplitude_x=0.1,
+                       angular_frequency=4.0)},
+    {"load.normal": 12.0}, {"load": Load(5.0), "drive.damping_y": 0.3}])
+def test_a_system_under_another_excitation_is_that_made_anew(changes):
+    """It shares what has been checked already; its arrays are those of a new system."""
+    system = driven_mass()
+    found = system.with_(**changes)
+    parts = {"drive": system.drive, "load": system.load}
+    for name, value in changes.items():
+        part, _, inner = name.partition(".")
+        parts[part] = replace(parts[part], **{inner: value}) if inner else value
+    anew = replace(system, **parts)
+    assert (found.drive, found.load) == (anew.drive, anew.load)
+    for name, mine, theirs in zip(found.arrays._fields, found.arrays, anew.arrays, strict=True):
+        np.testing.assert_array_equal(mine, theirs, err_msg=name)
+    y = np.linspace(-1e-3, 1e-3, system.size)
+    np.testing.assert_array_equal(found.rhs(0.3, y), anew.rhs(0.3, y))
+    assert np.abs(found.rhs(0.3, y) - system.rhs(0.3, y)).max() > 0.0
+
+
+def test_another_excitation_is_checked():
+    system = driven_mass()
+    with pytest.raises(InputError, match="drive = 3 must be a Drive"):
+        system.with_(drive=3)
+    with pytest.raises(InputError, match="body is plane"):
+        system.with_(**{"drive.stiffness_z": 1.0})
+    with pytest.raises(InputError, match=r"no parameter 'drive\.mass'"):
+        system.with_(**{"drive.mass": 1.0})
 
 
 def test_a_block_slides_as_coulomb_says_on_a_base_that_shakes():

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import End, continuation, start_of
 from fecontact.core.errors import require_finite
@@ -44,19 +44,20 @@ def continue_branch(
         If there is no solution near the start.
     """
     require_finite("A branch", direction=direction)
-    points, end = _collected(problem, u, options, tangent, direction, name)
+    header = BranchHeader(name, attributes or {})
+    points, end = _collected(problem, u, options, tangent, direction, header)
     if both and end.status not in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
         start = start_of(problem, u, options, tangent, direction)
         # The start counts once.
         left = options.points + 1 - min(regular(points), options.points // 2 + 1)
         others, _ = _collected(problem, u, replace(options, points=left), -start.tangent, direction,
-                               name)
+                               header)
         points, whole = shortened(points, options.points + 1 - regular(others))
         end = end if whole else End(BranchStatus.POINTS)
         turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
         points = [*turned, *points]
     message = " ".join(filter(None, (end.message, problem.note(points))))
-    return Branch(name, tuple(points), end.status, message, attributes or {})
+    return Branch(name, tuple(points), end.status, message, header.attributes)
 
 
 def regular(points: Iterable[BranchPoint]) -> int:
@@ -74,12 +75,12 @@ def shortened(points: Sequence[BranchPoint], most: int) -> tuple[list[BranchPoin
 
 def _collected(
     problem: Problem, u: Array, options: ContinuationOptions, tangent: Array | None,
-    direction: float, name: str,
+    direction: float, header: BranchHeader,
 ) -> tuple[list[BranchPoint], End]:
     points: list[BranchPoint] = []
-    steps = continuation(problem, u, options, tangent=tangent, direction=direction)
+    steps = continuation(problem, u, options, tangent=tangent, direction=direction, header=header)
     with shown(options.progress,
-               lambda: progress_bar(f"Following {name}", options.points)) as tell:
+               lambda: progress_bar(f"Following {header.parameter_name}", options.points)) as tell:
         try:
             while True:
                 points.append(next(steps))

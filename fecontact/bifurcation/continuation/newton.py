@@ -191,8 +191,17 @@ def finished(
     if not (np.isfinite(size) and size > 0.0):
         raise AnalysisError("The branch has no direction there: its equations grow beyond all "
                             "numbers.")
-    tangent = tangent / size
-    values = (problem.point(u, linearisation, tangent) if stored or options.events else {})
+    return completed(problem, u, linearisation, tangent / size, iterations, options,
+                     stored=stored)
+
+
+def completed(
+    problem: Problem, u: Array, linearisation: Linearisation, tangent: Array, iterations: int,
+    options: ContinuationOptions, values: Mapping[str, Any] | None = None, *, stored: bool = True,
+) -> Solution:
+    """As :func:`finished` with a tangent, and perhaps values, that are known."""
+    if values is None:
+        values = (problem.point(u, linearisation, tangent) if stored or options.events else {})
     return Solution(u, linearisation, tangent, iterations, values,
                     _tests(problem, u, linearisation, tangent, values, options))
 
@@ -210,8 +219,10 @@ def _tests(
     found: dict[str, float | Callable[[], float]] = {}
     if options.locate:
         found |= {"fold": float(tangent[-1]), **problem.tests(u, linearisation, tangent)}
-    known = {**values, "parameter": float(u[-1])}
-    return Tests(found | {name: float(event(known)) for name, event in options.events.items()})
+    if options.events:
+        known = {**values, "parameter": float(u[-1])}
+        found |= {name: float(event(known)) for name, event in options.events.items()}
+    return Tests(found)
 
 
 def norm(problem: Problem, vector: Array) -> float:

@@ -37,32 +37,43 @@ class BranchStatus(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Stride:
-    """Plain steps of a branch that a problem makes at once, without special points among them.
+    """Plain steps of a branch that a problem makes at once, with folds among them alone.
 
     Attributes
     ----------
-    points : list of Solution
-        One for each step.
+    points : list of BranchPoint
+        One for each step, and the folds.
+    count : int
+        Number of the former.
     problem : Problem
         The problem for the next step.
     here, before : Solution
         Last point, with the tangent in the lengths of that problem, and the one before it.
     step : float
         Length of the next step.
+    status : BranchStatus, optional
+        Why the branch ends with the last point; None where it goes on.
     """
 
     points: list[Any]
+    count: int
     problem: "Problem"
     here: Any
     before: Any
     step: float
+    status: BranchStatus | None = None
 
 
 class Strider(Protocol):
     """What makes plain steps."""
 
-    def stride(self, problem: Any, here: Any, step: float, most: int, start: Any) -> Stride | None:
-        """At most so many plain steps from a solution; None if the next step is none."""
+    def stride(
+        self, problem: Any, here: Any, step: float, most: int, start: Any, header: Any = None
+    ) -> Stride | None:
+        """At most so many plain steps from a solution; None if the next step is none.
+
+        ``header`` is that of the points.
+        """
 
 
 class Linearisation(Protocol):
@@ -181,6 +192,12 @@ class Problem(Protocol):
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
         """Problem, u and tangent on a new mesh, asked for after each step; None to keep the old."""
+        return None
+
+    def started(self, u: Array, row: Array, options: "ContinuationOptions") -> Any:
+        """The :class:`~fecontact.bifurcation.continuation.newton.Solution` at right angles to a row
+        near u, found faster than by steps one by one; None where it is not.
+        """
         return None
 
     def strider(self, options: "ContinuationOptions") -> Strider | None:

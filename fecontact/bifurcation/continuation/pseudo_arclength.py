@@ -13,7 +13,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.corner import round_corner
 from fecontact.bifurcation.continuation.hairpin import round_hairpin
 from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import UNRESOLVED
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
@@ -60,6 +60,7 @@ def continuation(
     *,
     tangent: Array | None = None,
     direction: float = 1.0,
+    header: BranchHeader | None = None,
 ) -> Generator[BranchPoint, None, End]:
     """Yield the points of a branch one by one, from a solution or a guess of it.
 
@@ -78,6 +79,8 @@ def continuation(
         Direction of the first step.
     direction : float
         Sign of the first change of the parameter, where there is no tangent.
+    header : BranchHeader, optional
+        Of the points of plain steps.
 
     Raises
     ------
@@ -95,12 +98,13 @@ def continuation(
     halved, whole = 0, step
     strider = problem.strider(options)
     while count < options.points:
-        if strider is not None and halved == 0 and count > 1:
-            stride = strider.stride(problem, here, step, options.points - count, start)
+        if strider is not None and halved == 0:
+            stride = strider.stride(problem, here, step, options.points - count, start, header)
             if stride is not None:
-                for at in stride.points:
-                    yield BranchPoint(at.u, at.tangent, at.values)
-                count += len(stride.points)
+                yield from stride.points
+                if stride.status is not None:
+                    return End(stride.status)
+                count += stride.count
                 problem, here, before = stride.problem, stride.here, stride.before
                 step = stride.step
                 continue
@@ -196,6 +200,9 @@ def start_of(
         row[-1] = 1.0 if direction >= 0.0 else -1.0
     else:
         row = problem.weights() * tangent / norm(problem, tangent)
+    started: Solution | None = problem.started(u, row, options)
+    if started is not None:
+        return started
     found = corrected(problem, np.array(u, dtype=float), row, options.tolerance,
                       3 * options.iterations)
     if found is None:

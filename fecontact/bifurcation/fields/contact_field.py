@@ -1,7 +1,7 @@
 """A contact system as a vector field of some of its parameters."""
 
 from collections.abc import Iterable, Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -20,6 +20,8 @@ from fecontact.system.nodes import SystemArrays
 _STEP = 2e-4
 # Smallest value for that step, relative to the base value.
 _LEAST_VALUE = 1e-3
+# Fields over ranges that are kept.
+_KEPT = 4
 # Arrays that prescribe functions of time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
                       "profile_parameters", "friction_scale_parameters",
@@ -135,6 +137,17 @@ class ContactField(VectorField):
         row = np.zeros(self.dimension)
         row[: basis.modes] = basis.point_row(point, component)
         return row
+
+
+@lru_cache(maxsize=_KEPT)
+def field_between(
+    system: ContactSystem, ranges: tuple[tuple[str, tuple[float, float]], ...]
+) -> ContactField:
+    """A system as a vector field of parameters, by their names, with ranges of their values.
+
+    Those that were made last are kept: responses of one system by several methods share one.
+    """
+    return ContactField(ParametrisedSystem(system, [name for name, _ in ranges], dict(ranges)))
 
 
 def affine_arrays(field: ContactField, values: Array, index: int) -> AffineArrays | None:

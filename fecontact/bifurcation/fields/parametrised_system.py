@@ -32,6 +32,8 @@ _AFFINE_ERROR = 1e-12
 _MOST_LEVELS = 50
 # Part of a range by which its box is wider, for differences at its ends.
 _BEYOND = 0.02
+# Part of a box, about its middle, within which base values serve to check what is affine.
+_WITHIN = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,10 @@ class ParametrisedSystem:
             self._setters.append(setter)
         self._made: OrderedDict[bytes, ContactSystem] = OrderedDict()
         self._size = system.size
+        self._known: bytes | None = None
         values = np.array(list(self.parameters.values()), dtype=float)
+        if all(value is None for value in given.values()):
+            self._known = values.tobytes()
         self._latest: tuple[bytes, SystemArrays] | None = None
         self._boxes: dict[tuple[int, ...], _Corners | None] = {}
         self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
@@ -127,6 +132,8 @@ class ParametrisedSystem:
         if found is not None:
             return found
         made = self.base
+        if key == self._known:
+            return made
         for setter, value in zip(self._setters, values.tolist(), strict=True):
             made = setter(made, value)
         if made.size != self._size:
@@ -137,6 +144,11 @@ class ParametrisedSystem:
         if len(self._made) > _CACHED_BOXES:
             self._made.popitem(last=False)
         return made
+
+    @property
+    def base_values(self) -> Array:
+        """Values (k,) of the parameters before any is set."""
+        return self._base
 
     def made_for(self, values: Array, index: int) -> list[float]:
         """Values of one parameter, the others as given, for which there are systems already."""
@@ -262,6 +274,8 @@ class _Corners:
         self._slopes: dict[int, tuple[bytes, SystemArrays]] = {}
         stacked: dict[str, Array] = {}
         for name in first._fields:
+            if all(getattr(arrays, name) is getattr(first, name) for arrays in corners):
+                continue
             values = [np.asarray(getattr(arrays, name)) for arrays in corners]
             if any(value.shape != values[0].shape for value in values):
                 raise _NotAffineError
@@ -332,8 +346,10 @@ class _Corners:
 
     def agrees(self, arrays: SystemArrays, values: Array) -> bool:
         mine = self.at(values)
-        for name in arrays._fields:
-            expected, found = np.asarray(getattr(arrays, name)), np.asarray(getattr(mine, name))
+        for one, other in zip(arrays, mine, strict=True):
+            if one is other:
+                continue
+            expected, found = np.asarray(one), np.asarray(other)
             if expected.shape != found.shape:
                 return False
             scale = np.abs(expected).max(initial=0.0)
@@ -381,8 +397,11 @@ def _corners(family: ParametrisedSystem, low: Array, high: Array) -> _Corners:
              for corner in product(*zip(low[::-1].tolist(), high[::-1].tolist(), strict=True))]
     result = _Corners(low, high, [family.system(corner).arrays for corner in order])
     inside = np.modf(np.sqrt(2.0) * np.arange(1.0, 1.0 + len(low)))[0]
-    for part in (inside, 1.0 - inside**2):
-        point = low + part * (high - low)
+    other, base = low + (1.0 - inside**2) * (high - low), family.base_values
+    # There is a system for the base values already.
+    if (np.abs(base - 0.5 * (low + high)) < 0.5 * _WITHIN * (high - low)).all():
+        other = base
+    for point in (low + inside * (high - low), other):
         if not result.agrees(family.system(point).arrays, point):
             raise _NotAffineError
     return result

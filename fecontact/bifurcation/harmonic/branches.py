@@ -1,5 +1,6 @@
 """Branches of orbits by harmonic balance, from motions, Hopf points and points of branches."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -137,9 +138,11 @@ def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
 
 def follow(
     problem: HarmonicProblem, u: Array, tangent: Array | None, method: HarmonicBalance,
-    options: ContinuationOptions, **how: Any,
+    options: ContinuationOptions, further: Mapping[str, Any] | None = None, **how: Any,
 ) -> Branch:
     """Follow a branch, with more harmonics until its truncation errors meet the tolerance.
+
+    ``further`` are attributes of the branch.
 
     Raises
     ------
@@ -151,7 +154,8 @@ def follow(
     ended = replace(options, stop_at=[*stops, HALVING])
     while True:
         branch = continue_branch(problem, u, ended, name=name, tangent=tangent,
-                                 attributes=attributes_of(problem), **how)
+                                 attributes={**attributes_of(problem), **(further or {})},
+                                 **how)
         if branch.points[-1].kind == HALVING and HALVING not in stops:
             branch = replace(branch, status=BranchStatus.CLOSED)
         if method.tolerance is None or branch.status is BranchStatus.INTERRUPTED:

@@ -16,6 +16,7 @@ from fecontact.system.fields.vector_field import VectorField
 
 # Samples a period of what is observed, and harmonics of it that are stored.
 _SAMPLES, _HARMONICS = 512, 15
+OBSERVED = ("observed_minimum", "observed_maximum", "observed_amplitude", "observed_harmonics")
 
 
 def observed_row(
@@ -52,13 +53,14 @@ def observed_values(
     'observed_minimum', 'observed_maximum', half their difference as 'observed_amplitude', and
     'observed_harmonics' (16,), complex.
     """
-    return observed_of_orbits(layout, X[None], np.array([period]), row)[0]
+    found = observed_of_orbits(layout, X[None], np.array([period]), row)
+    return {name: values[0] for name, values in found.items()}
 
 
 def observed_of_orbits(
     layout: Layout, X: Array, periods: Array, row: Array
-) -> list[dict[str, Any]]:
-    """Those of K orbits with coefficients X (K, 2 H + 1, b) and periods (K,)."""
+) -> dict[str, Any]:
+    """Those of K orbits with coefficients X (K, 2 H + 1, b) and periods (K,), K of each name."""
     K, H, m = len(X), X.shape[1] // 2, layout.displacements
     moved = np.moveaxis(X, 1, 0)
     observes = moved[..., :m] @ row[:m] + moved[..., m:] @ row[2 * m : m + layout.harmonic]
@@ -68,7 +70,5 @@ def observed_of_orbits(
     harmonics = np.zeros((K, max(H, _HARMONICS) + 1), dtype=complex)
     harmonics[:, 0] = observes[0]
     harmonics[:, 1 : H + 1] = (observes[1::2] - 1j * observes[2::2]).T
-    return [{"observed_minimum": least, "observed_maximum": most,
-             "observed_amplitude": (most - least) / 2.0, "observed_harmonics": each}
-            for least, most, each in zip(low.tolist(), high.tolist(),
-                                         harmonics[:, : _HARMONICS + 1], strict=True)]
+    return dict(zip(OBSERVED, (low.tolist(), high.tolist(), ((high - low) / 2.0).tolist(),
+                               harmonics[:, : _HARMONICS + 1]), strict=True))

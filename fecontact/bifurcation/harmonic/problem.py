@@ -1,13 +1,15 @@
 """Continuation problem of periodic orbits by harmonic balance."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm
+from fecontact.bifurcation.continuation.newton import Solution, completed, weighted_norm
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -15,10 +17,11 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
-from fecontact.bifurcation.harmonic.compiled.arrays import Equations
+from fecontact.bifurcation.harmonic.compiled.arrays import TOLERANCE, Equations
 from fecontact.bifurcation.harmonic.compiled.balance import MOST_UNKNOWNS
-from fecontact.bifurcation.harmonic.compiled.linear_systems import (
+from fecontact.bifurcation.harmonic.compiled.orbit import (
     DERIVATIVES,
+    ORBIT,
     RESIDUAL,
     SOLUTION,
     evaluate,
@@ -26,6 +29,7 @@ from fecontact.bifurcation.harmonic.compiled.linear_systems import (
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
+from fecontact.bifurcation.harmonic.stored import StoredOrbits, StoredValues
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
 from fecontact.bifurcation.orbits.same_orbit import (
     HALVING,
@@ -165,12 +169,15 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     limits : (d,) array, optional
         Upper limits up to which the scales of the states grow with the orbit; None keeps the
         scales constant.
+    row : (d,) array, optional
+        What is observed of responses.
     """
 
     stability: str | None = "transitions"
     before: tuple[Array, ...] = ()
     bend: Array | None = None
     limits: Array | None = None
+    row: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
@@ -225,19 +232,62 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         found = np.clip(found, self.scales, np.append(self.limits, self.scales[-2:]))
         return found if (found > 1.5 * self.scales).any() else self.scales
 
-    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
-        low, high = self.extremes(u, linearisation.memory)
-        error, residual = linearisation.neglected
-        found = {"period": self.period(u), "truncation_error": error, "residual": residual,
-                 "minimum": low, "maximum": high}
-        if self.layout.memory:
-            found["memory"] = linearisation.memory
+        known: dict[str, Any] = {}
         if self.stability is not None:
-            known = linearisation.floquet
-            found |= {"multipliers": known.multipliers, "unstable": known.unstable,
-                      "stable": known.stable, "trivial_error": known.trivial_error}
-        return found
+            found = linearisation.floquet
+            known = {"multipliers": [found.multipliers], "unstable": [found.unstable],
+                     "stable": [found.stable], "trivial_error": [found.trivial_error]}
+        forces, mean = linearisation._samples()
+        return self.stored(u[None], linearisation.memory[None], forces[None], mean[None],
+                           self.scales[None, self.layout.columns], known)[0]
+
+    def stored(
+        self, u: Array, z: Array, forces: Array, mean: Array, sizes: Array, known: dict[str, Any]
+    ) -> list[StoredValues]:
+        """Values to store of K orbits u (K, n + 1), with those that are known; see StoredOrbits."""
+        layout, count = self.layout, len(u)
+        if self.turn is not None:
+            periods = self.periods * self.turn / u[:, -1]
+        else:
+            periods = np.array([self.period(each) for each in u])
+        orbits = StoredOrbits(layout, u[:, : self.size].reshape(count, -1, layout.harmonic), z,
+                              periods, forces, mean, sizes, self.row, known)
+        return [StoredValues(orbits, k) for k in range(count)]
+
+    def started(
+        self, u: Array, row: Array, options: ContinuationOptions
+    ) -> Solution | None:
+        """See :meth:`Problem.started`."""
+        found = self.found(u, row, options.tolerance)
+        if found is None:
+            return None
+        u, along, forces, mean, z = found
+        values = None if self.stability is not None else self.stored(
+            u[None], z[None], forces[None], mean[None], self.scales[None, self.layout.columns],
+            {})[0]
+        return completed(self, u, self.linearise(u), along / weighted_norm(self.weights(), along),
+                         1, options, values)
+
+    def found(
+        self, u: Array, row: Array, tolerance: float
+    ) -> tuple[Array, ...] | None:
+        """The orbit near u at right angles to a row, by compiled code; None where it finds none.
+
+        With the direction x of the branch, ``row @ x = 1``, accelerations at the samples, their
+        mean derivatives, and internal variables, as :meth:`stored` takes them.
+        """
+        e = self.equations(float(u[-1])) if type(self) is HarmonicProblem else None
+        if e is None:
+            return None
+        m, u = self.layout.displacements, np.array(u, dtype=float)
+        forces, mean, along = np.empty((self.samples, m)), np.empty((m, 2 * m)), np.empty_like(u)
+        e.numbers[TOLERANCE] = tolerance
+        if not (evaluate(u, ORBIT, e, forces, mean, row, self.weights(), along)
+                and math.isfinite(weighted_norm(self.weights(), along))):
+            return None
+        return u, along, forces, mean, e.room.z.copy()
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, if known, and of orbits that shrink to rest."""
@@ -246,6 +296,10 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             found[VANISHING] = shrunk(np.ones(1), self.coefficients(u)[1:] / self._sizes,
                                       self.reference[1:] / self._sizes)
         return found
+
+    def note(self, points: Sequence[BranchPoint]) -> str:
+        """Where multipliers are lost, if they are asked for."""
+        return "" if self.stability is None else super().note(points)
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""

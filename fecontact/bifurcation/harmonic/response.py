@@ -16,10 +16,14 @@ from fecontact.bifurcation.continuation.problem import (
     width_of,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
-from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
-from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
+from fecontact.bifurcation.fields.contact_field import (
+    ContactField,
+    contact_field,
+    field_between,
+)
 from fecontact.bifurcation.harmonic import branches, starts
-from fecontact.bifurcation.harmonic.layout import layout_from
+from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
+from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_of_orbits, observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -162,11 +166,10 @@ def frequency_response(
     level_name, values = levels_of(levels)
     if isinstance(system, ContactSystem):
         name = parameter or _FREQUENCY
-        names = dict.fromkeys([name] + ([level_name] if level_name else []))
-        ranges = {name: chosen.bounds}
+        ranges = {name: (float(chosen.bounds[0]), float(chosen.bounds[1]))}
         if level_name:
             ranges[level_name] = (float(values.min()), float(values.max()))
-        field: VectorField = ContactField(ParametrisedSystem(system, names, ranges))
+        field: VectorField = field_between(system, tuple(ranges.items()))
     else:
         field, name = system, system.parameter_or_only(parameter)
     row, observed = observed_row(field, observe)
@@ -176,14 +179,15 @@ def frequency_response(
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:
-            branch = branch_of_response(field, given, field.index(name), level_name, first,
-                                        method or HarmonicBalance(), chosen, held,
-                                        both=low < first < high)
+            branch = branch_of_response(
+                field, given, field.index(name), level_name, first, method or HarmonicBalance(),
+                chosen, held, both=low < first < high, row=row,
+                further=_told(observed, level_name, float(value)))
         except KeyboardInterrupt:
             if not found:
                 raise
             break
-        found.append(with_observed(branch, row, observed, level_name, float(value)))
+        found.append(branch)
         if branch.status is BranchStatus.INTERRUPTED:
             break
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
@@ -219,11 +223,16 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
 def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
     method: HarmonicBalance, options: ContinuationOptions, held: Array | None = None, *,
-    both: bool,
+    both: bool, row: Array | None = None, further: Mapping[str, Any] | None = None,
 ) -> Branch:
-    """The branch at one level; ``held`` (d,) is the state of a preload."""
+    """The branch at one level; ``held`` (d,) is the state of a preload.
+
+    ``row`` (d,) is what is observed, if anything, ``further`` are attributes of the branch.
+    """
     ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
     told: FecontactError = AnalysisError("No orbit was found to start from.")
+    if row is not None:
+        _require_observable(layout_of(field), row)
     for begin in ends:
         values = values.copy()
         values[free] = begin
@@ -242,10 +251,13 @@ def branch_of_response(
             except FecontactError as error:
                 told = error
                 continue
+            if row is not None:
+                problem = replace(problem, row=row)
             direction = 1.0 if begin < options.bounds[1] else -1.0
-            branch = branches.follow(problem, u, None, method, options, direction=direction,
-                                     both=both)
-            return replace(branch, message=stall_reason(field, branch))
+            branch = branches.follow(problem, u, None, method, options, further,
+                                     direction=direction, both=both)
+            message = stall_reason(field, branch)
+            return branch if message == branch.message else replace(branch, message=message)
     raise told
 
 
@@ -257,20 +269,21 @@ def _problem(
 
     Elements that never slide keep the deflection of the state ``held``, or of rest.
     """
-    period = field.forcing_period(values)
-    if period is None:
+    name = list(field.parameters)[free]
+    scales = np.ones(field.dimension + 2)
+    scales[-1] = width_of(None, options, float(values[free]))
+    problem = starts.problem_for(field, values, free, method, scales,
+                                 limits=np.full(field.dimension, 1e4))
+    if problem.autonomous:
         raise InputError("Nothing excites the system with a period; a frequency response needs a "
                          "harmonic drive or load.")
-    name = list(field.parameters)[free]
-    width = width_of(None, options, float(values[free]))
-    problem = starts.problem_for(field, values, free, method,
-                                 np.concatenate([np.ones(field.dimension), [period, width]]))
-    if not np.isfinite(period):
+    scales[-2] = problem.period(values[[free]])
+    if not np.isfinite(scales[-2]):
         raise InputError(f"At {name} = {values[free]:g} the excitation has no period.")
     if isinstance(field, ContactField) and problem.layout.memory:
         state = rest_state(field, values) if held is None else held
         problem = replace(problem, kept=problem.kept.left_by(state[None]))
-    return replace(problem, limits=np.full(field.dimension, 1e4))
+    return problem
 
 
 def _from_rest(
@@ -279,10 +292,18 @@ def _from_rest(
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit that Newton's method finds from rest, and scales of its size."""
     problem = _problem(field, values, free, method, options, held)
-    state = (rest_state(field, values) if isinstance(field, ContactField)
-             else np.zeros(field.dimension))
-    u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
+    u = np.append(np.zeros(problem.size), values[free])
+    if isinstance(field, ContactField) and not _rests_at_zero(problem, field, u):
+        state = rest_state(field, values)
+        u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
     return _scaled(*starts.corrected(problem, u))
+
+
+def _rests_at_zero(problem: HarmonicProblem, field: ContactField, u: Array) -> bool:
+    """Whether all forces without displacement are known to have no mean."""
+    e = problem.equations(float(u[-1]))
+    return (e is not None and not problem.layout.memory and e.numbers[RESTS] != 0.0
+            and not field.system().basis.springs)
 
 
 def rest_state(field: ContactField, values: Array) -> Array:
@@ -297,13 +318,19 @@ def rest_state(field: ContactField, values: Array) -> Array:
 
 
 def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
-    """The problem with scales of the size of an orbit, which is found again to their precision."""
-    low, high = problem.extremes(u, problem.linearise(u).memory)
-    sizes = (high - low) / 2.0
+    """The problem with scales of the size of an orbit; it is found again to their precision."""
+    if problem.layout.memory:
+        low, high = problem.extremes(u, problem.linearise(u).memory)
+        sizes = (high - low) / 2.0
+    else:
+        states = problem.states(u, problem.period(u), np.zeros((problem.samples, 0)))
+        sizes = (states.max(axis=0) - states.min(axis=0)) / 2.0
     largest = float(sizes.max()) or 1.0
     sizes = np.maximum(sizes, 1e-3 * largest)
     scales = np.concatenate([sizes, problem.scales[-2:]])
-    return starts.corrected(replace(problem, scales=scales, limits=1e4 * sizes), u)
+    scaled = replace(problem, scales=scales, limits=1e4 * sizes)
+    # A branch begins so by itself where that is quick.
+    return (scaled, u) if scaled.equations(float(u[-1])) else starts.corrected(scaled, u)
 
 
 def _raised(
@@ -354,19 +381,28 @@ def with_observed(
 ) -> Branch:
     """The branch with what is observed at its points, and its level as attributes."""
     layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
-    if row[layout.states - layout.memory :].any():
-        raise InputError("Internal variables of friction cannot be observed; choose a displacement "
-                         "or a velocity.")
+    _require_observable(layout, row)
     b = layout.harmonic
     X = np.array([point.u[: (2 * H + 1) * b] for point in branch.points]).reshape(-1, 2 * H + 1, b)
     seen = observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
-    attributes: dict[str, Any] = {**branch.attributes, "observed": observed, "level": level,
-                                  "level_name": level_name or ""}
+    attributes = {**branch.attributes, **_told(observed, level_name, level)}
     header = BranchHeader(branch.parameter_name, attributes)
-    points = [special_point(point.u, point.tangent, {**point.values, **each}, point.kind,
+    points = [special_point(point.u, point.tangent, {
+        **point.values, **{name: values[k] for name, values in seen.items()}}, point.kind,
                             details_of(point), header)
-              for point, each in zip(branch.points, seen, strict=True)]
+              for k, point in enumerate(branch.points)]
     return replace(branch, points=tuple(points), attributes=attributes)
+
+
+def _require_observable(layout: Layout, row: Array) -> None:
+    if row[layout.states - layout.memory :].any():
+        raise InputError("Internal variables of friction cannot be observed; choose a displacement "
+                         "or a velocity.")
+
+
+def _told(observed: str, level_name: str | None, level: float) -> dict[str, Any]:
+    """Attributes of a branch of responses."""
+    return {"observed": observed, "level": level, "level_name": level_name or ""}
 
 
 def continued(

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvals, expm
 
 from fecontact.bifurcation.harmonic.balance import Balance
+from fecontact.bifurcation.harmonic.compiled.along_orbits import derivatives_along
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
-from fecontact.bifurcation.harmonic.compiled.evaluation import derivatives_along
 from fecontact.bifurcation.harmonic.layout import around
 from fecontact.bifurcation.harmonic.memory import LEAK
 from fecontact.bifurcation.harmonic.series import basis_at

@@ -34,10 +34,11 @@ _INTERVALS, _DEGREE = 200, 4
 
 def problem_for(
     field: VectorField, values: Array, free: int, method: HarmonicBalance, scales: Array,
-    periods: int = 1, offsets: Array | None = None,
+    periods: int = 1, offsets: Array | None = None, limits: Array | None = None,
 ) -> HarmonicProblem:
     """The problem of a field; ``scales`` (d + 2,) of states, period and parameter.
 
+    The former grow with the orbit up to the limits (d,), if there are any.
     ``offsets`` (c,) are those of elements that never slide, see :class:`Kept`.
     """
     layout = layout_of(field)
@@ -46,7 +47,7 @@ def problem_for(
     found = HarmonicProblem(
         field, values.copy(), free, method.harmonics, method.count,
         np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout, periods,
-        *timing_of(field, values, free), kept, stability=method.stability)
+        *timing_of(field, values, free), kept, stability=method.stability, limits=limits)
     return replace(found, compiled=CompiledBalance.of(found))
 
 
@@ -137,6 +138,9 @@ def corrected(
     """
     row = np.zeros_like(u)
     row[-1] = 1.0
+    found = problem.found(u, row, tolerance)
+    if found is not None:
+        return problem, found[0]
     name = list(problem.field.parameters)[problem.free]
     where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
     weights = problem.weights()
@@ -156,17 +160,17 @@ def corrected(
         while True:
             try:
                 trial = problem.linearise(u + factor * step)
-                found = float(np.linalg.norm(trial.residual))
+                left = float(np.linalg.norm(trial.residual))
             except AnalysisError:
-                found = np.inf
-            if found < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(found)):
+                left = np.inf
+            if left < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(left)):
                 break
             factor /= 2.0
             if factor < 1e-4:
                 raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does "
                                     f"not converge (residual {norm:.3g}); start nearer to it, or "
                                     f"take other than {problem.harmonics} harmonics.")
-        u, linearised, norm = u + factor * step, trial, found
+        u, linearised, norm = u + factor * step, trial, left
         if small:
             if problem.autonomous and motion(u) <= 1e-4 * begin:
                 raise AnalysisError(f"No periodic orbit was found {where}: the iteration ends "

@@ -8,7 +8,7 @@ from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
 # Further values of a parameter, as factors, at which the period is asked for.
-_BESIDE = (0.97, 1.01, 1.043)
+_BESIDE = (0.97, 1.043)
 # Relative difference of numbers that count as the same.
 _SAME = 1e-13
 
@@ -26,11 +26,11 @@ def timing_of(
         return None, field.forcing_period(values)
     here = float(values[free])
     made = made_values(field, values, free) if isinstance(field, ContactField) else []
-    others = [value for value in made if value * here > 0.0]
-    if len(others) < len(_BESIDE):
-        others = [here * factor for factor in _BESIDE]
+    places = [value for value in made if value * here > 0.0][: 1 + len(_BESIDE)]
+    if len(places) <= len(_BESIDE):
+        places = [here, *(here * factor for factor in _BESIDE)]
     periods, products = [], []
-    for value in (here, *others):
+    for value in places:
         beside = values.copy()
         beside[free] = value
         try:

@@ -19,7 +19,8 @@ class Room(NamedTuple):
     ``square`` and ``condensed`` hold (k, k) and (k, k + 1) derivatives, ``a`` factors of (k + 1,
     k + 1); ``column`` (n,) is the derivative to the parameter, ``linear`` (2, m, m) are stiffness
     and damping. ``along`` (n + 1,) is the solution of the equations without right side that has one
-    in the last row.
+    in the last row. Plain contact forces are found row by row over the samples: ``motion`` (2 m, N)
+    displacements and velocities, ``pushes`` (m, N) forces, ``node`` (8, N) what belongs to a node.
     """
 
     t: Array
@@ -28,6 +29,7 @@ class Room(NamedTuple):
     z: Array
     target: Array
     f: Array
+    f_marched: Array
     J: Array
     J_marched: Array
     coefficients: Array
@@ -50,6 +52,9 @@ class Room(NamedTuple):
     beside: Array
     along: Array
     vectors: Array
+    motion: Array
+    pushes: Array
+    node: Array
 
 
 class Equations(NamedTuple):
@@ -61,9 +66,12 @@ class Equations(NamedTuple):
     m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
     whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
     which internal variables return. Numbers are the period times p or 0, the period, least and
-    largest p for which this holds, whether contact forces do not depend on p and t, bounds of the
-    branch, tolerance, largest step, largest turn, Newton's rounding. ``limits`` (m,) bound the
-    scales of the displacements; ``nodes`` have internal variables.
+    largest p for which this holds, whether contact forces do not depend on p and t, whether they
+    are plain, of displacements and velocities in the plane alone, bounds of the branch, tolerance,
+    largest step, largest turn, Newton's rounding, whether folds are located, whether all
+    forces at rest have no mean; and of Newton's method the size of a second step over the square
+    of the first, negative if unknown, with the number of times it was relied on. ``limits`` (m,)
+    bound the scales of the displacements; ``nodes`` have internal variables.
     """
 
     contact: SystemArrays
@@ -86,14 +94,14 @@ class Equations(NamedTuple):
     room: Room
 
 
-(TURN, PERIOD, LOW, HIGH, STEADY, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP, LARGEST_TURN,
- ROUNDING) = range(11)
+(TURN, PERIOD, LOW, HIGH, STEADY, PLAIN, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP,
+ LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED) = range(16)
 
 _blocks = types.Array(f8, 4, "C")
 ROOM = types.NamedTuple(
-    [vector, matrix, matrix, matrix, matrix, matrix, block, block, block, matrix, vector, vector,
+    [vector, *[matrix] * 6, block, block, block, matrix, vector, vector,
      block, block, _blocks, vector, vector, integers, integers, integers, matrix, block,
-     block, *[vector] * 4, matrix], Room)
+     block, *[vector] * 4, *[matrix] * 4], Room)
 EQUATIONS = types.NamedTuple(
     [SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, *[vector] * 3, i8, ROOM],
     Equations)
@@ -103,7 +111,8 @@ class Reached(NamedTuple):
     """Points that were reached, K at most.
 
     u, tangent (K, n + 1), internal variables z (K, N, c), accelerations (K, N, m), mean derivatives
-    of these (K, m, 2 m) to q and q', scales (K, m + 1) for the step behind, and ``step`` (1,).
+    of these (K, m, 2 m) to q and q', scales (K, m + 1) for the step behind, lengths (K,) of the
+    steps, which points are folds (K,), and ``step`` (1,).
     """
 
     u: Array
@@ -112,10 +121,13 @@ class Reached(NamedTuple):
     forces: Array
     mean: Array
     scales: Array
+    lengths: Array
+    folds: Integers
     step: Array
 
 
-REACHED = types.NamedTuple([matrix, matrix, block, block, block, matrix, vector], Reached)
+REACHED = types.NamedTuple(
+    [matrix, matrix, *[block] * 3, matrix, vector, integers, vector], Reached)
 
 
 def room_for(
@@ -130,10 +142,12 @@ def room_for(
     s = c // nodes if nodes else 0
     return Room(
         np.empty(N), np.empty((N, d)), np.empty((N, d)), np.empty((N, c)), np.empty((N, c)),
-        np.empty((N, d)), np.empty((N, d, d)), np.empty((N if c else 0, d, d)),
+        np.empty((N, d)), np.empty((N if c else 0, d)), np.empty((N, d, d)),
+        np.empty((N if c else 0, d, d)),
         np.empty((2, m, L)), np.empty((max(m, 2 * coupled**2), N)), np.empty(4 * L * coupled**2),
         np.empty(k * k), np.empty((N if c else 0, c, n + 1)),
         np.empty((N if c else 0, m, n + 1)), np.empty((N, nodes, s, s)), np.empty(k * (k + 1)),
         np.empty((k + 1) ** 2), np.empty(k + 1, dtype=np.int64), np.arange(m),
         np.array([coupled]), np.empty((2, m)), np.empty((3, m, 2 * m)), np.empty((2, m, m)),
-        np.empty(n), np.empty(n), np.empty(n), np.empty(n + 1), np.empty((10, n + 1)))
+        np.empty(n), np.empty(n), np.empty(n), np.empty(n + 1), np.empty((16, n + 1)),
+        np.empty((d - c, N)), np.empty((m, N)), np.empty((8, N)))

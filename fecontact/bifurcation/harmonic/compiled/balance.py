@@ -8,14 +8,16 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
 from fecontact.bifurcation.fields.parametrised_system import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
+from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
 from fecontact.core.types import Array
-from fecontact.system.jacobian import batch_rates
 from fecontact.system.nodes import SystemArrays
 
 # Most unknowns that compiled code without LAPACK solves for together.
 MOST_UNKNOWNS = 160
 # Relative error of loads that are affine in the parameter.
 _AFFINE = 1e-13
+# Part of the forces on a body at rest up to which their mean is nothing.
+_NOTHING = 1e-14
 # Arrays of a system that do not act on contact forces.
 _OF_BODY = frozenset({"stiffness", "damping", "modal_damping", "constant_load", "drive_shapes",
                       "drive_stiffness", "drive_damping", "drive_parameters", "load_shapes",
@@ -88,7 +90,7 @@ class CompiledBalance:
     ) -> arrays.Equations:
         layout, series = problem.layout, problem.series
         m, L = layout.displacements, 2 * problem.harmonics + 1
-        numbers = np.zeros(arrays.ROUNDING + 1)
+        numbers = np.zeros(arrays.TRUSTED + 1)
         if problem.turn is not None:
             numbers[arrays.TURN] = problem.periods * problem.turn
         else:
@@ -102,46 +104,55 @@ class CompiledBalance:
         found = self._without_contact(problem, near)
         if found is not None:
             contact = _contact_alone(contact)
-            body, given = found
+            body, given, rests = found
+            numbers[arrays.RESTS] = rests
             numbers[arrays.STEADY] = self._steady(near)
+            numbers[arrays.PLAIN] = (numbers[arrays.STEADY] and problem.size <= MOST_UNKNOWNS
+                                     and not layout.memory and self._plain(near))
         return arrays.Equations(
             contact, near.flat, near.base, near.slope, series.times, series.values,
             series.projection, series.cosines, series.sines, body, given,
             series.projection @ given, problem.kept.rows, problem.kept.offsets, np.full(m, np.inf),
             numbers, layout.nodes, room)
 
-    def _without_contact(self, problem: Any, near: AffineArrays) -> tuple[Array, Array] | None:
-        """``body`` and ``given`` of the equations; None where loads are not affine."""
-        system, m = near.arrays, problem.layout.displacements
-        bare = system._replace(Tx=np.zeros_like(system.Tx), Ty=np.zeros_like(system.Ty),
-                               T2=np.zeros_like(system.T2))
-        places = near.low + (near.high - near.low) * np.array([0.02, 0.98, 0.31, 0.73])
-        loads, matrices = [], []
-        x = np.zeros((problem.samples, problem.layout.states))
-        for value in places:
-            near.flat[:] = near.base + value * near.slope
-            f = np.empty_like(x)
-            batch_rates(problem.series.times * problem.period(np.array([value])), x, bare, f)
-            loads.append(f[:, m : 2 * m].copy())
-            matrices.append(np.stack([system.stiffness, system.damping]))
+    def _without_contact(
+        self, problem: Any, near: AffineArrays
+    ) -> tuple[Array, Array, bool] | None:
+        """``body`` and ``given`` of the equations, and whether contact and loads leave rest alone.
+
+        None where loads are not affine.
+        """
+        system, m, N = near.arrays, problem.layout.displacements, problem.samples
+        places = near.low + (near.high - near.low) * np.array([0.02, 0.98, 0.31])
+        periods = np.array([problem.period(places[k : k + 1]) for k in range(len(places))])
+        loads, matrices = np.empty((len(places), N, m)), np.empty((len(places), 2, m, m))
+        forces = np.empty((N, m))
+        forces_at_rest(places, periods, problem.series.times, near.flat, near.base, near.slope,
+                       system, loads, matrices, forces)
         given = np.stack(_affine(places, loads))
         if any(np.abs(given[0] + value * given[1] - load).max()
                > _AFFINE * np.abs(given).max() * max(1.0, abs(value))
                for value, load in zip(places, loads, strict=True)):
             return None
-        return np.concatenate(_affine(places, matrices)), given
+        rests = np.abs(forces.mean(axis=0)).max() <= _NOTHING * np.abs(forces).max()
+        return np.concatenate(_affine(places, matrices)), given, bool(rests)
 
     def _steady(self, near: AffineArrays) -> bool:
         """Whether contact forces depend neither on the parameter nor on time."""
         ground = self.contact_field.system().ground
         return not ground.wavy and ground.friction_variation is None and not any(
-            np.shares_memory(array, near.flat)
+            np.may_share_memory(array, near.flat)
             for name, array in near.arrays._asdict().items()
             if isinstance(array, np.ndarray) and name not in _OF_BODY)
 
 
-def _affine(places: Array, found: list[Array]) -> tuple[Array, Array]:
-    """Value at zero and slope from the first two of arrays at places."""
+    def _plain(self, near: AffineArrays) -> bool:
+        """Whether contact forces are those of plane bodies on ground of constant speed."""
+        return not len(near.arrays.T2) and self.contact_field.system().prescribed_motion.constant
+
+
+def _affine(places: Array, found: Array) -> tuple[Array, Array]:
+    """Value at zero and slope from the first two of arrays (P, ...) at places (P,)."""
     slope = (found[1] - found[0]) / (places[1] - places[0])
     return found[0] - places[0] * slope, slope
 

@@ -7,13 +7,12 @@ is taken harmonic by harmonic, contact forces at the samples.
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, PERIOD, STEADY, TURN
+from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY, TURN
+from fecontact.bifurcation.harmonic.compiled.plain_forces import combine, plain_forces, project
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
-from fecontact.core.compiled import block, f8, helper, kernel, matrix, routine, vector
-from fecontact.core.references import borrowed
+from fecontact.core.compiled import helper, routine
 from fecontact.system.jacobian import batch_derivatives, batch_rates
 
 # Relative steps of one-sided and of central differences in the parameter.
@@ -46,22 +45,28 @@ def speed_coefficient(u, k, j, m, T):
 
 
 @helper
+def take_motion(u, T, e):
+    """Fill the rows of displacements and velocities at the samples."""
+    X, motion = e.room.coefficients, e.room.motion
+    m, L, N = X.shape[1], X.shape[2], len(e.tau)
+    for j in range(m):
+        for k in range(L):
+            # The rows of the projection are those of the series, but for their size.
+            size = N if k == 0 else 0.5 * N
+            X[0, j, k] = size * u[k * m + j]
+            X[1, j, k] = size * speed_coefficient(u, k, j, m, T)
+        for part in range(2):
+            combine(e.projection, X[part, j], L, motion[part * m + j])
+
+
+@helper
 def take_states(u, T, e, x):
     """Fill displacements and velocities of the states (N, d) at the samples."""
-    X, row = e.room.coefficients, e.room.rows[0]
-    m, L, N = X.shape[1], X.shape[2], len(x)
-    for part in range(2):
-        for j in range(m):
-            for n in range(N):
-                row[n] = 0.0
-            for k in range(L):
-                X[part, j, k] = u[k * m + j] if part == 0 else speed_coefficient(u, k, j, m, T)
-                # The rows of the projection are those of the series, but for their size.
-                size = X[part, j, k] * (N if k == 0 else 0.5 * N)
-                for n in range(N):
-                    row[n] += size * e.projection[k, n]
-            for n in range(N):
-                x[n, part * m + j] = row[n]
+    motion = e.room.motion
+    take_motion(u, T, e)
+    for j in range(len(motion)):
+        for n in range(len(x)):
+            x[n, j] = motion[j, n]
 
 
 @helper
@@ -82,22 +87,30 @@ def _take_differences(T, e):
 
 
 @helper
-def balance(u, T, f, loads, e, out):
-    """Fill out (n,) with the harmonics of q'' - f; f at the samples without what is linear.
+def take_pushes(f, e):
+    """Fill the rows of the forces from f (N, d) at the samples."""
+    pushes = e.room.pushes
+    m = len(pushes)
+    for j in range(m):
+        for n in range(len(f)):
+            pushes[j, n] = f[n, m + j]
+
+
+@helper
+def balance(u, T, loads, e, out):
+    """Fill out (n,) with the harmonics of q'' - f; ``pushes`` are without what is linear.
 
     ``loads`` is the factor of the loads.
     """
-    m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
-    rows, linear, p = e.room.rows, e.room.linear, u[len(u) - 1]
+    m, L = e.springs.shape[1], e.values.shape[1]
+    linear, p = e.room.linear, u[len(u) - 1]
+    pushed = e.room.coefficients[0]
     for j in range(m):
-        for n in range(N):
-            rows[j, n] = f[n, m + j]
+        project(e.projection, e.room.pushes[j], pushed[j])
     for k in range(L):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
-            total = loads * (e.pulls[0, k, j] + p * e.pulls[1, k, j])
-            for n in range(N):
-                total += e.projection[k, n] * rows[j, n]
+            total = pushed[j, k] + loads * (e.pulls[0, k, j] + p * e.pulls[1, k, j])
             out[k * m + j] = -turn * turn * u[k * m + j] - total
         for i in range(m):
             place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
@@ -114,6 +127,11 @@ def evaluate_at(u, derivatives, e):
     room = e.room
     m, c = e.springs.shape[1], len(e.offsets)
     T = take_parameter(u[len(u) - 1], e)
+    if e.numbers[PLAIN] != 0.0:
+        take_motion(u, T, e)
+        plain_forces(derivatives, e)
+        balance(u, T, 1.0, e, room.residual)
+        return T
     take_states(u, T, e, room.x)
     if c > 0:
         _take_differences(T, e)
@@ -131,36 +149,52 @@ def evaluate_at(u, derivatives, e):
                           np.empty((0, 0)))
     else:
         batch_rates(room.t, room.x, e.contact, room.f)
-    balance(u, T, room.f, 1.0, e, room.residual)
+    take_pushes(room.f, e)
+    balance(u, T, 1.0, e, room.residual)
     return T
 
 
 @helper
-def _harmonics_of_derivatives(T, s, e):
-    """Fill the derivatives of the balance of s coupled modes to their coefficients, z held."""
+def _take_rows(s, e):
+    """Fill the rows of the derivatives of the forces of s coupled modes."""
     room = e.room
-    m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
+    m = e.springs.shape[1]
+    for part in range(2):
+        for i in range(s):
+            for j in range(s):
+                row = room.rows[(part * s + i) * s + j]
+                for n in range(len(row)):
+                    row[n] = room.J[n, m + room.order[i], part * m + room.order[j]]
+
+
+@helper
+def _harmonics_of_derivatives(T, s, e):
+    """Fill the derivatives of the balance of s coupled modes to their coefficients, z held.
+
+    The rows hold those of the forces.
+    """
+    room = e.room
+    L = e.values.shape[1]
     spectra = room.spectra[: 4 * L * s * s].reshape((4, L, s * s))
     square = room.square[: L * s * L * s].reshape((L, s, L, s))
     for part in range(2):
         for i in range(s):
             for j in range(s):
                 row = room.rows[(part * s + i) * s + j]
-                least, most = np.inf, -np.inf
-                for n in range(N):
-                    value = room.J[n, m + room.order[i], part * m + room.order[j]]
-                    row[n] = value
-                    least, most = min(least, value), max(most, value)
+                same = True
+                for n in range(1, len(row)):
+                    same = same and row[n] == row[0]
+                cosines, sines = room.along[:L], room.beside[:L]
+                if same:
+                    for k in range(L):
+                        cosines[k], sines[k] = 0.0, 0.0
+                    cosines[0] = 2.0 * row[0]
+                else:
+                    project(e.cosines, row, cosines)
+                    project(e.sines, row, sines)
                 p = i * s + j
-                spectra[2 * part, 0, p], spectra[2 * part + 1, 0, p] = 2.0 * most, 0.0
                 for k in range(L):
-                    c, w = 0.0, 0.0
-                    if least != most:
-                        for n in range(N):
-                            c += e.cosines[k, n] * row[n]
-                            w += e.sines[k, n] * row[n]
-                    if k > 0 or least != most:
-                        spectra[2 * part, k, p], spectra[2 * part + 1, k, p] = c, w
+                    spectra[2 * part, k, p], spectra[2 * part + 1, k, p] = cosines[k], sines[k]
     fill_blocks(spectra[0], spectra[1], spectra[2], spectra[3], T, s, s, square)
     for k in range(L):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
@@ -181,19 +215,26 @@ def _by_parameter(u, T, e):
     N, c = len(e.tau), len(e.offsets)
     # Relative change of the period; that of speeds is the opposite.
     rise = -1.0 / p if e.numbers[TURN] != 0.0 else 0.0
+    plain, row, pushed = e.numbers[PLAIN] != 0.0, room.node[0], room.coefficients[0]
     for j in range(m):
-        row = room.rows[j]
         for n in range(N):
-            total = 0.0
-            for i in range(m):
-                total -= room.J[n, m + j, m + i] * room.x[n, m + i]
-            row[n] = rise * total
+            row[n] = 0.0
+        moves = not plain
+        for i in range(m):
+            by_speed = room.rows[(m + j) * m + i]
+            for n in range(N):
+                slope = by_speed[n] if plain else room.J[n, m + j, m + i]
+                moves = moves or slope != 0.0
+                row[n] -= rise * room.motion[m + i, n] * slope
+        if moves:
+            project(e.projection, row, pushed[j])
+        else:
+            for k in range(L):
+                pushed[j, k] = 0.0
     for k in range(L):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
-            total = e.pulls[1, k, j]
-            for n in range(N):
-                total += e.projection[k, n] * room.rows[j, n]
+            total = e.pulls[1, k, j] + pushed[j, k]
             room.column[k * m + j] = 2.0 * rise * turn * turn * u[k * m + j] - total
         for i in range(m):
             place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
@@ -231,16 +272,18 @@ def _beside(u, central, e, followed):
         T = take_parameter(there[n], e)
         take_states(there, T, e, room.x)
         batch_rates(room.t, room.x, e.contact, room.f)
-        balance(there, T, room.f, 1.0, e, room.beside)
+        take_pushes(room.f, e)
+        balance(there, T, 1.0, e, room.beside)
         for k in range(n):
             room.column[k] += sign * room.beside[k] / width
         if c > 0:
             _take_differences(T, e)
-            batch_rates(room.t, room.y, e.contact, room.f)
+            batch_rates(room.t, room.y, e.contact, room.f_marched)
             rate = N / T
             for k in range(N):
                 for i in range(c):
-                    off = (room.f[k, 2 * m + i] - LEAK / T * (room.z[k, i] - room.target[k, i])
+                    off = (room.f_marched[k, 2 * m + i]
+                           - LEAK / T * (room.z[k, i] - room.target[k, i])
                            - rate * (1.5 * room.z[k, i] - 2.0 * room.z[k - 1, i]
                                      + 0.5 * room.z[k - 2, i]))
                     followed[k, i, n] = (sign * off / width
@@ -309,10 +352,12 @@ def condense(u, T, central, e):
     c, s = len(e.offsets), room.coupled[0]
     m, L = e.springs.shape[1], e.values.shape[1]
     k = L * s
+    if e.numbers[PLAIN] == 0.0:
+        _take_rows(s, e)
     _harmonics_of_derivatives(T, s, e)
     if c > 0:
-        batch_derivatives(room.t, room.y, e.contact, e.contact, 0.0, room.f, room.J_marched,
-                          np.empty((0, 0)))
+        batch_derivatives(room.t, room.y, e.contact, e.contact, 0.0, room.f_marched,
+                          room.J_marched, np.empty((0, 0)))
     if e.numbers[STEADY] != 0.0:
         _by_parameter(u, T, e)
     else:
@@ -330,15 +375,26 @@ def condense(u, T, central, e):
 @helper
 def take_forces(p, e, forces):
     """Fill forces (N, m) with the accelerations at the samples that were evaluated last."""
-    room = e.room
+    room, linear = e.room, e.room.linear
     m, N = e.springs.shape[1], len(e.tau)
-    for n in range(N):
+    if e.numbers[PLAIN] != 0.0:
         for j in range(m):
-            forces[n, j] = room.f[n, m + j] + e.given[0, n, j] + p * e.given[1, n, j]
-        for i in range(m):
-            place, speed = room.x[n, i], room.x[n, m + i]
+            push = room.pushes[j]
+            for n in range(N):
+                forces[n, j] = push[n] + e.given[0, n, j] + p * e.given[1, n, j]
+            for i in range(m):
+                places, speeds = room.motion[i], room.motion[m + i]
+                stiffness, damping = linear[0, i, j], linear[1, i, j]
+                for n in range(N):
+                    forces[n, j] -= stiffness * places[n] + damping * speeds[n]
+    else:
+        for n in range(N):
             for j in range(m):
-                forces[n, j] -= room.linear[0, i, j] * place + room.linear[1, i, j] * speed
+                forces[n, j] = room.f[n, m + j] + e.given[0, n, j] + p * e.given[1, n, j]
+            for i in range(m):
+                place, speed = room.x[n, i], room.x[n, m + i]
+                for j in range(m):
+                    forces[n, j] -= linear[0, i, j] * place + linear[1, i, j] * speed
 
 
 @helper
@@ -349,61 +405,19 @@ def take_mean(e, mean):
     for i in range(m):
         for j in range(2 * m):
             mean[i, j] = 0.0
-    for n in range(N):
+    if e.numbers[PLAIN] != 0.0:
         for i in range(m):
             for j in range(2 * m):
-                mean[i, j] += room.J[n, m + i, j] / N
+                row, total = room.rows[((j // m) * m + i) * m + j % m], 0.0
+                for n in range(N):
+                    total += row[n]
+                mean[i, j] = total / N
+    else:
+        for n in range(N):
+            for i in range(m):
+                for j in range(2 * m):
+                    mean[i, j] += room.J[n, m + i, j] / N
     for i in range(m):
         for j in range(m):
             mean[i, j] -= room.linear[0, i, j]
             mean[i, m + j] -= room.linear[1, i, j]
-
-
-@helper
-def _take_coefficients(u, T, X):
-    """Fill X (2, m, 2 H + 1) with the coefficients of displacements and velocities."""
-    m = X.shape[1]
-    for j in range(m):
-        for k in range(X.shape[2]):
-            X[0, j, k], X[1, j, k] = u[k * m + j], speed_coefficient(u, k, j, m, T)
-
-
-@kernel(types.void(matrix, block, vector, matrix, EQUATIONS, types.Array(f8, 4, "C")))
-def derivatives_along(us, zs, tau, series, e, J):
-    """Fill J (K, P, d, d) with the derivatives of the rates at times tau (P,) of K orbits.
-
-    ``series`` (2 H + 1, P) holds the functions of the series there. Internal variables zs
-    (K, N, c) are linear between the samples.
-    """
-    us, zs, series, e, J = borrowed(us), borrowed(zs), borrowed(series), borrowed(e), borrowed(J)
-    m, N, c = e.springs.shape[1], zs.shape[1], zs.shape[2]
-    X, linear = e.room.coefficients, e.room.linear
-    L = X.shape[2]
-    P = len(tau)
-    t, x, f, row = np.empty(P), np.empty((P, 2 * m + c)), np.empty((P, 2 * m + c)), np.empty(P)
-    for k in range(len(us)):
-        T = take_parameter(us[k, us.shape[1] - 1], e)
-        _take_coefficients(us[k], T, X)
-        for part in range(2):
-            for j in range(m):
-                for p in range(P):
-                    row[p] = 0.0
-                for i in range(L):
-                    for p in range(P):
-                        row[p] += X[part, j, i] * series[i, p]
-                for p in range(P):
-                    x[p, part * m + j] = row[p]
-        for p in range(P):
-            t[p] = tau[p] * T
-            place = tau[p] * N
-            first = int(place)
-            part_of = place - first
-            for i in range(c):
-                x[p, 2 * m + i] = ((1.0 - part_of) * zs[k, first % N, i]
-                                   + part_of * zs[k, (first + 1) % N, i])
-        batch_derivatives(t, x, e.contact, e.contact, 0.0, f, J[k], np.empty((0, 0)))
-        for p in range(P):
-            for i in range(m):
-                for j in range(m):
-                    J[k, p, m + i, j] -= linear[0, i, j]
-                    J[k, p, m + i, m + j] -= linear[1, i, j]

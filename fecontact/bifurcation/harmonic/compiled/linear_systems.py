@@ -7,26 +7,19 @@ together. What that neglects is made good by iteration with all derivatives at t
 
 import math
 
-from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
     balance,
-    condense,
-    evaluate_at,
-    take_forces,
-    take_mean,
+    take_pushes,
     take_states,
 )
-from fecontact.core.compiled import helper, i8, kernel, matrix, routine, vector
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
-from fecontact.core.references import borrowed
 
 # Coupling of a mode, relative to its own stiffness, from which it is solved for with the others,
 # and the one up to which it may be left.
 _COUPLED, _LEFT = 0.03, 0.2
 # Iterations of a solution, and relative error of one that is precise.
-_ROUNDS, _PRECISE = 40, 1e-11
-# What is wanted at an orbit.
-RESIDUAL, DERIVATIVES, SOLUTION = range(3)
+_ROUNDS, PRECISE = 40, 1e-11
 
 
 @helper
@@ -186,7 +179,8 @@ def _applied(row, x, T, e, out):
             forces[i] = total
         for i in range(m):
             room.y[k, m + i] = forces[i]
-    balance(x, T, room.y, 0.0, e, out)
+    take_pushes(room.y, e)
+    balance(x, T, 0.0, e, out)
     for i in range(n):
         out[i] += room.column[i] * x[n]
     out[n] = inner(row, x)
@@ -221,29 +215,3 @@ def solve_with(row, weights, T, tolerance, e, x):
         if off <= tolerance * size:
             return 1
     return 0
-
-
-@kernel(i8(vector, i8, EQUATIONS, matrix, matrix, vector, vector, vector))
-def evaluate(u, wanted, e, forces, mean, row, weights, x):
-    """Fill forces (N, m) and leave ``residual`` and ``z`` at u (n + 1,) in the room of e.
-
-    With derivatives, ``wanted`` = DERIVATIVES, also ``condensed``, and the mean derivatives
-    (m, 2 m) of the forces to q and q'. With SOLUTION the right side x (n + 1,) becomes the solution
-    with the derivatives and a last row, for more unknowns than are solved for together. Returns 0
-    where internal variables do not come to repeat, or the iteration does not converge, else 1.
-    """
-    u, e, forces, mean = borrowed(u), borrowed(e), borrowed(forces), borrowed(mean)
-    row, weights, x = borrowed(row), borrowed(weights), borrowed(x)
-    T = evaluate_at(u, wanted != RESIDUAL, e)
-    if not T > 0.0:
-        return 0
-    if wanted == SOLUTION and choose_coupled(T, e) == 0:
-        return 0
-    take_forces(u[len(u) - 1], e, forces)
-    if wanted != RESIDUAL:
-        take_mean(e, mean)
-        condense(u, T, True, e)
-    if wanted == SOLUTION:
-        factorise_with(row, T, e)
-        return solve_with(row, weights, T, _PRECISE, e, x)
-    return 1

@@ -1,10 +1,11 @@
 """Steps along a branch of forced orbits of a contact system, many of them in one compiled call.
 
-Per step: predictor along the tangent with the curvature of the last step, Newton's method at right
-angles to it, tangent, step control, as in
+Per step: predictor along the Hermite cubic of the last step, Newton's method at right angles to the
+tangent, tangent, step control, as in
 :mod:`fecontact.bifurcation.continuation.pseudo_arclength`. The factors made at the prediction serve
-all Newton steps, as long as these converge quickly, and the tangent. What is not a plain step, a
-fold, a bound, a failure, ends the call.
+all Newton steps, as long as these converge quickly, and the tangent. Folds are located where they
+alone are asked for, and so is the bound at which the branch ends. What is no such step, a failure
+or the change of another test, ends the call.
 """
 
 import math
@@ -14,34 +15,26 @@ import numpy as np
 from fecontact.bifurcation.harmonic.compiled.arrays import (
     EQUATIONS,
     FIRST_BOUND,
+    FOLDS,
     HIGH,
     LARGEST_STEP,
     LARGEST_TURN,
     LAST_BOUND,
     LOW,
     REACHED,
-    ROUNDING,
-    TOLERANCE,
+    SQUARE,
 )
-from fecontact.bifurcation.harmonic.compiled.evaluation import (
-    condense,
-    evaluate_at,
-    take_forces,
-    take_mean,
+from fecontact.bifurcation.harmonic.compiled.evaluation import take_forces, take_mean
+from fecontact.bifurcation.harmonic.compiled.linear_systems import inner, length
+from fecontact.bifurcation.harmonic.compiled.newton import (
+    bound_between,
+    corrected,
+    fold_between,
+    linearised,
 )
-from fecontact.bifurcation.harmonic.compiled.linear_systems import (
-    choose_coupled,
-    factorise_with,
-    inner,
-    length,
-    solve_with,
-)
-from fecontact.core.compiled import helper, i8, kernel, routine, vector
+from fecontact.core.compiled import helper, i8, kernel, vector
 from fecontact.core.references import borrowed
 
-# Newton steps before a step fails, and largest factor by which a step with kept factors may leave
-# the error of the one before.
-_STEPS, _SERVES = 8, 0.2
 # Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
 # Halvings of a step in one call; a turn that stays the same over two of them is a corner.
@@ -51,64 +44,9 @@ _OVERSHOOT = 1.2
 # Growth of an orbit from which its scales follow.
 _GROWN = 1.5
 
-# Relative errors of tangents and of Newton steps where they are found by iteration.
-_TANGENT, _INEXACT = 1e-7, 1e-3
-
 # Why a call ended: as many points as were asked for, something to look at in the next step, a step
-# that fails, modes that cannot be separated.
-FULL, EVENT, FAILED, COUPLED = range(4)
-
-
-@routine
-def _corrected(u, guess, row, weights, e):
-    """Newton's method from u = guess at right angles to a row.
-
-    Returns how often factors were made; zero where it fails, -1 where modes cannot be separated.
-    """
-    room = e.room
-    n = len(room.residual)
-    tolerance = e.numbers[TOLERANCE]
-    change = room.vectors[0]
-    scale = 1.0 + length(weights, guess)
-    before, made, fresh, made_at = np.inf, 0, True, 0.0
-    for count in range(1, _STEPS + 1):
-        T = evaluate_at(u, fresh, e)
-        if not T > 0.0:
-            return 0
-        for k in range(n):
-            change[k] = -room.residual[k]
-        off = 0.0
-        for k in range(n + 1):
-            off += row[k] * (u[k] - guess[k])
-        change[n] = -off
-        if fresh:
-            if len(room.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
-                return -1
-            condense(u, T, False, e)
-            factorise_with(row, T, e)
-            made, made_at = made + 1, T
-            for k in range(n):
-                room.along[k] = 0.0
-            room.along[n] = 1.0
-            if solve_with(row, weights, T, _TANGENT, e, room.along) == 0:
-                return -1
-        if solve_with(row, weights, made_at, _INEXACT, e, change) == 0:
-            return -1
-        size = length(weights, change)
-        if count > 1 and size > before and before <= e.numbers[ROUNDING] * scale:
-            return made
-        if not size < np.inf or (count > 1 and size > before):
-            return 0
-        for k in range(n + 1):
-            u[k] += change[k]
-        if fresh and size <= tolerance * scale:
-            return made
-        falls = size / before
-        if count > 1 and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
-            return made
-        fresh = not fresh and falls > _SERVES
-        before = size
-    return 0
+# that fails, modes that cannot be separated, a bound on which the last point lies.
+FULL, EVENT, FAILED, COUPLED, BOUND = range(5)
 
 
 @helper
@@ -142,15 +80,49 @@ def _grow(u, scales, e):
 
 
 @helper
-def _keep(count, u, tangent, e, out):
-    """Store a point with what its values are made from."""
-    out.u[count, :] = u
-    out.tangent[count, :] = tangent
+def _keep(count, u, along, weights, sign, scales, way, e, out):
+    """Store a point with its direction and what its values are made from."""
+    size = sign * length(weights, along)
+    for k in range(len(u)):
+        out.u[count, k], out.tangent[count, k] = u[k], along[k] / size
     for n in range(len(e.tau)):
         for i in range(len(e.offsets)):
             out.z[count, n, i] = e.room.z[n, i]
     take_forces(u[len(u) - 1], e, out.forces[count])
     take_mean(e, out.mean[count])
+    for k in range(len(scales)):
+        out.scales[count, k] = scales[k]
+    out.lengths[count], out.folds[count] = way, 0
+
+
+@helper
+def _predict(u, tangent, bend, third, step, weights, guess):
+    """Fill the guess a step ahead: along the cubic, or the tangent where that bends too much."""
+    aside = 0.0
+    for k in range(len(u)):
+        off = step * step * (bend[k] + step * third[k])
+        guess[k] = off
+        aside += weights[k] * off * off
+    kept = 1.0 if aside <= (_MOST_BENT * step) ** 2 else 0.0
+    for k in range(len(u)):
+        guess[k] = u[k] + step * tangent[k] + kept * guess[k]
+
+
+@helper
+def _exact(count, row, weights, e, out):
+    """Make the last tangent that of the equations at its point; 0 if its slope changes sign."""
+    u, tangent = out.u[count], out.tangent[count]
+    along, n = e.room.along, len(u) - 1
+    for k in range(n + 1):
+        row[k] = weights[k] * tangent[k]
+    if linearised(u, row, weights, e) == 0:
+        return 0
+    size = length(weights, along)
+    if not 0.0 < size < np.inf or along[n] * tangent[n] <= 0.0:
+        return 0
+    for k in range(n + 1):
+        tangent[k] = along[k] / size
+    return 1
 
 
 @kernel(i8(vector, vector, vector, vector, EQUATIONS, REACHED, vector))
@@ -167,9 +139,15 @@ def steps(u, tangent, bend, scales, e, out, why):
     n, H = len(u) - 1, e.values.shape[1] // 2
     row, weights, guess, there, chord = (room.vectors[1], room.vectors[2], room.vectors[3],
                                          room.vectors[4], room.vectors[5])
+    found, third = room.vectors[10], room.vectors[13]
     _set_weights(scales, H, weights)
-    step, count, halvings, last_turn, alike = out.step[0], 0, 0, 0.0, 0
+    for k in range(n + 1):
+        bend[k], third[k] = 0.5 * bend[k], 0.0
+    step, count, halvings, last_turn, alike, far = out.step[0], 0, 0, 0.0, 0, 0.0
+    # With internal variables of friction branches have kinks, too many for a cubic.
+    smooth = 0.0 if len(e.offsets) > 0 else 1.0
     why[0] = FULL
+    e.numbers[SQUARE] = -1.0
     while count < len(out.u):
         for k in range(n + 1):
             row[k] = weights[k] * tangent[k]
@@ -177,16 +155,13 @@ def steps(u, tangent, bend, scales, e, out, why):
         bound = e.numbers[LAST_BOUND] if slope > 0.0 else e.numbers[FIRST_BOUND]
         if slope != 0.0:
             step = min(step, _OVERSHOOT * (bound - u[n]) / slope)
-        aside = 0.5 * step * step
-        if aside * length(weights, bend) > _MOST_BENT * step:
-            aside = 0.0
-        for k in range(n + 1):
-            guess[k] = u[k] + step * tangent[k] + aside * bend[k]
-            there[k] = guess[k]
+        _predict(u, tangent, bend, third, step, weights, guess)
         if not e.numbers[LOW] < guess[n] < e.numbers[HIGH]:
             why[0] = EVENT
             break
-        made = _corrected(there, guess, row, weights, e)
+        for k in range(n + 1):
+            there[k] = guess[k]
+        made = corrected(there, guess, row, weights, e)
         if made < 0:
             why[0] = COUPLED
             break
@@ -196,8 +171,9 @@ def steps(u, tangent, bend, scales, e, out, why):
         if not failed:
             for k in range(n + 1):
                 chord[k] = there[k] - u[k]
+            far = length(weights, chord)
             aligned = inner(row, room.along) / size
-            ahead = inner(row, chord) / length(weights, chord)
+            ahead = inner(row, chord) / far
             cosine = math.cos(e.numbers[LARGEST_TURN])
             if min(aligned, ahead) < cosine:
                 # At a corner the turn stays the same over shorter steps.
@@ -212,16 +188,40 @@ def steps(u, tangent, bend, scales, e, out, why):
                 why[0] = FAILED
                 break
             continue
-        if (room.along[n] * slope <= 0.0 or there[n] <= e.numbers[FIRST_BOUND]
-            or there[n] >= e.numbers[LAST_BOUND]):
+        turns = room.along[n] * slope <= 0.0
+        leaves = there[n] <= e.numbers[FIRST_BOUND] or there[n] >= e.numbers[LAST_BOUND]
+        if turns and (leaves or e.numbers[FOLDS] == 0.0 or last_turn != 0.0):
             why[0] = EVENT
             break
-        way = inner(row, chord)
+        if turns and count + 2 > len(out.u):
+            break
+        if leaves:
+            why[0] = EVENT
+            leaving = room.vectors[14]
+            for k in range(n + 1):
+                leaving[k] = room.along[k] / size
+            if last_turn == 0.0 and bound_between(
+                    u, tangent, there, leaving, row, weights, bound, e, found) == 1:
+                _keep(count, found, room.along, weights, 1.0 if slope > 0.0 else -1.0, scales,
+                      far, e, out)
+                why[0] = BOUND
+                count += 1
+            break
+        last = count + 1 if turns else count
+        _keep(last, there, room.along, weights, 1.0, scales, far, e, out)
+        if turns:
+            if fold_between(u, tangent, there, out.tangent[last], row, weights, e, found) == 0:
+                why[0] = EVENT
+                break
+            _keep(count, found, room.along, weights, 1.0, scales, far, e, out)
+            out.folds[count] = 1
+        way, bent = inner(row, chord), 1.0 if last_turn == 0.0 else 0.0
+        cubic = smooth * bent / (way * way * way)
         for k in range(n + 1):
-            new = room.along[k] / size
-            bend[k] = (new - tangent[k]) / way if last_turn == 0.0 else 0.0
+            new = out.tangent[last, k]
+            third[k] = cubic * (way * (tangent[k] + new) - 2.0 * chord[k])
+            bend[k] = bent * 0.5 * (new - tangent[k]) / way + 1.5 * way * third[k]
             tangent[k], u[k] = new, there[k]
-        _keep(count, u, tangent, e, out)
         factor = 2.0 if made == 1 else (1.5 if made == 2 else 0.7)
         turn = math.acos(max(-1.0, min(1.0, aligned)))
         if turn > 0.0:
@@ -233,9 +233,13 @@ def steps(u, tangent, bend, scales, e, out, why):
             size = length(weights, tangent)
             for k in range(n + 1):
                 tangent[k] /= size
-                bend[k] = 0.0
-        for k in range(len(scales)):
-            out.scales[count, k] = scales[k]
-        count += 1
+                bend[k], third[k] = 0.0, 0.0
+            for k in range(len(scales)):
+                out.scales[last, k] = scales[k]
+        count = last + 1
     out.step[0] = step
+    if why[0] != BOUND and count > 0:
+        _set_weights(out.scales[max(count - 2, 0)], H, weights)
+        while count > 0 and _exact(count - 1, row, weights, e, out) == 0:
+            count -= 1
     return count

@@ -1,7 +1,8 @@
 """Plain steps of a branch of forced orbits, made by compiled code, with all that points store.
 
 What a call of :func:`~fecontact.bifurcation.harmonic.compiled.steps.steps` returns is looked at as
-a whole; it ends before the first step that needs more: a special point, a bound, a start met again.
+a whole; it ends before the first step that needs more: a special point but a fold, a start met
+again. Folds and the bound at the end are among its points.
 """
 
 from dataclasses import dataclass, replace
@@ -10,11 +11,15 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, Stride
-from fecontact.bifurcation.harmonic import estimates
+from fecontact.bifurcation.continuation.point import BranchHeader
+from fecontact.bifurcation.continuation.points import branch_points
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    Stride,
+)
 from fecontact.bifurcation.harmonic.compiled import arrays
-from fecontact.bifurcation.harmonic.compiled.steps import COUPLED, steps
-from fecontact.bifurcation.harmonic.series import differentiated
+from fecontact.bifurcation.harmonic.compiled.steps import BOUND, COUPLED, steps
 from fecontact.bifurcation.harmonic.stability import along_orbits
 from fecontact.bifurcation.orbits.floquet import Floquet
 from fecontact.core.errors import AnalysisError
@@ -23,8 +28,8 @@ from fecontact.core.types import Array
 # Points in the first and in later calls, numbers that a call may return, and entries of derivatives
 # at the samples that it may make (a second or so, in which it cannot be interrupted).
 _FIRST, _LATER, _NUMBERS, _ENTRIES = 8, 64, 4_000_000, 8_000_000
-# Without stability folds alone end a call, and compiled code sees these itself.
-_WITHOUT_STABILITY = 256
+# Without stability there is nothing to look at but the start.
+_WITHOUT_STABILITY = 512
 # Steps that are made one by one where modes cannot be separated, before compiled code is tried.
 _APART = 10
 # Steps shorter than this part of the first one are made one by one: they may lead to a corner.
@@ -55,22 +60,24 @@ class Strides:
         if (problem.compiled is None or options.events
                 or problem.stability not in (None, "transitions")):
             return None
-        return cls(options)
+        return cls(options, _FIRST if problem.stability is not None else _WITHOUT_STABILITY)
 
     def stride(
-        self, problem: Any, here: Solution, step: float, most: int, start: Solution
+        self, problem: Any, here: Solution, step: float, most: int, start: Solution,
+        header: BranchHeader | None = None,
     ) -> Stride | None:
         """Plain steps from a solution; see :class:`Stride`. None where there are none."""
         if self.waits > 0:
             self.waits -= 1
             return None
         e = problem.equations(float(here.u[-1]))
-        if e is None:
+        if e is None or (here is start and problem.layout.memory):
             return None
         options = self.options
-        e.numbers[arrays.FIRST_BOUND :] = [
+        stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
+        e.numbers[arrays.FIRST_BOUND : arrays.RESTS] = [
             *options.bounds, options.tolerance, options.largest_step, options.largest_turn,
-            problem.rounding]
+            problem.rounding, options.locate and "fold" not in stops]
         if problem.limits is not None:
             e.limits[:] = problem.limits[: len(e.limits)]
         else:
@@ -82,23 +89,23 @@ class Strides:
         out = arrays.Reached(
             np.empty((count, n)), np.empty((count, n)), np.empty((count, N, c)),
             np.empty((count, N, m)), np.empty((count, m, 2 * m)), np.empty((count, m + 1)),
-            np.array([step]))
+            np.empty(count), np.empty(count, dtype=np.int64), np.array([step]))
         why = np.empty(1)
         bend = np.zeros(n) if problem.bend is None else problem.bend.copy()
         scales = np.append(problem.scales[:m], problem.scales[-1])
         made = steps(here.u.copy(), here.tangent.copy(), bend, scales, e, out, why)
         self.waits = _APART if why[0] == COUPLED else 0
-        made = self._before_corner(problem, here, made, out)
+        bound = why[0] == BOUND
+        if not bound:
+            made = self._before_corner(made, out)
         if made == 0:
             return None
-        return self._seen(problem, here, made, out, e, start)
+        return self._seen(problem, here, made, out, e, start, header, bound)
 
-    def _before_corner(self, problem: Any, here: Solution, made: int, out: arrays.Reached) -> int:
+    def _before_corner(self, made: int, out: arrays.Reached) -> int:
         """Number of points before steps that shorten towards a corner without end."""
-        weights, shortest = problem.weights(), _SHORTEST * self.options.step
-        way = np.diff(np.vstack([here.u, out.u[:made]]), axis=0)
-        lengths = np.sqrt((weights * way**2).sum(axis=1))
-        if out.step[0] >= shortest or (lengths >= shortest).all():
+        lengths, shortest = out.lengths[:made], _SHORTEST * self.options.step
+        if out.step[0] >= shortest or not (lengths < shortest).any():
             return made
         made = int(np.argmax(lengths < shortest))
         out.step[0] = lengths[made - 1] if made else shortest
@@ -106,86 +113,109 @@ class Strides:
 
     def _seen(
         self, problem: Any, here: Solution, made: int, out: arrays.Reached,
-        e: arrays.Equations, start: Solution,
+        e: arrays.Equations, start: Solution, header: BranchHeader | None, bound: bool,
     ) -> Stride | None:
         """The points that were reached before the first step at which something happens."""
         m = problem.layout.displacements
-        u, tangents = out.u[:made], out.tangent[:made]
-        values = _values(problem, u, out, made)
+        u, tangents, folds = out.u[:made], out.tangent[:made], out.folds[:made].tolist()
         found: list[Floquet] = []
+        known: dict[str, Any] = {}
         if problem.stability is not None:
             found = along_orbits(problem, u, out.z[:made], e)
-            for value, floquet in zip(values, found, strict=True):
-                value |= {"multipliers": floquet.multipliers, "unstable": floquet.unstable,
-                          "stable": floquet.stable, "trivial_error": 0.0}
-        tests = [_tests(problem, found[k] if found else None, tangents[k], self.options)
-                 for k in range(made)]
-        weights = _weights(problem, np.vstack([np.append(problem.scales[:m], problem.scales[-1]),
-                                               out.scales[: made - 1]]))
-        before = np.vstack([here.u, u[:-1]])
-        directions = np.vstack([here.tangent, tangents[:-1]])
-        lengths = (weights * directions * (u - before)).sum(axis=1) / np.sqrt(
-            (weights * directions**2).sum(axis=1))
-        whole = self._eventless(problem, here, values, tests, start, u, weights, lengths)
+            known = {"multipliers": [each.multipliers for each in found],
+                     "unstable": [each.unstable for each in found],
+                     "stable": [each.stable for each in found], "trivial_error": [0.0] * made}
+        sizes = np.vstack([np.append(problem.scales[:m], problem.scales[-1]),
+                           out.scales[: made - 1]])
+        whole = self._before_start(problem, here, start, u, sizes, out.lengths[:made])
+        if problem.stability is not None and self.options.locate:
+            whole = self._before_changes(problem, here, found, tangents, folds, whole)
         later = _LATER if problem.stability is not None else _WITHOUT_STABILITY
         self.count = later if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
         # The last tangent is made exact: what lies behind it relies on its signs.
-        while whole > 0 and not self._made_exact(problem, u[whole - 1], weights[whole - 1],
-                                                 tangents[whole - 1]):
+        while 0 < whole < made and (folds[whole - 1] or not self._made_exact(
+                problem, u[whole - 1], _weights(problem, sizes[whole - 1 : whole])[0],
+                tangents[whole - 1])):
             whole -= 1
         if whole == 0:
             return None
+        values = problem.stored(u, out.z[:made], out.forces[:made], out.mean[:made],
+                                out.scales[:made, :m], known)
+        points = branch_points(u[:whole], tangents[:whole], values[:whole], folds[:whole],
+                               header)
+        count = whole - sum(folds[:whole])
+        if bound and whole == made:
+            return Stride(points, count, problem, here, here, float(out.step[0]),
+                          BranchStatus.BOUND)
         last = whole - 1
-        if "fold" in tests[last]:
-            tests[last] = _tests(problem, found[last] if found else None, tangents[last],
-                                 self.options)
-        points = [Solution(u[k], None, tangents[k], 0, values[k], tests[k])  # type: ignore[arg-type]
-                  for k in range(whole)]
         scales = problem.scales.copy()
         scales[:m], scales[-1] = out.scales[last, :m], out.scales[last, m]
-        tangent = tangents[last] / np.sqrt(_weights(problem, out.scales[last : last + 1])[0]
-                                           @ tangents[last]**2)
         grown = not np.array_equal(scales, problem.scales)
-        bend = None if grown else (tangents[last] - directions[last]) / lengths[last]
+        before = tangents[last - 1] if last else here.tangent
+        bend = None if grown else (tangents[last] - before) / out.lengths[last]
+        tangent = tangents[last]
+        if grown:
+            tangent = tangent / np.sqrt(_weights(problem, out.scales[last : last + 1])[0]
+                                        @ tangent**2)
         reached = replace(
             problem, reference=problem.coefficients(u[last]).copy(),
             values=problem.parameters(u[last]), scales=scales, before=(u[last], tangent),
             bend=bend)
-        points[-1] = replace(points[-1], linearisation=reached.linearise(u[last]))
-        previous = points[-2] if whole > 1 else here
+        tests = (_tests(problem, found[last] if found else None, tangent)
+                 if self.options.locate else {})
+        ends = [Solution(u[k], reached.linearise(u[k]), tangents[k], 0, values[k], tests)
+                for k in (last - 1, last) if k >= 0]
         step = float(out.step[0]) if whole == made else float(min(
-            1.5 * lengths[last], self.options.largest_step))
-        return Stride(points, reached, replace(points[-1], tangent=tangent), previous, step)
+            1.5 * out.lengths[last], self.options.largest_step))
+        return Stride(points, count, reached, replace(ends[-1], tangent=tangent),
+                      ends[0] if last else here, step)
 
-    def _eventless(
-        self, problem: Any, here: Solution, values: list[dict[str, Any]],
-        tests: list[dict[str, float]], start: Solution, u: Array, weights: Array, lengths: Array,
+    def _before_start(
+        self, problem: Any, here: Solution, start: Solution, u: Array, scales: Array,
+        lengths: Array,
     ) -> int:
-        """Number of points before the first step at which something happens."""
-        # The branch may meet its start again; with several periods of the forcing in another phase.
-        before = np.vstack([here.u, u[:-1]])
-        if problem.periods == 1 and len(start.u) == u.shape[1]:
-            off = start.u - before
-            chord = np.sqrt((weights * (u - before) ** 2).sum(axis=1))
-            along = (weights * (u - before) * off).sum(axis=1) / chord
-            near = np.sqrt((weights * off**2).sum(axis=1)) < 3.0 * chord
-            met = np.flatnonzero(near & (along > -0.1 * chord))
-        else:
-            ends = np.abs(np.append(here.u[-1], u[:, -1]) - start.u[-1])
-            met = np.flatnonzero(np.minimum(ends[:-1], ends[1:]) * np.sqrt(weights[:, -1])
-                                 <= lengths)
-        first = int(met[0]) if len(met) else len(u)
-        one = here
-        for k in range(first if self.options.locate else 0):
-            tested, previous = tests[k], (one.tests if k == 0 else tests[k - 1])
-            if any(previous.get(name, 0.0) * value <= 0.0 for name, value in tested.items()):
-                return k
-            if problem.stability is not None:
-                known = one.values["unstable"] if k == 0 else values[k - 1]["unstable"]
-                if values[k]["unstable"] != known:
-                    return k
-        return first
+        """Number of points before the first step that may meet the start of the branch again."""
+        if len(start.u) != u.shape[1]:
+            return len(u)
+        width = float(problem.scales[-1])
+        distances = np.abs(u[:, -1] - start.u[-1]) / width
+        near = np.flatnonzero(distances <= 6.0 * lengths)
+        if here is start:
+            near = near[near > 0]
+        # With several periods of the forcing in another phase.
+        if problem.periods != 1:
+            ends = np.append(abs(float(here.u[-1] - start.u[-1])) / width, distances)
+            near = near[np.minimum(ends[near], ends[near + 1]) <= lengths[near]]
+            return int(near[0]) if len(near) else len(u)
+        if not len(near):
+            return len(u)
+        before = np.where(near[:, None] > 0, u[near - 1], here.u)
+        weights, chord, off = _weights(problem, scales[near]), u[near] - before, start.u - before
+        square = (weights * chord**2).sum(axis=1)
+        met = near[((weights * off**2).sum(axis=1) < 9.0 * square)
+                   & ((weights * chord * off).sum(axis=1) > -0.1 * square)]
+        return int(met[0]) if len(met) else len(u)
 
+    def _before_changes(
+        self, problem: Any, here: Solution, found: list[Floquet], tangents: Array,
+        folds: list[int], most: int,
+    ) -> int:
+        """Number of points before the first step on which a test or the stability changes.
+
+        At a fold one multiplier passes one.
+        """
+        previous, unstable, turn = here.tests, here.values["unstable"], None
+        for k in range(most):
+            if folds[k]:
+                turn = k
+                continue
+            tested = _tests(problem, found[k], tangents[k])
+            changed = any(previous.get(name, 0.0) * value <= 0.0 for name, value in tested.items()
+                          if turn is None or name != "fold")
+            if changed or abs(found[k].unstable - unstable) != (turn is not None):
+                return k if turn is None else turn
+            previous, unstable, turn = tested, found[k].unstable, None
+        return most
 
     def _made_exact(
         self, problem: Any, u: Array, weights: Array, tangent: Array
@@ -207,12 +237,7 @@ class Strides:
         return True
 
 
-def _tests(
-    problem: Any, floquet: Floquet | None, tangent: Array,
-    options: ContinuationOptions,
-) -> dict[str, float]:
-    if not options.locate:
-        return {}
+def _tests(problem: Any, floquet: Floquet | None, tangent: Array) -> dict[str, float]:
     slope = float(tangent[-1])
     if floquet is None:
         return {"fold": slope}
@@ -225,26 +250,3 @@ def _weights(problem: Any, scales: Array) -> Array:
     over[0] = 1.0
     sizes = scales[:, None, :-1] ** -2.0
     return np.concatenate([(over * sizes).reshape(len(scales), -1), scales[:, -1:] ** -2.0], axis=1)
-
-
-def _values(
-    problem: Any, u: Array, out: arrays.Reached, made: int
-) -> list[dict[str, Any]]:
-    """What is stored of each point but its stability."""
-    m = problem.layout.displacements
-    X = u[:, :-1].reshape(made, -1, m)
-    periods = (problem.periods * problem.turn / u[:, -1] if problem.turn is not None
-               else np.full(made, problem.period(u[0])))
-    speeds = np.moveaxis(differentiated(np.moveaxis(X, 1, 0)), 0, 1) / periods[:, None, None]
-    low, high = estimates.extremes(np.concatenate([X, speeds], axis=2), out.z[:made])
-    errors, residuals = estimates.neglected(X, out.forces[:made], out.mean[:made], periods,
-                                            out.scales[:made, :m], m)
-    found: list[dict[str, Any]] = [
-        {"period": period, "truncation_error": error, "residual": residual, "minimum": low[k],
-         "maximum": high[k]}
-        for k, (period, error, residual) in enumerate(zip(
-            periods.tolist(), errors.tolist(), residuals.tolist(), strict=True))]
-    if problem.layout.memory:
-        for k, value in enumerate(found):
-            value["memory"] = out.z[k]
-    return found

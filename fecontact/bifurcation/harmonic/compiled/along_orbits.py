@@ -1,0 +1,60 @@
+"""Derivatives of the rates along orbits of a contact system, in compiled code."""
+
+import numpy as np
+from numba import types
+
+from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS
+from fecontact.bifurcation.harmonic.compiled.evaluation import speed_coefficient, take_parameter
+from fecontact.core.compiled import block, f8, helper, kernel, matrix, vector
+from fecontact.core.references import borrowed
+from fecontact.system.jacobian import batch_derivatives
+
+
+@helper
+def _take_coefficients(u, T, X):
+    """Fill X (2, m, 2 H + 1) with the coefficients of displacements and velocities."""
+    m = X.shape[1]
+    for j in range(m):
+        for k in range(X.shape[2]):
+            X[0, j, k], X[1, j, k] = u[k * m + j], speed_coefficient(u, k, j, m, T)
+
+
+@kernel(types.void(matrix, block, vector, matrix, EQUATIONS, types.Array(f8, 4, "C")))
+def derivatives_along(us, zs, tau, series, e, J):
+    """Fill J (K, P, d, d) with the derivatives of the rates at times tau (P,) of K orbits.
+
+    ``series`` (2 H + 1, P) holds the functions of the series there. Internal variables zs
+    (K, N, c) are linear between the samples.
+    """
+    us, zs, series, e, J = borrowed(us), borrowed(zs), borrowed(series), borrowed(e), borrowed(J)
+    m, N, c = e.springs.shape[1], zs.shape[1], zs.shape[2]
+    X, linear = e.room.coefficients, e.room.linear
+    L = X.shape[2]
+    P = len(tau)
+    t, x, f, row = np.empty(P), np.empty((P, 2 * m + c)), np.empty((P, 2 * m + c)), np.empty(P)
+    for k in range(len(us)):
+        T = take_parameter(us[k, us.shape[1] - 1], e)
+        _take_coefficients(us[k], T, X)
+        for part in range(2):
+            for j in range(m):
+                for p in range(P):
+                    row[p] = 0.0
+                for i in range(L):
+                    for p in range(P):
+                        row[p] += X[part, j, i] * series[i, p]
+                for p in range(P):
+                    x[p, part * m + j] = row[p]
+        for p in range(P):
+            t[p] = tau[p] * T
+            place = tau[p] * N
+            first = int(place)
+            part_of = place - first
+            for i in range(c):
+                x[p, 2 * m + i] = ((1.0 - part_of) * zs[k, first % N, i]
+                                   + part_of * zs[k, (first + 1) % N, i])
+        batch_derivatives(t, x, e.contact, e.contact, 0.0, f, J[k], np.empty((0, 0)))
+        for p in range(P):
+            for i in range(m):
+                for j in range(m):
+                    J[k, p, m + i, j] -= linear[0, i, j]
+                    J[k, p, m + i, m + j] -= linear[1, i, j]

@@ -1,0 +1,278 @@
+"""Newton's method of compiled steps: to a branch, to a fold or a bound on it, to an orbit."""
+
+import math
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic.compiled.arrays import (
+    PLAIN,
+    ROUNDING,
+    SQUARE,
+    TOLERANCE,
+    TRUSTED,
+)
+from fecontact.bifurcation.harmonic.compiled.evaluation import condense, evaluate_at
+from fecontact.bifurcation.harmonic.compiled.linear_systems import (
+    PRECISE,
+    choose_coupled,
+    factorise_with,
+    inner,
+    length,
+    solve_with,
+)
+from fecontact.core.compiled import helper, routine
+
+# Newton steps before a step fails, and largest factor by which a step with kept factors may leave
+# the error of the one before.
+_STEPS, _SERVES = 8, 0.2
+# First Newton steps up to this relative size may be the only ones, so many times before one is
+# measured again, if the next one is so many times shorter than it need be.
+_SHORT, _RELIED, _MARGIN = 1e-5, 3, 10.0
+# Relative errors of tangents and of Newton steps where they are found by iteration.
+_TANGENT, _INEXACT = 1e-7, 1e-3
+# Relative size of the last Newton step at special points and bounds, and most such steps.
+_EXACT, _EXACT_STEPS = 1e-10, 12
+# Part of a step to which folds are located, the one that rounding may leave, factor by which the
+# test falls at the end, and most solutions that are looked at.
+_LOCATED, _ROUNDED, _FALLS, _TRIES = 1e-12, 1e-10, 0.1, 30
+# Steps to an orbit, and the shortest part of one.
+_CORRECTIONS, _LEAST = 40, 1e-4
+# Part of the larger value at both ends that the test of a fold must come below.
+_SMALL = 1e-3
+
+
+@helper
+def _right_side(u, guess, row, e, change):
+    """Fill change (n + 1,) with the negative residual and the distance from the guess."""
+    n = len(e.room.residual)
+    for k in range(n):
+        change[k] = -e.room.residual[k]
+    off = 0.0
+    for k in range(n + 1):
+        off += row[k] * (u[k] - guess[k])
+    change[n] = -off
+
+
+@helper
+def _take_along(row, weights, T, tolerance, e):
+    """Fill ``along`` with the factors that were made last; 0 if that fails."""
+    along = e.room.along
+    for k in range(len(along)):
+        along[k] = 0.0
+    along[len(along) - 1] = 1.0
+    return solve_with(row, weights, T, tolerance, e, along)
+
+
+@helper
+def _relies(size, scale, e):
+    """Whether a first Newton step ends the iteration: the next one is known to be short enough.
+
+    It is proportional to the square of this one, where laws have no memory; the factor is that of
+    steps before, measured again after some.
+    """
+    if e.numbers[PLAIN] == 0.0 or not e.numbers[SQUARE] >= 0.0 or size > _SHORT * scale:
+        return False
+    e.numbers[TRUSTED] += 1.0
+    following = _MARGIN * e.numbers[SQUARE] * size * size
+    return following <= 0.1 * e.numbers[TOLERANCE] * scale and e.numbers[TRUSTED] <= _RELIED
+
+
+@routine
+def corrected(u, guess, row, weights, e):
+    """Newton's method from u = guess at right angles to a row.
+
+    Returns how often factors were made; zero where it fails, -1 where modes cannot be separated.
+    """
+    room = e.room
+    n = len(room.residual)
+    tolerance = e.numbers[TOLERANCE]
+    change = room.vectors[0]
+    scale = 1.0 + length(weights, guess)
+    before, made, fresh, made_at = np.inf, 0, True, 0.0
+    for count in range(1, _STEPS + 1):
+        T = evaluate_at(u, fresh, e)
+        if not T > 0.0:
+            return 0
+        _right_side(u, guess, row, e, change)
+        if fresh:
+            if len(room.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
+                return -1
+            condense(u, T, False, e)
+            factorise_with(row, T, e)
+            made, made_at = made + 1, T
+            if _take_along(row, weights, T, _TANGENT, e) == 0:
+                return -1
+        if solve_with(row, weights, made_at, _INEXACT, e, change) == 0:
+            return -1
+        size = length(weights, change)
+        if count > 1 and size > before and before <= e.numbers[ROUNDING] * scale:
+            return made
+        if not size < np.inf or (count > 1 and size > before):
+            return 0
+        for k in range(n + 1):
+            u[k] += change[k]
+        if fresh and (size <= tolerance * scale or (count == 1 and _relies(size, scale, e))):
+            return made
+        if count == 2 and made == 1:
+            e.numbers[SQUARE], e.numbers[TRUSTED] = size / (before * before), 0.0
+        falls = size / before
+        if count > 1 and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
+            return made
+        fresh = not fresh and falls > _SERVES
+        before = size
+    return 0
+
+
+@routine
+def linearised(u, row, weights, e):
+    """Fill ``along`` with the derivatives at u; 0 if that fails, else 1."""
+    room = e.room
+    n = len(room.residual)
+    T = evaluate_at(u, True, e)
+    if not T > 0.0 or (len(room.condensed) < n * (n + 1) and choose_coupled(T, e) == 0):
+        return 0
+    condense(u, T, True, e)
+    factorise_with(row, T, e)
+    return _take_along(row, weights, T, PRECISE, e)
+
+
+@routine
+def solved(u, guess, row, weights, e):
+    """The solution at right angles to a row with ``along`` there; 0 where it fails, else 1.
+
+    Each step has its own derivatives.
+    """
+    room = e.room
+    n = len(room.residual)
+    change, scale, before = room.vectors[0], 1.0 + length(weights, guess), np.inf
+    for _ in range(_EXACT_STEPS):
+        if linearised(u, row, weights, e) == 0:
+            return 0
+        _right_side(u, guess, row, e, change)
+        T = e.room.t[1] * len(e.tau)
+        if solve_with(row, weights, T, PRECISE, e, change) == 0:
+            return 0
+        size = length(weights, change)
+        if not size < np.inf or size > 2.0 * before > 2.0 * e.numbers[ROUNDING] * scale:
+            return 0
+        if size > before:
+            return 1
+        for k in range(n + 1):
+            u[k] += change[k]
+        if size <= _EXACT * scale:
+            return 1
+        before = size
+    return 0
+
+
+@routine
+def settled(u, row, weights, tolerance, e):
+    """The orbit near u at right angles to a row, with ``along`` there; 0 where it fails, else 1.
+
+    Steps are shortened until the residual falls. u is overwritten.
+    """
+    room = e.room
+    n = len(room.residual)
+    change, guess, trial = room.vectors[0], room.vectors[3], room.vectors[4]
+    for k in range(n + 1):
+        guess[k] = u[k]
+    for _ in range(_CORRECTIONS):
+        if linearised(u, row, weights, e) == 0:
+            return 0
+        norm = math.sqrt(inner(room.residual, room.residual))
+        _right_side(u, guess, row, e, change)
+        if solve_with(row, weights, e.room.t[1] * len(e.tau), PRECISE, e, change) == 0:
+            return 0
+        size = length(weights, change)
+        if not size < np.inf:
+            return 0
+        small = size < tolerance * (1.0 + length(weights, u))
+        factor = 1.0
+        while True:
+            for k in range(n + 1):
+                trial[k] = u[k] + factor * change[k]
+            found = np.inf
+            if evaluate_at(trial, False, e) > 0.0:
+                found = math.sqrt(inner(room.residual, room.residual))
+            if found < (1.0 - 0.1 * factor) * norm or (small and found < np.inf):
+                break
+            factor *= 0.5
+            if factor < _LEAST:
+                return 0
+        for k in range(n + 1):
+            u[k] = trial[k]
+        if small:
+            return linearised(u, row, weights, e)
+    return 0
+
+
+@helper
+def _cubic(u, tangent, there, leaving, row, way, along, out):
+    """Fill out with the Hermite cubic through u and there, at a length along the row."""
+    x = along / way
+    first = way * x * (1.0 - x) ** 2 / inner(row, tangent)
+    last = way * x * x * (x - 1.0) / inner(row, leaving)
+    rest = x * x * (3.0 - 2.0 * x)
+    for k in range(len(out)):
+        out[k] = u[k] + first * tangent[k] + rest * (there[k] - u[k]) + last * leaving[k]
+
+
+@routine
+def fold_between(u, tangent, there, leaving, row, weights, e, found):
+    """Fill found with the fold between two points; ``along`` is its direction.
+
+    The row is that of the tangent at u. Returns 0 where no fold is found, else 1.
+    """
+    guess, n = e.room.vectors[11], len(u) - 1
+    way = 0.0
+    for k in range(n + 1):
+        way += row[k] * (there[k] - u[k])
+    low, high, f_low, f_high = 0.0, way, tangent[n], leaving[n]
+    largest = max(abs(f_low), abs(f_high))
+    x, f, at, value = low, f_low, high, f_high
+    for _ in range(_TRIES):
+        # The secant of the last two values, else of the bracket.
+        new = at - value * (at - x) / (value - f)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        _cubic(u, tangent, there, leaving, row, way, new, guess)
+        for k in range(n + 1):
+            found[k] = guess[k]
+        if solved(found, guess, row, weights, e) == 0:
+            return 0
+        x, f, at = at, value, new
+        value = e.room.along[n] / length(weights, e.room.along)
+        if value * f_low > 0.0:
+            low = at
+        else:
+            high = at
+        left = abs(value * (at - x)) / abs(value - f) if value != f else 0.0
+        settled = left <= 0.5 * _LOCATED * way and abs(value) <= _FALLS * abs(f)
+        stuck = left <= _ROUNDED * way and abs(value) > _FALLS * abs(f)
+        if value == 0.0 or settled or stuck or high - low <= _LOCATED * way:
+            return 1 if abs(value) <= _SMALL * largest else 0
+    return 0
+
+
+@routine
+def bound_between(u, tangent, there, leaving, row, weights, bound, e, found):
+    """Fill found with the point at a bound of the parameter between two points.
+
+    ``along`` becomes its direction, with one as the last number. Returns 0 where there is none.
+    """
+    guess, unit, n = e.room.vectors[11], e.room.vectors[12], len(u) - 1
+    way, along = 0.0, 0.0
+    for k in range(n + 1):
+        way += row[k] * (there[k] - u[k])
+        unit[k] = 0.0
+    unit[n] = 1.0
+    _cubic(u, tangent, there, leaving, row, way, way * (bound - u[n]) / (there[n] - u[n]), guess)
+    guess[n] = bound
+    for k in range(n + 1):
+        found[k] = guess[k]
+    if solved(found, guess, unit, weights, e) == 0:
+        return 0
+    found[n] = bound
+    for k in range(n + 1):
+        along += row[k] * (found[k] - u[k])
+    return 1 if 0.0 < along <= way else 0

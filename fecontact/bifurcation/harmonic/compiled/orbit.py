@@ -1,0 +1,59 @@
+"""Equations of harmonic balance at one orbit, and the orbit nearby, in compiled code."""
+
+from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, STEADY, TOLERANCE
+from fecontact.bifurcation.harmonic.compiled.evaluation import (
+    condense,
+    evaluate_at,
+    take_forces,
+    take_mean,
+)
+from fecontact.bifurcation.harmonic.compiled.linear_systems import (
+    PRECISE,
+    choose_coupled,
+    factorise_with,
+    solve_with,
+)
+from fecontact.bifurcation.harmonic.compiled.newton import settled
+from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.references import borrowed
+
+# What is wanted at an orbit.
+RESIDUAL, DERIVATIVES, SOLUTION, ORBIT = range(4)
+
+
+@kernel(i8(vector, i8, EQUATIONS, matrix, matrix, vector, vector, vector))
+def evaluate(u, wanted, e, forces, mean, row, weights, x):
+    """Fill forces (N, m) and leave ``residual`` and ``z`` at u (n + 1,) in the room of e.
+
+    With derivatives, ``wanted`` = DERIVATIVES, also ``condensed``, and the mean derivatives
+    (m, 2 m) of the forces to q and q'. With SOLUTION the right side x (n + 1,) becomes the solution
+    with the derivatives and a last row, for more unknowns than are solved for together. With ORBIT
+    u becomes the orbit nearby, and x the solution without right side but one in the last row.
+    Returns 0 where internal variables do not come to repeat, or an iteration does not converge,
+    else 1.
+    """
+    u, e, forces, mean = borrowed(u), borrowed(e), borrowed(forces), borrowed(mean)
+    row, weights, x = borrowed(row), borrowed(weights), borrowed(x)
+    if wanted == ORBIT:
+        if settled(u, row, weights, e.numbers[TOLERANCE], e) == 0:
+            return 0
+        for k in range(len(x)):
+            x[k] = e.room.along[k]
+        take_mean(e, mean)
+        if e.numbers[STEADY] == 0.0:
+            evaluate_at(u, False, e)
+        take_forces(u[len(u) - 1], e, forces)
+        return 1
+    T = evaluate_at(u, wanted != RESIDUAL, e)
+    if not T > 0.0:
+        return 0
+    if wanted == SOLUTION and choose_coupled(T, e) == 0:
+        return 0
+    take_forces(u[len(u) - 1], e, forces)
+    if wanted != RESIDUAL:
+        take_mean(e, mean)
+        condense(u, T, True, e)
+    if wanted == SOLUTION:
+        factorise_with(row, T, e)
+        return solve_with(row, weights, T, PRECISE, e, x)
+    return 1

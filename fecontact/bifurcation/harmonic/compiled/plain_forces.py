@@ -1,0 +1,126 @@
+"""Plain contact forces of a motion: of displacements and velocities alone, over all samples.
+
+Plain are nodes of plane bodies on level ground of constant speed, friction without memory. Their
+motion, forces and derivatives are rows over the samples, so that laws are called one after the
+other and all else is done on whole rows.
+"""
+
+from fecontact.core.compiled import helper, routine
+from fecontact.laws.signatures import friction_at, ground_at, normal_at
+from fecontact.system.nodes import ground_motion
+
+
+@helper
+def combine(table, factors, count, row):
+    """Fill a row (N,) with the sum of factors times the first rows of a table."""
+    N = len(row)
+    for n in range(N):
+        row[n] = 0.0
+    for k in range(0, count - count % 4, 4):
+        a, b, c, d = factors[k], factors[k + 1], factors[k + 2], factors[k + 3]
+        t0, t1, t2, t3 = table[k], table[k + 1], table[k + 2], table[k + 3]
+        for n in range(N):
+            row[n] += a * t0[n] + b * t1[n] + c * t2[n] + d * t3[n]
+    for k in range(count - count % 4, count):
+        a, t0 = factors[k], table[k]
+        for n in range(N):
+            row[n] += a * t0[n]
+
+
+@helper
+def project(table, row, out):
+    """Fill out (L,) with the products of the rows of a table (L, N) with a row (N,)."""
+    L, N = len(out), len(row)
+    for k in range(0, L - L % 4, 4):
+        t0, t1, t2, t3 = table[k], table[k + 1], table[k + 2], table[k + 3]
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for n in range(N):
+            x = row[n]
+            a += t0[n] * x
+            b += t1[n] * x
+            c += t2[n] * x
+            d += t3[n] * x
+        out[k], out[k + 1], out[k + 2], out[k + 3] = a, b, c, d
+    for k in range(L - L % 4, L):
+        t0, a = table[k], 0.0
+        for n in range(N):
+            a += t0[n] * row[n]
+        out[k] = a
+
+
+@helper
+def _node_motion(j, e):
+    """Fill the rows of the height of node j, its rate and its slip velocity."""
+    s, motion, node = e.contact, e.room.motion, e.room.node
+    m, N = e.springs.shape[1], len(e.tau)
+    for n in range(N):
+        node[0, n], node[1, n], node[2, n] = 0.0, 0.0, 0.0
+    slip = -s.sliding[j] * ground_motion(0.0, s).speed
+    for n in range(N):
+        node[2, n] = slip
+    for i in range(m):
+        tx, ty = s.Tx[j, i], s.Ty[j, i]
+        for n in range(N):
+            node[0, n] += ty * motion[i, n]
+            node[1, n] += ty * motion[m + i, n]
+            node[2, n] += tx * motion[m + i, n]
+
+
+@routine
+def plain_forces(derivatives, e):
+    """Fill ``pushes`` (m, N) from ``motion``, and the ``rows`` of their derivatives if asked for.
+
+    Row (part m + i) m + k of these is that of force i to displacement (part 0) or velocity k.
+    """
+    room, s = e.room, e.contact
+    m, N = e.springs.shape[1], len(e.tau)
+    pushes, rows, node = room.pushes, room.rows, room.node
+    for i in range(m):
+        for n in range(N):
+            pushes[i, n] = 0.0
+    if derivatives:
+        for p in range(2 * m * m):
+            for n in range(N):
+                rows[p, n] = 0.0
+    for j in range(len(s.Tx)):
+        _node_motion(j, e)
+        level = -s.gap[j]
+        if s.on_ground[j]:
+            level += ground_at(s.profile)(s.abscissa[j], s.profile_parameters)[0]
+        rubs = False
+        for i in range(m):
+            rubs = rubs or s.Tx[j, i] != 0.0
+        # Derivatives of the normal force to height and rate, of friction to slip and normal force.
+        for n in range(N):
+            F, F_u, F_v = normal_at(s.normal[j])(level - node[0, n], -node[1, n],
+                                                 s.normal_parameters[j])
+            if F == 0.0:
+                F_u, F_v = 0.0, 0.0
+            node[3, n], node[4, n], node[5, n] = F, -F_u, -F_v
+        if rubs:
+            for n in range(N):
+                F, R, R_v, R_F = node[3, n], 0.0, 0.0, 0.0
+                if F != 0.0:
+                    R, R_v, R_F = friction_at(s.friction[j])(node[2, n], abs(F),
+                                                             s.friction_parameters[j])
+                node[0, n], node[6, n] = R, R_v
+                node[7, n] = R_F if F >= 0.0 else -R_F
+        for i in range(m):
+            tx, ty = s.Tx[j, i], s.Ty[j, i]
+            for n in range(N):
+                pushes[i, n] += ty * node[3, n]
+            if rubs:
+                for n in range(N):
+                    pushes[i, n] -= tx * node[0, n]
+            if not derivatives:
+                continue
+            for k in range(m):
+                by, sx = s.Ty[j, k], tx * s.Tx[j, k]
+                q, v = rows[i * m + k], rows[(m + i) * m + k]
+                for n in range(N):
+                    q[n] += ty * by * node[4, n]
+                    v[n] += ty * by * node[5, n]
+                if rubs:
+                    for n in range(N):
+                        q[n] -= tx * by * node[7, n] * node[4, n]
+                        v[n] -= tx * by * node[7, n] * node[5, n] + sx * node[6, n]

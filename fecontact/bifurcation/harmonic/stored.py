@@ -1,0 +1,106 @@
+"""What branches store of orbits by harmonic balance, made when it is first asked for."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic import estimates
+from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.observed import OBSERVED, observed_of_orbits
+from fecontact.bifurcation.harmonic.series import differentiated
+from fecontact.core.types import Array
+
+_ERRORS, _EXTREMES = ("truncation_error", "residual"), ("minimum", "maximum")
+
+
+@dataclass(eq=False)
+class StoredOrbits:
+    """Values of K orbits by name, such as 'maximum', for all of them at once.
+
+    Attributes
+    ----------
+    layout : Layout
+        How states become unknowns.
+    X : (K, 2 H + 1, b) array
+        Coefficients.
+    z : (K, N, c) array
+        Internal variables at the samples.
+    periods : (K,) array
+        T [s].
+    forces, mean, sizes : (K, N, b), (K, b, ...) and (K, b) or (b,) arrays
+        What errors are estimated from; see :func:`estimates.neglected`.
+    row : (d,) array, optional
+        Displacement that is observed.
+    known : dict
+        Values by name that are there, a sequence of K each.
+    """
+
+    layout: Layout
+    X: Array
+    z: Array
+    periods: Array
+    forces: Array
+    mean: Array
+    sizes: Array
+    row: Array | None = None
+    known: dict[str, Any] = field(default_factory=dict)
+
+    def names(self) -> tuple[str, ...]:
+        """Names of all values, in the order in which they are stored."""
+        first = ("period", *_ERRORS, *_EXTREMES, *(("memory",) if self.layout.memory else ()))
+        more = () if self.row is None else OBSERVED
+        return (*first, *(name for name in self.known if name not in first and name not in more),
+                *more)
+
+    def column(self, name: str) -> Any:
+        """The values (K, ...) of a name."""
+        if name not in self.known:
+            self.known.update(self._made(name))
+        return self.known[name]
+
+    def _made(self, name: str) -> dict[str, Any]:
+        layout, X = self.layout, self.X
+        m = layout.displacements
+        if name == "period":
+            return {name: self.periods.tolist()}
+        if name == "memory" and layout.memory:
+            return {name: self.z}
+        if name in _EXTREMES:
+            whole = X
+            if m:
+                speeds = np.moveaxis(differentiated(np.moveaxis(X[..., :m], 1, 0)), 0, 1)
+                whole = np.concatenate([X[..., :m], speeds / self.periods[:, None, None],
+                                        X[..., m:]], axis=2)
+            return dict(zip(_EXTREMES, estimates.extremes(whole, self.z), strict=True))
+        if name in _ERRORS:
+            found = estimates.neglected(X, self.forces, self.mean, self.periods, self.sizes, m)
+            return {each: values.tolist() for each, values in zip(_ERRORS, found, strict=True)}
+        if name in OBSERVED and self.row is not None:
+            return observed_of_orbits(layout, X, self.periods, self.row)
+        raise KeyError(name)
+
+
+class StoredValues(Mapping[str, Any]):
+    """The values of one of several orbits."""
+
+    __slots__ = ("_index", "_orbits")
+
+    def __init__(self, orbits: StoredOrbits, index: int) -> None:
+        self._orbits, self._index = orbits, index
+
+    def __getitem__(self, name: str) -> Any:
+        return self._orbits.column(name)[self._index]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._orbits.names())
+
+    def __len__(self) -> int:
+        return len(self._orbits.names())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._orbits.names()
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
