@@ -90,13 +90,16 @@ def start(
     times = np.array(times, dtype=float)
     largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
-    slip_scale, depth, stick_speed = np.empty(n), np.empty(n), np.zeros(n)
+    slip_scale, depth, stick_speed, untouched = np.zeros((4, n))
     for nodes, _, law in system.law_groups("friction"):
         slip_scale[nodes] = law.velocity_scale
         if not law.memory:
             stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
+        untouched[nodes] = law.untouched(nodes.stop - nodes.start)
+    # What friction remembers fades without force, and derivatives are those of all nodes.
+    untouched[system.arrays.memory > 0 if not vary else slice(None)] = -np.inf
     longest = longest_step(system, times, max_step)
     with np.errstate(over="ignore", invalid="ignore"):
         energy = energy_scale(system, state)
@@ -111,7 +114,7 @@ def start(
     control = Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
-        largest=largest,
+        largest=largest, untouched=untouched,
         breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
         speed_scale=system.velocity_scale, energy_scale=energy,
@@ -120,10 +123,11 @@ def start(
         acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
     first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * longest)
+    blocks = blocks_of(basis, system.arrays)
     return Run(
-        Problem(system.arrays, blocks_of(basis, system.arrays), control),
+        Problem(system.arrays, blocks, control),
         progress_for(state, float(times[0]), first, m, n, basis.dimension),
-        room_for(m, n, states, basis.dimension),
+        room_for(m, n, states, basis.dimension, blocks),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(above.arrays, below.arrays, width, variation_for(
