@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fecontact as fc
-from fecontact.integrate import near_nodes
+from fecontact.integrate import ContactEvents, near_nodes
 from fecontact.integrate.rodas5p import driver, stage_solver
 from fecontact.integrate.rodas5p.blocks import FEW
 from fecontact.laws import (
@@ -111,6 +111,18 @@ def test_results_are_those_of_all_nodes(case, work):
     for name in ("states", "work"):
         a, b = getattr(own, name), getattr(other, name)
         assert np.abs(a - b).max() <= 1e-8 * np.abs(b).max(), name
+
+
+@pytest.mark.parametrize("case", ["belt", "shaken", "solid"])
+def test_events_are_those_of_all_nodes(case):
+    own, other = runs_of(*CASES[case](), events=(ContactEvents(),))
+    for run in (own, other):
+        while run.advance(50) == 0:
+            pass
+    assert len(other.events.time) > 20
+    assert own.events.kind == other.events.kind
+    assert np.array_equal(own.events.node, other.events.node)
+    assert own.events.time == pytest.approx(other.events.time, abs=1e-12)
 
 
 def test_states_far_from_the_start_find_their_nodes():
