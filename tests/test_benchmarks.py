@@ -20,6 +20,7 @@ BENCHMARKS = {
                       (r"^harmonic balance .* error (\S+)$", 0.0, 1e-5)]),
     "laws": ((), [(r"lugre .* us, (\d) internal", 1.0, 0.0),
                    (r"iwan .* us, (\d) internal", 8.0, 0)]),
+    "many_contacts": ((), [(r"^ +400 .* (\S+) +\S+$", 0.1, 0.03)]),
     "output": ((), [(r"^(\d+) nodes", 205.0, 50.0)]),
     # With all residual vectors nothing is missing of the compliance.
     "reduction": ((), [(r"^slender beam, P2 +0 .* (\S+)$", 0.0, 1e-9)]),

@@ -15,6 +15,7 @@ from fecontact.integrate.courses import (
     STEEPEST,
     set_heights,
 )
+from fecontact.integrate.near_nodes import reach_out
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.system.nodes import in_space, moved_along
 
@@ -23,15 +24,16 @@ _FEW = 4
 
 
 @routine
-def restless(moved, h, s, blocks, control, room):
+def restless(step, problem, progress, room):
     """Whether :func:`doubtful` may be true.
 
     ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
-    end; ``moved`` is its motion at the start.
+    end.
     """
+    s, control = problem.system, problem.control
     if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
-        return _restless_nodes(moved, h, s, blocks, control, room)
-    return _restless_modes(moved, h, s, blocks, control, room)
+        return _restless_nodes(step.moved, step.h, s, problem.blocks, control, room)
+    return _restless_modes(step, problem, progress, room)
 
 
 @helper
@@ -85,25 +87,31 @@ def _restless_nodes(moved, h, s, blocks, control, room):
 
 
 @helper
-def _restless_modes(moved, h, s, blocks, control, room):
+def _restless_modes(step, problem, progress, room):
     """The same for many nodes, from the modes only."""
+    s, blocks, control = problem.system, problem.blocks, problem.control
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
+    h, moved, near = step.h, step.moved, room.near
     n, m = len(s.gap), len(control.largest)
     # Sums over the modes before each one.
     moves, speeds = room.inner[0], room.inner[1]
     moves[0], speeds[0] = 0.0, 0.0
+    furthest = 0.0
     for i in range(m):
         largest = control.largest[i]
+        furthest += largest * abs(room.after[i] - progress.state[i])
         moves[i + 1] = moves[i] + largest * _departure(dense[0, i], dense[1, i], dense[2, i])
         speeds[i + 1] = speeds[i] + largest * _departure(
             dense[0, m + i], dense[1, m + i], dense[2, m + i])
+    reach_out(furthest + moves[m], blocks, room)
     wavy = bounds[STEEPEST] != 0.0
     if wavy:
         set_heights(motion.motion_given(room.given), s, bounds, nodes[0], ends[2, n : 2 * n])
     later = room.given[motion.SPEED]
     some = False
-    for j in range(n):
+    for at in range(near.count[0]):
+        j = near.nodes[at]
         move, quicken = 0.0, 0.0
         for span in range(blocks.spans.shape[1]):
             first_mode, last_mode = blocks.spans[j, span, 0], blocks.spans[j, span, 1]

@@ -180,6 +180,14 @@ class NormalLaw(NodeLaw):
         """
         return np.zeros((1, nodes))
 
+    def untouched(self, nodes: int) -> Array:
+        """Penetrations (n,) up to which F, dF/du and dF/dv are zero at every rate [m].
+
+        The time integrator leaves out nodes that stay below them. -inf, the default, stands for a
+        law of which this is not known.
+        """
+        return np.full(nodes, -np.inf)
+
     def pieces(self, share: Array) -> Array | None:
         """Pieces (n, p, 11) of a law that is polynomial piece by piece, else None.
 

@@ -19,10 +19,15 @@ _NORMAL_PLACES = np.array([(u, v) for u in (-1e-3, 0.0, 1e-9, 1e-6, 1e-4)
 _FRICTION_PLACES = np.array([(v, F) for v in (-1.0, -1e-3, 0.0, 1e-6, 1e-3, 1.0)
                              for F in (0.0, 1e-3, 1.0, 100.0)]).T
 
+# Distances to the other side, in penetration scales.
+_DISTANCES = np.concatenate([[0.0], np.geomspace(1e-6, 1e4, 21)])
+
 
 @lru_cache(maxsize=256)
 def require_sound(law: NormalLaw | FrictionLaw) -> None:
     """Raise :class:`InputError` unless a law returns the required number of finite values.
+
+    A normal law must be zero where its ``untouched`` says so.
 
     The message gives the returned values and the arguments.
     """
@@ -65,6 +70,20 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
         shown = ", ".join(f"{value:g}" for value in out[wrong[0], :3])
         raise InputError(f"{name} returns ({shown}{', ...' * (out.shape[1] > 3)}) at ({names}) = "
                          f"({place}); a law must return finite numbers everywhere.")
+    if isinstance(law, NormalLaw):
+        _require_untouched(law, law.table(np.full(nodes, 1.0 / nodes)))
+
+
+def _require_untouched(law: NormalLaw, table: Array) -> None:
+    """Raise unless a law is zero where it says that nodes are untouched."""
+    limits = law.untouched(len(table))
+    known = ~np.isneginf(limits)
+    for limit, *row in np.unique(np.column_stack([limits, table])[known], axis=0):
+        u, v = (grid.ravel() for grid in np.meshgrid(
+            limit - law.penetration_scale * _DISTANCES, (-1.0, -1e-3, 0.0, 1e-3, 1.0)))
+        values = normal_values(law.kernel.address, np.array(row), u, v)
+        _require(law, "(u, v)", np.column_stack([u, v]), (values == 0.0).all(axis=1), values,
+                 f"must be zero, as untouched = {limit:g} m says")
 
 
 Values = Callable[[Array], Array]

@@ -18,7 +18,8 @@ from fecontact import (
     simulate,
 )
 from fecontact.fem import pair_faces
-from fecontact.integrate.rodas5p.blocks import blocks_of
+from fecontact.integrate.rodas5p import driver
+from fecontact.integrate.rodas5p.blocks import FEW, blocks_of
 from fecontact.laws import ConstantFriction, Harmonic, LinearContact, LuGreFriction
 from fecontact.reduction import reduce_bodies
 
@@ -29,13 +30,18 @@ MODES = {"middle": 4, "top": 3, "bottom": 2, "lid": 3}
 
 @pytest.fixture(scope="module")
 def stacked():
+    return stack(3, 2)
+
+
+def stack(nodes, nodes_between):
     """Four beams on each other and the ground, told in another order than they stand in."""
     mesh = generate(Beam(length=0.1, height=HEIGHT, element_size=0.004))
     upwards = ("bottom", "middle", "top", "lid")
     bodies = {name: ElasticBody(mesh.placed((0.0, upwards.index(name) * HEIGHT)), thickness=0.01,
                                 fixed={"left": "xy"}) for name in ORDER}
-    faces = [pair_faces(bodies, "bottom.contact", "ground", nodes=3, nodes_on="face"),
-             *(pair_faces(bodies, f"{upper}.contact", f"{lower}.top", nodes=2, nodes_on="face")
+    faces = [pair_faces(bodies, "bottom.contact", "ground", nodes=nodes, nodes_on="face"),
+             *(pair_faces(bodies, f"{upper}.contact", f"{lower}.top", nodes=nodes_between,
+                          nodes_on="face")
                for lower, upper in pairwise(upwards))]
     bases = reduce_bodies(bodies, faces, modes=MODES, reduction="vibration", damping=0.01,
                           each={name: {"B": "", "C": "top" if name == "lid" else "",
@@ -105,6 +111,31 @@ def test_runs_are_those_of_full_matrices(stacked, friction):
     for name in ("modal_coordinates", "modal_velocities", "friction_work"):
         a, b = getattr(one, name), getattr(other, name)
         assert np.abs(a - b).max() < 1e-6 * np.abs(b).max()
+
+
+def test_nodes_left_out_of_some_blocks():
+    # More nodes than are always looked at; the upper faces open and close in turn.
+    whole = system(stack(6, 5), ConstantFriction(0.3, smoothing_slope=1e4))
+    assert whole.basis.contact_nodes > FEW
+    runs, least = [], []
+    for one, all_near in ((whole, False), (whole, True), (in_one_block(whole), False)):
+        run = driver.start(one, np.zeros(one.size), np.linspace(0.0, 4e-3, 101), rtol=1e-3,
+                           max_step=2e-6)
+        if all_near:
+            run.problem.control.untouched[:] = -np.inf
+        counts = []
+        while run.advance(20) == 0:
+            counts.append(int(run.room.near.count[0]))
+        runs.append(run)
+        least.append(min(counts))
+    one, *others = runs
+    assert least == [least[0], whole.basis.contact_nodes, least[0]]
+    assert least[0] < 0.8 * whole.basis.contact_nodes
+    for other in others:
+        assert one.statistics == other.statistics
+        for name in ("states", "work"):
+            a, b = getattr(one, name), getattr(other, name)
+            assert np.abs(a - b).max() < 1e-9 * np.abs(b).max()
 
 
 def test_derivatives_are_those_of_full_matrices(stacked):

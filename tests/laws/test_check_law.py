@@ -177,6 +177,47 @@ def test_single_mistakes_are_found(law, message):
         check_law(law)
 
 
+@dataclass(frozen=True)
+class FarSpring(Spring):
+    """A spring that says up to where it is not touched."""
+
+    limit: float = 0.0
+
+    def untouched(self, nodes):
+        return np.full(nodes, self.limit)
+
+
+def test_force_on_untouched_nodes_is_found():
+    check_law(FarSpring(limit=0.0))
+    check_law(FarSpring(limit=-1e-6))
+    for limit in (1e-9, np.inf):
+        law = FarSpring()
+        object.__setattr__(law, "limit", limit)
+        with pytest.raises(fc.FecontactError,
+                           match=r"FarSpring: at \(u, v\) = .* must be zero, as untouched = "):
+            check_law(law)
+
+
+# None where the force ends nowhere, or where this is not known.
+UNTOUCHED = {
+    ExponentialContact: -50e-6, GreenwoodWilliamson: None, PrescribedForce: None,
+    TwoSidedStop: None, BilateralCubic: None, BilateralPlay: None, BilateralPiecewise: None}
+
+
+@pytest.mark.parametrize("cls", law_names()[NormalLaw].values(), ids=lambda cls: cls.__name__)
+def test_penetration_up_to_which_laws_are_zero(cls):
+    law = cls(*NEEDED.get(cls, ()))
+    found = law.untouched(3)
+    assert found.shape == (3,)
+    expected = UNTOUCHED.get(cls, 0.0)
+    if cls is GreenwoodWilliamson:
+        expected = law.height_deviation * (law.separation - 9.0)
+    if expected is None:
+        assert np.isneginf(found).all()
+    else:
+        assert found == pytest.approx(expected, rel=0.005)
+
+
 def test_hysteresis_that_gives_energy_off_is_found():
     law = BoucWenFriction()
     object.__setattr__(law, "beta", -0.5)

@@ -22,17 +22,21 @@ from fecontact.system.nodes import SystemArrays
 class Blocks(NamedTuple):
     """Rows of contact nodes, and blocks of them and of the matrices; ends are exclusive.
 
+    The nodes are all, or those near the other side (:mod:`fecontact.integrate.near_nodes`).
+
     Attributes
     ----------
+    nodes, count : (n,), (1,) integer arrays
+        Numbers of the nodes in ascending order, in the first ``count[0]`` places.
     shapes : (m, 2 n) array
-        Rows Tx, then Ty, of all contact nodes side by side, so that sums over nodes vectorise;
+        Their rows Tx, then from column n on Ty, side by side, so that sums over nodes vectorise;
         (m, 3 n) in space, T2 last.
     parts : (p, 4) integer array
         First and last mode, first and last node of each block of the rows.
     tiles : (t, 4) integer array
         The same as first and last row, first and last column of ``shapes``.
     spans : (n, r, 2) integer array
-        First and last modes that move each node; empty spans fill the array.
+        First and last modes that move each node of all; empty spans fill the array.
     own : (b, 4) integer array
         Rows and columns of the blocks of stiffness and damping.
     coupled : (c, 6) integer array
@@ -46,6 +50,8 @@ class Blocks(NamedTuple):
         In this order, ends of the columns and, with the fill-in of pivoting, of the rows.
     """
 
+    nodes: Integers
+    count: Integers
     shapes: Array
     parts: Integers
     tiles: Integers
@@ -59,8 +65,11 @@ class Blocks(NamedTuple):
 
 _TABLE = types.Array(i8, 2, "C")
 BLOCKS = types.NamedTuple(
-    [matrix, _TABLE, _TABLE, types.Array(i8, 3, "C"), _TABLE, _TABLE, _TABLE, integers, _TABLE],
-    Blocks)
+    [integers, integers, matrix, _TABLE, _TABLE, types.Array(i8, 3, "C"), _TABLE, _TABLE, _TABLE,
+     integers, _TABLE], Blocks)
+
+# So few nodes are always taken as near: to find out costs more.
+FEW = 16
 
 
 @helper
@@ -98,6 +107,15 @@ def one_block(shapes: Array, nodes: int) -> Blocks:
     return _blocks(shapes, [(0, len(shapes))], [(0, nodes)], whole, whole, whole)
 
 
+def near_blocks(blocks: Blocks) -> Blocks:
+    """Blocks of the near nodes, which are all to begin with."""
+    if len(blocks.nodes) <= FEW:
+        return blocks
+    return blocks._replace(**{
+        name: getattr(blocks, name).copy()
+        for name in ("nodes", "count", "shapes", "parts", "tiles", "pairs")})
+
+
 def _blocks(
     shapes: Array, modes: list[tuple[int, int]], nodes: list[tuple[int, int]], moved: Array,
     own: Array, coupled: Array,
@@ -113,10 +131,10 @@ def _blocks(
         for place, a in enumerate(np.flatnonzero(moved[b])):
             spans[first:last, place] = modes[a]
     return Blocks(
-        shapes=shapes,
+        nodes=np.arange(n), count=np.array([n]), shapes=shapes,
         parts=_table(parts, 4),
         tiles=_table([(*part[:2], *columns) for part in parts
-                      for columns in _each(part[2:], n, tangents)], 4),
+                      for columns in _each(part[2:], n, tangents, n <= FEW)], 4),
         spans=spans,
         own=_table([(*modes[a], *modes[c]) for a, c in np.argwhere(own)], 4),
         coupled=_table([(*modes[a], *modes[c], starts[a], starts[c])
@@ -124,7 +142,7 @@ def _blocks(
         pairs=_table([(*modes[a], *answered, *columns) for b in range(len(nodes))
                       for a in np.flatnonzero(moved[b]) for c in np.flatnonzero(moved[b])
                       for answered in _each(modes[c], m, 2)
-                      for columns in _each(nodes[b], n, tangents)], 6),
+                      for columns in _each(nodes[b], n, tangents, n <= FEW)], 6),
         position=position, reach=reach)
 
 
@@ -136,9 +154,11 @@ def _ranges(counts: list[int], total: int) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
-def _each(span: tuple[int, int], size: int, count: int) -> list[tuple[int, int]]:
-    """A range within each of some parts of one size; in one where it is all of them."""
-    if span == (0, size):
+def _each(
+    span: tuple[int, int], size: int, count: int, joined: bool = True,
+) -> list[tuple[int, int]]:
+    """A range within each of some parts of one size; in one, if ``joined``, where it is all."""
+    if joined and span == (0, size):
         return [(0, count * size)]
     return [(part * size + span[0], part * size + span[1]) for part in range(count)]
 

@@ -96,13 +96,16 @@ def start(
     times = np.array(times, dtype=float)
     largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
     largest = np.where(largest > 0.0, largest, 1.0)
-    slip_scale, depth, stick_speed = np.empty(n), np.empty(n), np.zeros(n)
+    slip_scale, depth, stick_speed, untouched = np.zeros((4, n))
     for nodes, _, law in system.law_groups("friction"):
         slip_scale[nodes] = law.velocity_scale
         if not law.memory:
             stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
+        untouched[nodes] = law.untouched(nodes.stop - nodes.start)
+    # What friction remembers fades without force, and derivatives are those of all nodes.
+    untouched[system.arrays.memory > 0 if not vary else slice(None)] = -np.inf
     longest = longest_step(system, times, max_step)
     breaks = np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float)
     above, below, width, columns = system, system, 0.0, 0
@@ -115,15 +118,16 @@ def start(
     control = Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
-        largest=largest,
+        largest=largest, untouched=untouched,
         breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
         speed_scale=system.velocity_scale, energy_scale=_energy_scale(system, state),
         work=int(work), unfelt=first_unfelt.address)
+    blocks = blocks_of(basis, system.arrays)
     return Run(
-        Problem(system.arrays, blocks_of(basis, system.arrays), control),
+        Problem(system.arrays, blocks, control),
         _progress(system, control, float(times[0]), state),
-        room_for(m, n, states, basis.dimension),
+        room_for(m, n, states, basis.dimension, blocks),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(above.arrays, below.arrays, width, variation_for(

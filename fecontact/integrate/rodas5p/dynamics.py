@@ -64,7 +64,7 @@ def motion_given(given):
 
 @helper
 def motion_of(j, w, s):
-    """Motion of node j, as :func:`project` puts it into w (3, d n)."""
+    """Motion of node j of the blocks, as :func:`project` puts it into w (3, d n)."""
     n = len(s.gap)
     if nodes.in_space(s):
         return nodes.NodeMotion(w[0, j], w[0, n + j], w[1, j], w[1, n + j], w[0, 2 * n + j],
@@ -74,12 +74,14 @@ def motion_of(j, w, s):
 
 @helper
 def project(blocks, y, places, speeds):
-    """Fill displacements and velocities (d n,) of the contact nodes: all x, all y, all across."""
+    """Fill displacements and velocities (d n,) of the nodes: from 0 on x, n on y, 2 n on across."""
     shapes = blocks.shapes
-    m, rows = shapes.shape
-    for j in range(rows):
-        places[j] = 0.0
-        speeds[j] = 0.0
+    m, columns = shapes.shape
+    count = blocks.count[0]
+    for first in range(0, columns, len(blocks.nodes)):
+        for j in range(first, first + count):
+            places[j] = 0.0
+            speeds[j] = 0.0
     for tile in range(len(blocks.tiles)):
         i, end, left, right = block_at(blocks.tiles, tile)
         while i + 3 < end:
@@ -97,19 +99,29 @@ def project(blocks, y, places, speeds):
 
 
 @helper
-def moved_by(blocks, column, q):
-    """Motion of a node by coordinates q: along in column j, away in n + j, across in 2 n + j."""
-    j = column % len(blocks.spans)
-    total = 0.0
-    for span in range(blocks.spans.shape[1]):
-        for i in range(blocks.spans[j, span, 0], blocks.spans[j, span, 1]):
-            total += blocks.shapes[i, column] * q[i]
-    return total
+def project_one(blocks, q, places):
+    """As :func:`project` for coordinates q (m,) alone."""
+    shapes = blocks.shapes
+    count = blocks.count[0]
+    for first in range(0, shapes.shape[1], len(blocks.nodes)):
+        for j in range(first, first + count):
+            places[j] = 0.0
+    for tile in range(len(blocks.tiles)):
+        i, end, left, right = block_at(blocks.tiles, tile)
+        while i + 3 < end:
+            for j in range(left, right):
+                places[j] += (shapes[i, j] * q[i] + shapes[i + 1, j] * q[i + 1]
+                              + shapes[i + 2, j] * q[i + 2] + shapes[i + 3, j] * q[i + 3])
+            i += 4
+        while i < end:
+            for j in range(left, right):
+                places[j] += shapes[i, j] * q[i]
+            i += 1
 
 
 @helper
 def push(blocks, forces, out):
-    """Add to ``out`` (m,) the modal forces of the node forces (d n,): all -T, all F, all across."""
+    """Add to ``out`` (m,) the modal forces of the node forces (d n,): -T, F, across."""
     for tile in range(len(blocks.tiles)):
         top, bottom, left, right = block_at(blocks.tiles, tile)
         for i in range(top, bottom):
@@ -139,22 +151,26 @@ def gather(y, s, blocks, load, forces, rate):
 
 @helper
 def set_rate(y, s, blocks, given, load, w, scratch, rate):
-    """Fill ``rate`` (size,) with y'. ``w`` (3, d n) and ``scratch`` are room to work in."""
+    """Fill ``rate`` (size,) with y', by forces of the nodes of ``blocks``.
+
+    ``w`` (3, d n) and ``scratch`` are room to work in.
+    """
     m, n = len(load), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
     project(blocks, y, w[0], w[1])
     moved = motion_given(given)
     force, rates = scratch.force[0], scratch.rates[0]
-    for j in range(n):
+    for at in range(blocks.count[0]):
+        j = blocks.nodes[at]
         first = 2 * m + j * states
-        F, R, contact = kernels.node_forces(j, motion_of(j, w, s), moved,
+        F, R, contact = kernels.node_forces(j, motion_of(at, w, s), moved,
                                             y[first : first + s.memory[j]], s, force, rates)
-        forces[j] = -nodes.leaning(F, R, contact.slope, s)
-        forces[n + j] = F
+        forces[at] = -nodes.leaning(F, R, contact.slope, s)
+        forces[n + at] = F
         if nodes.in_space(s):
-            forces[2 * n + j] = -nodes.leaning(F, kernels.friction_across(force, rates),
-                                               contact.slope_across, s)
+            forces[2 * n + at] = -nodes.leaning(F, kernels.friction_across(force, rates),
+                                                contact.slope_across, s)
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
     gather(y, s, blocks, load, forces, rate)
@@ -168,15 +184,16 @@ def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     forces = w[2]
     project(blocks, y, w[0], w[1])
     moved = motion_given(given)
-    for j in range(n):
+    for at in range(blocks.count[0]):
+        j = blocks.nodes[at]
         first = 2 * m + j * states
-        F, T, contact = kernels.node_gradients(j, motion_of(j, w, s), moved,
+        F, T, contact = kernels.node_gradients(j, motion_of(at, w, s), moved,
                                          y[first : first + s.memory[j]], s, out.force[j],
                                          out.rates[j], out.partial[j])
-        forces[j] = -T
-        forces[n + j] = F
+        forces[at] = -T
+        forces[n + at] = F
         if nodes.in_space(s):
-            forces[2 * n + j] = -nodes.leaning(
+            forces[2 * n + at] = -nodes.leaning(
                 F, kernels.friction_across(out.force[j], out.rates[j]), contact.slope_across, s)
         for k in range(states):
             rate[first + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
@@ -201,20 +218,21 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     if nodes.in_space(s):
         for i in range(m):
             out[m + i] += given[PULL_RATE + 2] * s.drive_shapes[2, i]
-    for j in range(n):
+    for at in range(blocks.count[0]):
+        j = blocks.nodes[at]
         v = nodes.moved_along(j, given[SPEED], given[SECOND_SPEED], s)
         a = nodes.moved_along(j, acceleration[0], acceleration[1], s)
         p = g.partial[j]
-        forces[j] = v * p[1, 0] + a * p[1, 2]
-        forces[n + j] = -v * p[0, 0] - a * p[0, 2]
+        forces[at] = v * p[1, 0] + a * p[1, 2]
+        forces[n + at] = -v * p[0, 0] - a * p[0, 2]
         pressing = -v * p[2, 0] - a * p[2, 2]
         a2 = 0.0
         if nodes.in_space(s):
             v2 = nodes.moved_across(j, given[SPEED], given[SECOND_SPEED], s)
             a2 = nodes.moved_across(j, acceleration[0], acceleration[1], s)
-            forces[j] += v2 * p[1, 4] + a2 * p[1, 5]
-            forces[n + j] -= v2 * p[0, 4] + a2 * p[0, 5]
-            forces[2 * n + j] = v * p[3, 0] + a * p[3, 2] + v2 * p[3, 4] + a2 * p[3, 5]
+            forces[at] += v2 * p[1, 4] + a2 * p[1, 5]
+            forces[n + at] -= v2 * p[0, 4] + a2 * p[0, 5]
+            forces[2 * n + at] = v * p[3, 0] + a * p[3, 2] + v2 * p[3, 4] + a2 * p[3, 5]
             pressing -= v2 * p[2, 4] + a2 * p[2, 5]
         for k in range(states):
             rate = 0.0
@@ -237,8 +255,7 @@ def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
     """
     m, n = len(blocks.position), len(s.gap)
     project(blocks, y, w[0], w[1])
-    for j in range(w.shape[1]):
-        w[2, j] = moved_by(blocks, j, rate[m : 2 * m])
+    project_one(blocks, rate[m : 2 * m], w[2])
     first = within
     for j in range(n):
         u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]

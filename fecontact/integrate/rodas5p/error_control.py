@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.integrate.near_nodes import extend_near
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
@@ -33,21 +34,22 @@ def state_error(control, progress, room):
 
 
 @routine
-def slip_error(error, s, blocks, control, progress, room):
+def slip_error(error, s, control, progress, room):
     """The larger of the error and that of the slip velocities at the end of the step.
 
     Only where friction has no memory: there the force follows the slip velocity alone.
     """
     m, n = len(control.largest), len(s.gap)
-    difference = room.stages[tableau.STAGES - 1]
-    for j in range(n):
+    near, slips = room.near, room.between[0]
+    moved = dynamics.motion_given(room.given)
+    dynamics.project_one(near, room.stages[tableau.STAGES - 1, m : 2 * m], slips)
+    for at in range(near.count[0]):
+        j = near.nodes[at]
         if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
-            slip = dynamics.moved_by(blocks, j, difference[m : 2 * m])
-            moved = dynamics.motion_given(room.given)
+            slip = slips[at]
             distance = abs(room.nodes[1, j] - moved_along(j, moved.speed, moved.second_speed, s))
             if in_space(s):
-                slip = math.hypot(slip, dynamics.moved_by(blocks, 2 * n + j,
-                                                          difference[m : 2 * m]))
+                slip = math.hypot(slip, slips[2 * n + at])
                 distance = math.hypot(distance, room.nodes[1, 2 * n + j] - moved_across(
                     j, moved.speed, moved.second_speed, s))
             part = abs(slip) / (control.slip_part * (control.slip_scale[j] + distance))
@@ -112,17 +114,20 @@ _DIFFERENCE = _third_difference()
 @helper
 def _powers(t, y, problem, room, out):
     """As :func:`fecontact.system.powers.powers` by blocks; ``out`` (p + 2 n,) holds both."""
-    s, blocks = problem.system, problem.blocks
+    s, blocks, near = problem.system, problem.blocks, room.near
     m, n = len(blocks.position), len(s.gap)
     states = (len(y) - 2 * m) // n
     given_powers(t, y, s, out)
     for part in range(len(blocks.own)):
         matrix_powers(block_at(blocks.own, part), y, s, out)
     moved = ground_motion(t, s)
-    dynamics.project(blocks, y, room.between[0], room.between[1])
-    for j in range(n):
+    dynamics.project(near, y, room.between[0], room.between[1])
+    for j in range(POWER_COUNT, len(out)):
+        out[j] = 0.0
+    for at in range(near.count[0]):
+        j = near.nodes[at]
         first = 2 * m + j * states
-        add_node_powers(j, dynamics.motion_of(j, room.between, s), moved,
+        add_node_powers(j, dynamics.motion_of(at, room.between, s), moved,
                         y[first : first + s.memory[j]], problem.control.stick_speed[j], s,
                         room.scratch.force[0], room.scratch.rates[0], out, out[POWER_COUNT:])
 
@@ -138,6 +143,7 @@ def _set_powers(step, problem, progress, room):
             state = room.right
         else:
             state = room.after
+        extend_near(state, problem, progress, room)
         _powers(min(step.t + _POINTS[point] * step.h, step.latest), state, problem, room,
                 room.power[point])
 

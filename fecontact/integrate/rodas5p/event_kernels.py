@@ -333,11 +333,10 @@ def set_own_places(before, room, watch):
 def _set_places(step, problem, before, room, watch):
     """Fill ``watch.places`` for a step."""
     s, control = problem.system, problem.control
-    n = len(watch.zones)
     b, row = room.bound[0], room.bound[2]
     levels = control.levels.shape[0]
-    for j in range(n):
-        count = 0
+    for place in range(room.near.count[0]):
+        j, count = room.near.nodes[place], 0
         # Gaps over the levels of the normal law, and slip velocities either way where stick ends.
         for k in range(levels + 2):
             what, shift = GAP, 0.0
@@ -428,8 +427,9 @@ def _note_events(step, problem, progress, room, watch):
         _look(right, view)
         for k in range(len(watch.own)):
             note_own(k, left, right, view, watch)
-        for j in range(len(watch.zones)):
-            _note_node(j, left, right, view, watch)
+        # The others stay open.
+        for place in range(room.near.count[0]):
+            _note_node(room.near.nodes[place], left, right, view, watch)
     return first_stop(step, begun, watch)
 
 

@@ -46,8 +46,8 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all small systems of a size, for each type of tuples."""
     m, n = modes, nodes
     progress = state.progress_for(np.zeros(2 * m), 0.0, 0.0, m, n, 2)
-    room = state.room_for(m, n, 0, 2)
     blocks = one_block(np.zeros((m, 2 * n)), n)
+    room = state.room_for(m, n, 0, 2, blocks)
     tables = {name: value for name, value in blocks._asdict().items() if name != "shapes"}
     return {
         SYSTEM: {

@@ -98,15 +98,71 @@ def eliminate_memory(G, s, g, w):
                 w.weights[j, states + k] = total
 
 
+# Columns that are multiplied at a time: what the rows hold there stays in the caches.
+_PANEL = 512
+
+
 @helper
 def add_products(a, b, ends, columns, out):
-    """Add to out[i, k] the products of parts of the rows a_i and b_k, two by two at a time.
+    """Add to out[i, k] the products of parts of the rows a_i and b_k, four by four at a time.
 
     ``ends`` are first and last i, first and last k; ``columns`` those of a and b.
     """
-    top, bottom = ends[0], ends[1]
-    first, last = np.int64(ends[2]), np.int64(ends[3])
-    left, right = columns
+    top, bottom, first, last = ends[0], ends[1], np.int64(ends[2]), np.int64(ends[3])
+    below, beyond = bottom - (bottom - top) % 4, last - (last - first) % 4
+    left, right = np.int64(columns[0]), np.int64(columns[1])
+    while left < right:
+        end = min(left + _PANEL, right)
+        if below > top and beyond > first:
+            _add_by_fours(a, b, (top, below, first, beyond), (left, end), out)
+        if beyond < last:
+            _add_by_twos(a, b, (top, below, beyond, last), (left, end), out)
+        if below < bottom:
+            _add_by_twos(a, b, (below, bottom, first, last), (left, end), out)
+        left = end
+
+
+@routine
+def _add_by_fours(a, b, ends, columns, out):
+    """The same for numbers of rows that four divides."""
+    # Unsigned: loops over indices that might be negative are not vectorised.
+    left, right = np.uint64(columns[0]), np.uint64(columns[1])
+    for i in range(ends[0], ends[1], 4):
+        for k in range(ends[2], ends[3], 4):
+            s00, s01, s02, s03, s10, s11, s12, s13 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            s20, s21, s22, s23, s30, s31, s32, s33 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for j in range(left, right):
+                w, x, y, z = a[i, j], a[i + 1, j], a[i + 2, j], a[i + 3, j]
+                p, q, u, v = b[k, j], b[k + 1, j], b[k + 2, j], b[k + 3, j]
+                s00 += w * p
+                s01 += w * q
+                s02 += w * u
+                s03 += w * v
+                s10 += x * p
+                s11 += x * q
+                s12 += x * u
+                s13 += x * v
+                s20 += y * p
+                s21 += y * q
+                s22 += y * u
+                s23 += y * v
+                s30 += z * p
+                s31 += z * q
+                s32 += z * u
+                s33 += z * v
+            for row, sums in ((i, (s00, s01, s02, s03)), (i + 1, (s10, s11, s12, s13)),
+                              (i + 2, (s20, s21, s22, s23)), (i + 3, (s30, s31, s32, s33))):
+                out[row, k] += sums[0]
+                out[row, k + 1] += sums[1]
+                out[row, k + 2] += sums[2]
+                out[row, k + 3] += sums[3]
+
+
+@routine
+def _add_by_twos(a, b, ends, columns, out):
+    """The same for few rows, two by two at a time."""
+    top, bottom, first, last = ends
+    left, right = np.uint64(columns[0]), np.uint64(columns[1])
     for i in range(top, bottom - 1, 2):
         for k in range(first, last - 1, 2):
             a00, a01, a10, a11 = 0.0, 0.0, 0.0, 0.0
@@ -152,18 +208,19 @@ def set_answers(blocks, g, w):
     states = w.inverse.shape[1]
     c = w.coefficients
     space = len(c) > 4
-    for j in range(n):
+    for at in range(blocks.count[0]):
+        j = blocks.nodes[at]
         p = g.partial[j]
         pressing, slip = 0.0, 0.0
         for k in range(states):
             slip += w.weights[j, k] * g.rates[j, k, 1]
             pressing += w.weights[j, k] * g.rates[j, k, 2]
         for k in range(4):
-            c[k, j] = -p[1, k] - pressing * p[2, k]
-            c[k, n + j] = p[0, k]
-        c[2, j] -= slip
+            c[k, at] = -p[1, k] - pressing * p[2, k]
+            c[k, n + at] = p[0, k]
+        c[2, at] -= slip
         if space:
-            _set_coefficients_across(j, g, w, pressing)
+            _set_coefficients_across(at, j, g, w, pressing)
     for part in range(len(blocks.parts)):
         top, bottom, left, right = block_at(blocks.parts, part)
         for k in range(top, bottom):
@@ -172,19 +229,21 @@ def set_answers(blocks, g, w):
                 across = shapes[k, 2 * n :]
             for first in range(0, shapes.shape[1], n):
                 by_place, by_speed = w.answers[k, first:], w.answers[m + k, first:]
+                # Named outside the loop, or it is not vectorised.
+                c0, c1, c2, c3 = c[0, first:], c[1, first:], c[2, first:], c[3, first:]
                 for j in range(left, right):
-                    by_place[j] = c[0, first:][j] * along[j] + c[1, first:][j] * away[j]
-                for j in range(left, right):
-                    by_speed[j] = c[2, first:][j] * along[j] + c[3, first:][j] * away[j]
+                    by_place[j] = c0[j] * along[j] + c1[j] * away[j]
+                    by_speed[j] = c2[j] * along[j] + c3[j] * away[j]
                 if space:
+                    c4, c5 = c[4, first:], c[5, first:]
                     for j in range(left, right):
-                        by_place[j] += c[4, first:][j] * across[j]
-                        by_speed[j] += c[5, first:][j] * across[j]
+                        by_place[j] += c4[j] * across[j]
+                        by_speed[j] += c5[j] * across[j]
 
 
 @helper
-def _set_coefficients_across(j, g, w, pressing):
-    """What a node's motion across does to its forces, and all motion to that across."""
+def _set_coefficients_across(at, j, g, w, pressing):
+    """What motion across of node j, at a place, does to its forces, and all motion to that."""
     n, states = len(g.partial), w.inverse.shape[1]
     p, c = g.partial[j], w.coefficients
     slip, second_pressing, second_along, second_across = 0.0, 0.0, 0.0, 0.0
@@ -194,13 +253,13 @@ def _set_coefficients_across(j, g, w, pressing):
         second_along += w.weights[j, states + k] * g.rates[j, k, 1]
         second_across += w.weights[j, states + k] * g.rates[j, k, 3 + states]
     for k in range(4, 6):
-        c[k, j] = -p[1, k] - pressing * p[2, k]
-        c[k, n + j] = p[0, k]
-    c[5, j] -= slip
+        c[k, at] = -p[1, k] - pressing * p[2, k]
+        c[k, n + at] = p[0, k]
+    c[5, at] -= slip
     for k in range(6):
-        c[k, 2 * n + j] = -p[3, k] - second_pressing * p[2, k]
-    c[2, 2 * n + j] -= second_along
-    c[5, 2 * n + j] -= second_across
+        c[k, 2 * n + at] = -p[3, k] - second_pressing * p[2, k]
+    c[2, 2 * n + at] -= second_along
+    c[5, 2 * n + at] -= second_across
 
 
 @routine

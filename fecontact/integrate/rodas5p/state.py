@@ -10,7 +10,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
-from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks
+from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks, near_blocks
 from fecontact.system.nodes import (
     CONTACT_FIELDS,
     GROUND_MOTION,
@@ -44,6 +44,9 @@ class Control(NamedTuple):
         its character.
     largest : (m,) array
         Largest motion of each mode at any point.
+    untouched : (n,) array
+        Penetration up to which a node has no force, so that it need not be looked at; -inf if
+        there is none, or if it has to be looked at all the same.
     breaks : (k,) array
         Times to step on to.
     levels : (l, n) array
@@ -67,6 +70,7 @@ class Control(NamedTuple):
     stick_speed: Array
     depth: Array
     largest: Array
+    untouched: Array
     breaks: Array
     levels: Array
     ground: Array
@@ -79,7 +83,7 @@ class Control(NamedTuple):
     unfelt: int
 
 
-CONTROL = types.NamedTuple([vector] * 8 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
+CONTROL = types.NamedTuple([vector] * 9 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
 
 
 class Problem(NamedTuple):
@@ -168,14 +172,17 @@ OUTPUT = types.NamedTuple([vector, matrix, matrix], Output)
 class Room(NamedTuple):
     """Room to work in.
 
-    Vectors of the size of the state: the ``stages``, coefficients of the ``dense`` output, and
-    what the names say; ``nodes`` (3, d n), ``given`` and ``load`` for what acts at the time of a
-    stage, ``between`` (2, d n) for the nodes at a point within the step, ``power`` (4, p + 2 n) for
-    a quadrature. ``ends`` to ``places`` serve to look at the
-    course of a step: the nodes at its ends, its coefficients, those of the nodes, and room for
-    what they may do.
+    ``near`` are the blocks of the nodes that may touch, ``clearance`` (n + 1,) how far all nodes
+    are from that. Vectors of the size of the state: the ``stages``, coefficients of the ``dense``
+    output, and what the names say; ``nodes`` and ``slots`` (3, d n) for all nodes and the near
+    ones, ``given`` and ``load`` for what acts at the time of a stage, ``between`` (2, d n) for the
+    nodes at a point within the step, ``power`` (4, p + 2 n) for a quadrature. ``ends`` to
+    ``places`` serve to look at the course of a step: the nodes at its ends, its coefficients,
+    those of the nodes, and room for what they may do.
     """
 
+    near: Blocks
+    clearance: Array
     stages: Array
     dense: Array
     stage: Array
@@ -185,6 +192,7 @@ class Room(NamedTuple):
     after: Array
     rate_after: Array
     nodes: Array
+    slots: Array
     between: Array
     given: Array
     load: Array
@@ -202,7 +210,7 @@ class Room(NamedTuple):
 
 
 ROOM = types.NamedTuple(
-    [matrix] * 2 + [vector] * 6 + [matrix] * 2 + [vector] * 3
+    [BLOCKS, vector] + [matrix] * 2 + [vector] * 6 + [matrix] * 3 + [vector] * 3
     + [matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector],
     Room)
 
@@ -221,15 +229,16 @@ def gradients_for(
                             np.zeros((nodes, length)), np.zeros((nodes, states, width)))
 
 
-def room_for(modes: int, nodes: int, states: int, dimension: int) -> Room:
+def room_for(modes: int, nodes: int, states: int, dimension: int, blocks: Blocks) -> Room:
     """Room for a system of so many modes, contact nodes and internal variables per node."""
     columns = dimension * nodes
     size = 2 * modes + nodes * states
     stage, right, base, time_rate, after, rate_after = np.zeros((6, size))
     return Room(
+        near_blocks(blocks), np.zeros(nodes + 1),
         np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
         stage, right, base, time_rate, after, rate_after,
-        np.zeros((3, columns)), np.zeros((2, columns)), np.zeros(motion.GIVEN),
+        *np.zeros((2, 3, columns)), np.zeros((2, columns)), np.zeros(motion.GIVEN),
         np.zeros(modes), np.zeros(modes),
         np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)),
         stage_solver.reduced_for(modes, nodes, states, dimension),

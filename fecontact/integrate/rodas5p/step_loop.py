@@ -7,6 +7,7 @@ from fecontact.core.compiled import helper, i8, kernel, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.course_bounds import doubtful, restless
 from fecontact.integrate.courses import keep_ends, set_courses, set_ends
+from fecontact.integrate.near_nodes import choose_near, extend_near, set_end
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
     set_scale,
@@ -143,7 +144,7 @@ def _linearise(step, after_t, problem, progress, room):
         rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
         for i in range(m):
             room.pull_rate[i] += rate * s.load_shapes[k, i]
-    dynamics.set_time_rate(s, problem.blocks, room.given, (first, second), progress.gradients,
+    dynamics.set_time_rate(s, room.near, room.given, (first, second), progress.gradients,
                            room.pull_rate, room.nodes, room.time_rate)
     for i in range(m):
         progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
@@ -168,7 +169,8 @@ def _stages(step, G, problem, progress, room):
             if now != last:
                 dynamics.set_given(now, s, room.given, room.load)
                 last = now
-            dynamics.set_rate(room.stage, s, blocks, room.given, room.load, room.nodes,
+            extend_near(room.stage, problem, progress, room)
+            dynamics.set_rate(room.stage, s, room.near, room.given, room.load, room.nodes,
                               room.scratch, room.base)
             tableau.combined(tableau.C[i], 1.0 / step.h, room.base, room.stages, room.right)
         factor = tableau.TIME[i] * step.h
@@ -193,7 +195,7 @@ def _attempt(step, new, end, problem, progress, room):
     if memory:
         stage_solver.eliminate_memory(G, s, progress.gradients, room.reduced)
     if new or memory:
-        stage_solver.assemble(s, problem.blocks, progress.gradients, room.reduced)
+        stage_solver.assemble(s, room.near, progress.gradients, room.reduced)
     stage_solver.factorise_step(G, problem.blocks, room.reduced)
     _stages(step, G, problem, progress, room)
 
@@ -204,14 +206,13 @@ def _error_at_end(step, end, problem, progress, room):
 
     Where the state is within its tolerance, its rates and gradients are evaluated too.
     """
-    s, blocks, control = problem.system, problem.blocks, problem.control
+    s, control = problem.system, problem.control
     error = state_error(control, progress, room)
     if error <= 1.0:
         if step.at_break:
             dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.load)
-        dynamics.set_rate_and_gradients(room.after, s, blocks, room.given, room.load, room.nodes,
-                                        room.gradients_after, room.rate_after)
-        error = slip_error(error, s, blocks, control, progress, room)
+        set_end(problem, progress, room)
+        error = slip_error(error, s, control, progress, room)
     return error
 
 
@@ -219,7 +220,7 @@ def _error_at_end(step, end, problem, progress, room):
 def _unfelt_part(step, again, smallest, problem, progress, room):
     """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
     s, blocks, control = problem.system, problem.blocks, problem.control
-    if restless(step.moved, step.h, s, blocks, control, room) and again < _MOST_AGAIN:
+    if restless(step, problem, progress, room) and again < _MOST_AGAIN:
         set_courses(s, blocks, control.ground, progress.state, room.after, room)
         if doubtful(step.moved, step.h, s, control.ground, control.levels, control.slip_scale,
                     room):
@@ -320,7 +321,9 @@ def _go_on(step, problem, progress, room, output):
         progress.rate[k] = room.rate_after[k]
     here, there = progress.gradients, room.gradients_after
     n, states, width = here.rates.shape
-    for j in range(n):
+    # Those of the other nodes are zero.
+    for at in range(room.near.count[0]):
+        j = room.near.nodes[at]
         for row in range(here.partial.shape[1]):
             for k in range(here.partial.shape[2]):
                 here.partial[j, row, k] = there.partial[j, row, k]
@@ -371,6 +374,7 @@ def advance_by(problem, progress, room, output, vary, watch, most):
             # Rates just after t: they may jump at a break.
             dynamics.set_given(np.nextafter(t, end), s, room.given, room.load)
             moved = dynamics.motion_given(room.given)
+            choose_near(h, problem, progress, room)
         step = _aim(t, h, exactly, moved, end, problem, progress, room)
         _attempt(step, new, end, problem, progress, room)
         new = False

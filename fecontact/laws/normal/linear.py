@@ -50,6 +50,10 @@ class LinearContact(NormalLaw):
         """Penetration under 1 N on the whole face, or on each node [m], the smallest of all."""
         return 1.0 / float(np.max(self.stiffness))
 
+    def untouched(self, nodes: int) -> Array:
+        """Zero (n,), see :class:`NormalLaw`."""
+        return np.full(nodes, 0.0 if self.kernel is _linear else -np.inf)
+
     def pieces(self, share: Array) -> Array | None:
         """Nothing, and the force c u + d v."""
         if self.kernel is not _linear:

@@ -229,6 +229,10 @@ class MeasuredSurface(RoughSurface):
                                  curve.derivative()(_DEPTHS)]).reshape(-1)
         return np.column_stack([self._bed.table(share), np.tile(knots, (len(share), 1))])
 
+    def untouched(self, nodes: int) -> Array:
+        """Zero (n,), the place of the highest peak, see :class:`NormalLaw`."""
+        return np.full(nodes, 0.0 if self.kernel is _measured else -np.inf)
+
     def _curve(self) -> Any:
         from scipy.interpolate import PchipInterpolator
 

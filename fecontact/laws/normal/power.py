@@ -66,6 +66,10 @@ class _Power(NormalLaw):
         table = self.table(np.ones(max(sizes)))
         return float(np.min(table[:, 1] * table[:, 0] ** (-1.0 / table[:, 2])))
 
+    def untouched(self, nodes: int) -> Array:
+        """Zero (n,), see :class:`NormalLaw`."""
+        return np.full(nodes, 0.0 if self.kernel is _power else -np.inf)
+
     def pieces(self, share: Array) -> Array | None:
         """Nothing, and the force, for n = 1 or n = 2; else None."""
         scale, length, exponent, factor = self.table(share).T

@@ -110,6 +110,10 @@ def gaussian(u, v, p):
     return bed_of_asperities(v, p, compression, bearing, density)
 
 
+# Laws that are zero for u <= 0.
+_BEDS = (uniform, parabolic, cosine, gaussian)
+
+
 @dataclass(frozen=True)
 class RoughSurface(NormalLaw):
     r"""Rough surface with uniformly distributed asperity heights (4.1-16).
@@ -158,6 +162,10 @@ class RoughSurface(NormalLaw):
     def penetration_scale(self) -> float:
         """Roughness height R_Z [m], the smallest of all nodes."""
         return float(np.min(self.roughness_height))
+
+    def untouched(self, nodes: int) -> Array:
+        """Zero (n,), the place of the highest peak, see :class:`NormalLaw`."""
+        return np.full(nodes, 0.0 if self.kernel in _BEDS else -np.inf)
 
     def pieces(self, share: Array) -> Array | None:
         """Nothing, part of the asperities, and all of them, for uniform heights; else None."""

@@ -69,6 +69,13 @@ class ExponentialContact(NormalLaw):
         """Penetration (1, n) at which the force is exp(-10) times that at u = 0 [m]."""
         return np.full((1, nodes), -10.0 * np.asarray(self.decay_length))
 
+    def untouched(self, nodes: int) -> Array:
+        """Penetration (n,) below which the force is set to zero, -50 u_0 [m]."""
+        if self.kernel is not _exponential:
+            return super().untouched(nodes)
+        # A little deeper than that, for rounding.
+        return np.array(np.broadcast_to(1.001 * _FARTHEST * np.asarray(self.decay_length), nodes))
+
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
         force, length, _ = self.table(share).T
@@ -189,6 +196,13 @@ class GreenwoodWilliamson(NormalLaw):
         """Penetration (1, n) at h = 5, where the force is 1e-7 times that at h = 0 [m]."""
         away = np.asarray(self.separation) - 5.0
         return np.array(np.broadcast_to(np.asarray(self.height_deviation) * away, (1, nodes)))
+
+    def untouched(self, nodes: int) -> Array:
+        """Penetration (n,) at h = 9, from where on the force is set to zero [m]."""
+        if self.kernel is not _greenwood:
+            return super().untouched(nodes)
+        away = np.asarray(self.separation) - 1.001 * _APART
+        return np.array(np.broadcast_to(np.asarray(self.height_deviation) * away, nodes))
 
     def table(self, share: Array) -> Array:
         """Parameters (n, 4): 4/3 E* R^(1/2) N sigma^(3/2), sigma, h_0, chi."""
