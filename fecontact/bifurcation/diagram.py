@@ -146,4 +146,5 @@ def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
 
     if wanted.method == "shooting":
         return Shooting(segments=wanted.segments)
-    return Collocation(intervals=wanted.intervals, tolerance=wanted.tolerance)
+    return Collocation(intervals=wanted.intervals, tolerance=wanted.tolerance,
+                       state_tolerance=wanted.state_tolerance)

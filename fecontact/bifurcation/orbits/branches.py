@@ -327,7 +327,7 @@ def _on_own_intervals(start: starts.Start, method: Collocation) -> starts.Start:
     problem, u, _ = start
     count, sizes = method.intervals, _sizes(method)
     if sizes is not None:
-        error = state_error(problem.mesh, problem.nodes(u), problem.degree)
+        error = state_error(problem.mesh, problem.nodes(u), problem.degree, problem.scales)
         count = sizes.at_start(problem.intervals, error, problem.degree)
     return starts.on_intervals(start, count)
 

@@ -38,6 +38,8 @@ _AMPLITUDE_CHANGE = 0.1
 _AIM, _FEWER = 0.1, 0.65
 # Largest factor between the intervals of one mesh and the next.
 _MOST_CHANGE = 2.0
+# Steps in a row that have to allow fewer intervals: where a motion begins to stick, errors vary.
+_CALM = 5
 # Numbers of intervals are multiples of this: so many are eliminated at once.
 _AT_ONCE = 8
 
@@ -112,6 +114,8 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         the tangent along the branch; empty before the first step.
     sizes : Intervals, optional
         Of orbits along the branch; None keeps their number.
+    calm : int
+        Steps in a row after which fewer of them would have done.
     """
 
     age: int = 0
@@ -120,6 +124,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     precision: float = 1e-12
     before: tuple[Array, ...] = ()
     sizes: Intervals | None = None
+    calm: int = 0
 
     keeps_matrix: ClassVar[bool] = True
     confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
@@ -143,7 +148,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
                 "maximum": high, "state_error": self._error(u)}
 
     def _error(self, u: Array) -> float:
-        return state_error(self.mesh, self.nodes(u), self.degree)
+        return state_error(self.mesh, self.nodes(u), self.degree, self.scales)
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -207,14 +212,16 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         """The problem for the next step: phase condition at u, periodically a new mesh."""
         bend = self._bend(u, tangent)
         vectors = [u, tangent] if bend is None else [u, tangent, bend]
-        mesh, age, count = self.mesh, self.age + 1, self.intervals
+        mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
-            count = min(count, self.sizes.after(count, self._error(u), self.degree))
+            fewer = min(count, self.sizes.after(count, self._error(u), self.degree))
+            calm = self.calm + 1 if fewer < count else 0
+            count = fewer if calm >= _CALM else count
         if (self.renewal and age >= self.renewal) or count < self.intervals:
             mesh, age = equidistributed(mesh, self.nodes(u), self.degree, count), 0
             vectors = self._on_other_mesh(mesh, vectors)
         problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, vectors[0]),
-                          scales=self._grown(u), before=tuple(vectors))
+                          scales=self._grown(u), before=tuple(vectors), calm=calm)
         return problem, vectors[0], vectors[1]
 
     def refined(
@@ -229,7 +236,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         mesh = equidistributed(self.mesh, self.nodes(ahead.u), self.degree, count)
         vectors = self._on_other_mesh(mesh, [u, tangent, *self.before[2:]])
         problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, vectors[0]),
-                          before=tuple(vectors) if self.before else ())
+                          before=tuple(vectors) if self.before else (), calm=0)
         return problem, vectors[0], vectors[1]
 
     def note(self, points: Sequence[BranchPoint]) -> str:

@@ -247,15 +247,15 @@ def _monitor(mesh, nodes, top, share):
         share[j] = mean * (mesh[j + 1] - mesh[j])
 
 
-# Smallest range of a state to which an error of it is related, in its largest value and in the
-# largest range of all states.
-_LEAST_OF_VALUE, _LEAST_OF_ALL = 1e-6, 1e-11
+# Smallest range of a state to which an error of it is related: in its scale (Newton's method leaves
+# errors of 1e-8 of that), in its largest value, and in the largest range of all states.
+_LEAST_OF_SCALE, _LEAST_OF_VALUE, _LEAST_OF_ALL = 1e-2, 1e-6, 1e-11
 
 
-@kernel(f8(vector, matrix, vector))
-def _largest_error(mesh, nodes, top):
+@kernel(f8(vector, matrix, vector, vector))
+def _largest_error(mesh, nodes, top, scales):
     """Largest h^(m+1) |x^(m+1)| / range of all intervals and states."""
-    mesh, nodes = borrowed(mesh), borrowed(nodes)
+    mesh, nodes, scales = borrowed(mesh), borrowed(nodes), borrowed(scales)
     N = len(mesh) - 1
     total, d = nodes.shape
     m = total // N
@@ -264,7 +264,8 @@ def _largest_error(mesh, nodes, top):
         low, high = nodes[0, i], nodes[0, i]
         for node in range(total):
             low, high = min(low, nodes[node, i]), max(high, nodes[node, i])
-        ranges[i] = max(high - low, _LEAST_OF_VALUE * max(abs(low), abs(high)))
+        ranges[i] = max(high - low, _LEAST_OF_VALUE * max(abs(low), abs(high)),
+                        _LEAST_OF_SCALE * scales[i])
         most = max(most, high - low)
     slopes, worst = np.empty(N), 0.0
     for i in range(d):
@@ -287,8 +288,10 @@ def _largest_error(mesh, nodes, top):
     return worst
 
 
-def state_error(mesh: Array, nodes: Array, degree: int) -> float:
+def state_error(mesh: Array, nodes: Array, degree: int, scales: Array) -> float:
     r"""Largest error of a state between the ends of intervals, in its range over the orbit.
+
+    The range counts as a hundredth of the state's scale at least; the first d scales are those.
 
     There the collocation polynomials err most, by
 
@@ -299,7 +302,7 @@ def state_error(mesh: Array, nodes: Array, degree: int) -> float:
     neighbours, each from the jump of that of order m.
     """
     found = rule(degree)
-    return found.bump * float(_largest_error(mesh, nodes, found.top))
+    return found.bump * float(_largest_error(mesh, nodes, found.top, scales))
 
 
 @kernel(types.void(vector, matrix, vector, vector))
