@@ -39,7 +39,7 @@ _AIM, _FEWER = 0.1, 0.65
 # Largest factor between the intervals of one mesh and the next.
 _MOST_CHANGE = 2.0
 # Steps in a row that have to allow fewer intervals: where a motion begins to stick, errors vary.
-_CALM = 5
+_CALM = 10
 # Numbers of intervals are multiples of this: so many are eliminated at once.
 _AT_ONCE = 8
 

@@ -251,6 +251,9 @@ def _monitor(mesh, nodes, top, share):
 # errors of 1e-8 of that), in its largest value, and in the largest range of all states.
 _LEAST_OF_SCALE, _LEAST_OF_VALUE, _LEAST_OF_ALL = 1e-2, 1e-6, 1e-11
 
+# Part of an interval, in widths of a neighbour, in which the derivative between both counts.
+_MOST_REACH = 2.0
+
 
 @kernel(f8(vector, matrix, vector, vector))
 def _largest_error(mesh, nodes, top, scales):
@@ -280,11 +283,12 @@ def _largest_error(mesh, nodes, top, scales):
             slopes[j] = value / (mesh[j + 1] - mesh[j]) ** m
         for j in range(N):
             width = mesh[j + 1] - mesh[j]
-            before, after = j - 1 if j > 0 else N - 1, j + 1 if j + 1 < N else 0
-            derivative = 2.0 * max(
-                abs(slopes[j] - slopes[before]) / (width + mesh[before + 1] - mesh[before]),
-                abs(slopes[after] - slopes[j]) / (width + mesh[after + 1] - mesh[after]))
-            worst = max(worst, derivative * width ** (m + 1) / size)
+            for other in (j - 1 if j > 0 else N - 1, j + 1 if j + 1 < N else 0):
+                beside = mesh[other + 1] - mesh[other]
+                derivative = 2.0 * abs(slopes[other] - slopes[j]) / (width + beside)
+                # What a much narrower neighbour resolves does not go on through this interval.
+                reach = min(width, _MOST_REACH * beside)
+                worst = max(worst, derivative * reach ** (m + 1) / size)
     return worst
 
 
