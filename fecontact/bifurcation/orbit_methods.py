@@ -32,6 +32,7 @@ class Collocation:
         Largest error of the states of an orbit between the ends of intervals, in their ranges over
         it: where the estimate 'state_error' exceeds it, a point is found again on more intervals,
         which become fewer again where that leaves a tenth of it. None keeps ``intervals``.
+        Newton's method ends with steps of a hundredth of it at most.
 
     Raises
     ------

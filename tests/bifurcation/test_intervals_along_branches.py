@@ -121,61 +121,59 @@ def test_errors_of_relaxation_oscillations(tolerance):
 
 def test_intervals_rise_and_fall_along_a_branch():
     """To relaxation oscillations, and back to nearly harmonic ones from a point of the branch."""
-    there = relaxation(1e-7)
+    there = relaxation(1e-5)
     found = counts(there)
-    assert min(found) < 100 < found[-1]
+    assert min(found) < 50 < found[-1]
     field = vector_field(vanderpol, {"mu": 1.0}, 2)
-    back = orbit_branch(field, there.points[-1], bounds=(0.5, 30.0), direction=-1.0)
+    back = orbit_branch(field, there.points[-1], bounds=(0.05, 30.0), direction=-1.0)
     assert back.status is BranchStatus.BOUND
-    assert back.attributes["state_tolerance"] == 1e-7
-    assert back.column("state_error").max() <= 1e-7
+    assert back.attributes["state_tolerance"] == 1e-5
+    assert back.column("state_error").max() <= 1e-5
     found = counts(back)
-    assert found[0] > 100 > found[-1]
-    assert (np.diff(found) <= 0).all()
-    assert back.points[-1].parameter == there.points[0].parameter == 0.5
-    assert back.points[-1].values["period"] == pytest.approx(there.points[0].values["period"],
-                                                             rel=3e-8)
+    assert found[0] > 50 > 40 >= found[-1]
+    # The first terms of the series in mu.
+    period = 2.0 * np.pi * (1.0 + 0.05**2 / 16.0 - 5.0 * 0.05**4 / 3072.0)
+    assert back.points[-1].values["period"] == pytest.approx(period, rel=3e-8)
 
 
-def stick_slip(slope, tolerance, points=250):
+def stick_slip(slope, points=250, **method):
     field = vector_field(belt, {"speed": 1.0, "slope": slope}, 2)
     steady = equilibrium_branch(field, parameter="speed", bounds=(0.02, 3.0))
     return orbit_branch(field, steady.of_kind("Hopf")[0], bounds=(0.3, 3.0),
-                        method=Collocation(state_tolerance=tolerance),
+                        method=Collocation(**method),
                         options=ContinuationOptions(points=points))
 
 
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
-def test_errors_of_stick_slip(tolerance):
+def sticking(branch):
+    return [point for point in branch if point.kind is None and bool(point.values["stable"])]
+
+
+@pytest.mark.parametrize("slope", [100.0, 500.0])
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7, 1e-8])
+def test_errors_of_stick_slip(slope, tolerance):
     """A mass that sticks on its belt, against runs at tolerances of 1e-12."""
-    branch = stick_slip(100.0, tolerance)
+    branch = stick_slip(slope, state_tolerance=tolerance)
     assert branch.status is BranchStatus.BOUND
     assert branch.message == ""
     assert branch.column("state_error").max() <= tolerance
-    sticking = [point for point in branch if point.kind is None and bool(point.values["stable"])]
-    for point in sticking[5::15]:
-        period, error = true_error(point, belt, point.parameter, 100.0, periods=3)
-        assert error <= max(1.5 * tolerance, 3e-8)
-        assert point.values["state_error"] >= 0.3 * error - 2e-8
-        assert point.values["period"] == pytest.approx(period, rel=3e-8)
-
-
-def test_steep_friction_keeps_the_tolerance():
-    """Friction of slope 5e4: layers of a millionth of the period, which 50 intervals miss."""
-    branch, fixed = (stick_slip(5e4, tolerance) for tolerance in (1e-5, None))
     found = counts(branch)
     assert min(found) == 50
-    assert max(found) > 150
-    assert (np.diff(found) < 0).sum() >= 3
+    assert (max(found) > 50) == (tolerance < 1e-5)
+    for point in sticking(branch)[5::15]:
+        period, error = true_error(point, belt, point.parameter, slope, periods=3)
+        assert error <= 2.0 * tolerance
+        assert 0.25 * error - 1e-9 <= point.values["state_error"] <= 5.0 * error
+        assert point.values["period"] == pytest.approx(period, rel=max(1e-3 * tolerance, 3e-8))
+
+
+def test_steep_friction():
+    """Friction of slope 5e4, whose layers of a millionth of the period are hardly resolved."""
+    branch = stick_slip(5e4, state_tolerance=1e-6)
     assert branch.message == ""
-    assert branch.column("state_error").max() <= 1e-5
-    sticking = [point for point in branch if point.kind is None and bool(point.values["stable"])]
-    for point in sticking[5::25]:
-        assert true_error(point, belt, point.parameter, 5e4, periods=3)[1] <= 2e-5
-    worst = max((point for point in fixed if bool(point.values["stable"])),
-                key=lambda point: point.values["state_error"])
-    assert worst.values["state_error"] > 1e-3
-    assert true_error(worst, belt, worst.parameter, 5e4, periods=3)[1] > 1e-3
+    assert branch.column("state_error").max() <= 1e-6
+    assert max(counts(branch)) > min(counts(branch)) == 50
+    for point in sticking(branch)[5::20]:
+        assert true_error(point, belt, point.parameter, 5e4, periods=3)[1] <= 1e-5
 
 
 def driven_branch(method):

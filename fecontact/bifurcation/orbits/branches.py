@@ -37,6 +37,8 @@ from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Factors of the first step, tried in this order to leave a special point.
 _FIRST_STEPS = (1.0, 0.2, 0.04)
+# Largest tolerance of Newton's method, in that of the states.
+_NEWTON = 1e-2
 # Special points of orbits at which other orbits branch off.
 _BRANCHING = ("period doubling", "branch point")
 
@@ -359,11 +361,13 @@ def _followed(
     attributes = attributes_of(problem, limits) | {
         "intervals": int(method.intervals), "tolerance": method.tolerance,
         "most_intervals": method.most_intervals}
+    newton = options.tolerance
     if method.state_tolerance is not None:
         attributes["state_tolerance"] = method.state_tolerance
+        newton = min(newton, _NEWTON * method.state_tolerance)
     name = list(field.parameters)[problem.free]
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
-    ended = replace(options, stop_at=[*stops, HALVING])
+    ended = replace(options, stop_at=[*stops, HALVING], tolerance=newton)
     # Locate special points coarsely here; they are refined below on meshes of their own.
     problem = replace(problem, limits=limits, precision=ROUGHLY, sizes=_sizes(method))
     branch = continue_branch(problem, u, ended, name=name, tangent=tangent, attributes=attributes,
