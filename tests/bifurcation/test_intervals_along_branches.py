@@ -4,9 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from collocation_fields import settled
+from collocation_fields import settled, two_masses_field
 from numba import njit
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 from test_orbit_curves import circle_field, twisted
 
@@ -125,7 +126,8 @@ def test_intervals_rise_and_fall_along_a_branch():
     found = counts(there)
     assert min(found) < 50 < found[-1]
     field = vector_field(vanderpol, {"mu": 1.0}, 2)
-    back = orbit_branch(field, there.points[-1], bounds=(0.05, 30.0), direction=-1.0)
+    back = orbit_branch(field, there.points[-1], bounds=(0.05, 30.0), direction=-1.0,
+                        options=ContinuationOptions(largest_step=0.01, points=1000))
     assert back.status is BranchStatus.BOUND
     assert back.attributes["state_tolerance"] == 1e-5
     assert back.column("state_error").max() <= 1e-5
@@ -334,3 +336,49 @@ def test_points_of_codimension_two_that_finer_meshes_do_not_have(monkeypatch):
 def test_bad_tolerances(given):
     with pytest.raises(InputError, match="state_tolerance = "):
         Collocation(state_tolerance=given)
+
+
+def apart(one, other):
+    """Largest distance of two autonomous orbits, in any phase, in the ranges of the states."""
+    mine, theirs = (point.orbit(samples=8001) for point in (one, other))
+    theirs.states[-1] = theirs.states[0]
+    through = CubicSpline(theirs.times / theirs.times[-1], theirs.states, bc_type="periodic")
+    phases, ranges = mine.times[:-1] / mine.times[-1], np.ptp(theirs.states, axis=0)
+    sides = [np.fft.rfft(states[:-1] - states[:-1].mean(axis=0), axis=0) / ranges
+             for states in (mine.states, theirs.states)]
+    fitting = np.fft.irfft((sides[1] * sides[0].conj()).sum(axis=1), len(phases))
+    rough, near = np.argmax(fitting) / len(phases), 2.0 / len(phases)
+
+    def off(shift):
+        return float(np.max(np.abs(through(phases + shift) - mine.states[:-1]) / ranges))
+
+    return minimize_scalar(off, bounds=(rough - near, rough + near), method="bounded",
+                           options={"xatol": 1e-11}).fun
+
+
+def masses_branch(method):
+    field = two_masses_field(B=0.3)
+    sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.3, 12.0))
+    return field, orbit_branch(field, sliding.of_kind("Hopf")[0], method=method,
+                               bounds=(0.3, 12.0))
+
+
+@pytest.mark.parametrize(("followed", "doubling", "shown"), [
+    (masses_branch, 8.0921923844629, 9.3e-6), (chaos_branch, 2.83244502786, 4.2e-8)])
+def test_default_settings_reach_what_is_stated(followed, doubling, shown):
+    """A hundred-thousandth of the ranges, a ten-millionth of the diagram: table of the docs."""
+    field, branch = followed(Collocation())
+    largest = branch.column("state_error").max()
+    assert largest == pytest.approx(shown, rel=0.5)
+    assert largest <= 1e-5
+    found, = branch.of_kind("period doubling")
+    assert found.parameter_error <= 1e-7 * np.ptp(branch.parameter)
+    assert abs(found.parameter - doubling) <= 1.2 * found.parameter_error + 2e-11
+    worst = max((point for point in branch if point.kind is None),
+                key=lambda point: point.values["state_error"])
+    fine = orbit_branch(field, worst.orbit(field), branch.parameter_name, method=FINE,
+                        options=ContinuationOptions(points=1, tolerance=1e-9))
+    assert fine.points[0].parameter == worst.parameter
+    true = apart(worst, fine.points[0])
+    assert true <= 1e-5
+    assert 0.4 * true <= worst.values["state_error"] <= 3.0 * true

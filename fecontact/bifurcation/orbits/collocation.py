@@ -230,7 +230,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         """See :meth:`Problem.refined`: more intervals, distributed for the orbit ahead."""
         if self.sizes is None:
             return None
-        count = self.sizes.after(self.intervals, self._error(ahead.u), self.degree)
+        count = self.sizes.after(self.intervals, ahead.values["state_error"], self.degree)
         if count <= self.intervals:
             return None
         mesh = equidistributed(self.mesh, self.nodes(ahead.u), self.degree, count)

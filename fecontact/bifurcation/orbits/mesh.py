@@ -255,6 +255,14 @@ _LEAST_OF_SCALE, _LEAST_OF_VALUE, _LEAST_OF_ALL = 1e-2, 1e-6, 1e-11
 _MOST_REACH = 2.0
 
 
+@helper
+def _power(x, m):
+    result = x
+    for _ in range(1, m):
+        result *= x
+    return result
+
+
 @kernel(f8(vector, matrix, vector, vector))
 def _largest_error(mesh, nodes, top, scales):
     """Largest h^(m+1) |x^(m+1)| / range of all intervals and states."""
@@ -262,7 +270,15 @@ def _largest_error(mesh, nodes, top, scales):
     N = len(mesh) - 1
     total, d = nodes.shape
     m = total // N
-    ranges, most = np.empty(d), 0.0
+    ranges, slopes, powers, reaches = np.empty(d), np.empty(N), np.empty(N), np.empty(N)
+    for j in range(N):
+        after = j + 1 if j + 1 < N else 0
+        one, other = mesh[j + 1] - mesh[j], mesh[after + 1] - mesh[after]
+        powers[j] = 1.0 / _power(one, m)
+        # What a much narrower neighbour resolves does not go on through an interval.
+        reach = min(max(one, other), _MOST_REACH * min(one, other))
+        reaches[j] = 2.0 * _power(reach, m + 1) / (one + other)
+    most = 0.0
     for i in range(d):
         low, high = nodes[0, i], nodes[0, i]
         for node in range(total):
@@ -270,7 +286,7 @@ def _largest_error(mesh, nodes, top, scales):
         ranges[i] = max(high - low, _LEAST_OF_VALUE * max(abs(low), abs(high)),
                         _LEAST_OF_SCALE * scales[i])
         most = max(most, high - low)
-    slopes, worst = np.empty(N), 0.0
+    worst = 0.0
     for i in range(d):
         size = max(ranges[i], _LEAST_OF_ALL * most)
         if size == 0.0:
@@ -280,15 +296,10 @@ def _largest_error(mesh, nodes, top, scales):
             for k in range(m + 1):
                 node = j * m + k
                 value += top[k] * nodes[node if node < total else 0, i]
-            slopes[j] = value / (mesh[j + 1] - mesh[j]) ** m
+            slopes[j] = value * powers[j]
         for j in range(N):
-            width = mesh[j + 1] - mesh[j]
-            for other in (j - 1 if j > 0 else N - 1, j + 1 if j + 1 < N else 0):
-                beside = mesh[other + 1] - mesh[other]
-                derivative = 2.0 * abs(slopes[other] - slopes[j]) / (width + beside)
-                # What a much narrower neighbour resolves does not go on through this interval.
-                reach = min(width, _MOST_REACH * beside)
-                worst = max(worst, derivative * reach ** (m + 1) / size)
+            jump = abs(slopes[j + 1 if j + 1 < N else 0] - slopes[j])
+            worst = max(worst, jump * reaches[j] / size)
     return worst
 
 
