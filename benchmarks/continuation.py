@@ -147,7 +147,7 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
         print("intervals, by   points  CPU time  per point   error of fold, doubling   of its time")
         for intervals in (50,) if quick else (50, 70, 100, 200):
             task = partial(
-                orbit_branch, field, hopf, method=Collocation(intervals=intervals),
+                orbit_branch, field, hopf, method=Collocation(intervals, state_tolerance=None),
                 options=settings, bounds=(0.3, 12.0), scales=np.ones(4))
             if not quick:
                 task()

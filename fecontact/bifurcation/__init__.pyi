@@ -30,7 +30,8 @@ from .nonlinear_modes.nonlinear_mode import NonlinearMode, nonlinear_mode
 from .nonlinear_modes.resonance_curve import ResonanceCurve, resonance_curve
 from .orbit_family import orbit_family
 from .orbit_forms import with_normal_form
-from .orbits.branches import Collocation, Shooting, orbit_branch
+from .orbit_methods import Collocation, Shooting
+from .orbits.branches import orbit_branch
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fecontact.bifurcation.codim2_beside import begun
+from fecontact.bifurcation.codim2_error import with_errors
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
@@ -28,7 +29,7 @@ from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium
 from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.events.curves import border_curve
 from fecontact.bifurcation.homoclinic.starts import homoclinic_curve
-from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.bifurcation.orbits.codim2 import OrbitCurve, orbit_curve
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
@@ -211,5 +212,8 @@ def _followed(
         if grows(u - beside) > grows(u + beside):
             tangent, beside = -tangent, -beside
         u, both = u + beside, False
-    return continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
-                           attributes=attributes)
+    curve = continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
+                            attributes=attributes)
+    if not isinstance(problem, OrbitCurve):
+        return curve
+    return with_errors(problem, curve, list(options.events))

@@ -32,7 +32,8 @@ from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.equilibria.codim2 import equilibrium_curve
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales, newton
 from fecontact.bifurcation.equilibria.normal_forms import hopf
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbit_methods import Collocation
+from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
 from fecontact.core.types import Array

@@ -17,7 +17,7 @@ from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.diagram_options import BranchSettings
-    from fecontact.bifurcation.orbits.branches import Collocation, Shooting
+    from fecontact.bifurcation.orbit_methods import Collocation, Shooting
     from fecontact.system.contact_system import ContactSystem
 
 
@@ -142,8 +142,9 @@ def _orbits(
 
 def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
     """Collocation or shooting."""
-    from fecontact.bifurcation.orbits.branches import Collocation, Shooting
+    from fecontact.bifurcation.orbit_methods import Collocation, Shooting
 
     if wanted.method == "shooting":
         return Shooting(segments=wanted.segments)
-    return Collocation(intervals=wanted.intervals, tolerance=wanted.tolerance)
+    return Collocation(intervals=wanted.intervals, tolerance=wanted.tolerance,
+                       state_tolerance=wanted.state_tolerance)

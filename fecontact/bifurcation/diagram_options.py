@@ -50,6 +50,9 @@ class BranchSettings:
     tolerance : float
         For collocation: largest error of the parameter of special points, in parts of the bounds;
         they get more intervals until it is met.
+    state_tolerance : float
+        For collocation: largest error of the states of an orbit, in their ranges over it; orbits
+        get more intervals than ``intervals`` where they need them for it.
     segments : int
         For shooting: pieces of an orbit that are run for themselves; more for unstable orbits.
     transient : float, optional
@@ -84,6 +87,7 @@ class BranchSettings:
     method: Literal["collocation", "shooting"] = "collocation"
     intervals: int = 50
     tolerance: float = 1e-7
+    state_tolerance: float = 1e-5
     segments: int = 4
     transient: Annotated[float | None, Unit("s")] = None
     longest_period: Annotated[float | None, Unit("s")] = None
@@ -95,7 +99,7 @@ class BranchSettings:
     def __post_init__(self) -> None:
         require_positive("BranchSettings", step=self.step, largest_step=self.largest_step,
                          points=self.points, intervals=self.intervals, tolerance=self.tolerance,
-                         segments=self.segments)
+                         state_tolerance=self.state_tolerance, segments=self.segments)
         for name in ("transient", "longest_period"):
             if getattr(self, name) is not None:
                 require_positive("BranchSettings", **{name: getattr(self, name)})

@@ -10,8 +10,9 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of
+from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits import starts
-from fecontact.bifurcation.orbits.branches import Collocation, as_motion, attributes_of
+from fecontact.bifurcation.orbits.branches import as_motion, attributes_of
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.same_orbit import VANISHING

@@ -25,7 +25,7 @@ from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
-    from fecontact.bifurcation.orbits.branches import Method
+    from fecontact.bifurcation.orbit_methods import Method
 
 # Distance within which two points are the same: in widths of the diagram, ranges of the states, and
 # parts of a period.

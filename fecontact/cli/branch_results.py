@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 _BORN = {"supercritical": "stable orbits", "subcritical": "unstable orbits",
          "undecided": "orbits, stability undecided"}
 _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "period",
-            "frequency_hz", "minimum", "maximum", "amplitude", "criticality", "parameter_error")
+            "frequency_hz", "minimum", "maximum", "amplitude", "criticality", "parameter_error",
+            "state_error")
 
 
 def write_branch_results(
@@ -85,7 +86,8 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
                 *(repr(float(values[f"observed_{what}"]))
                   for what in ("minimum", "maximum", "amplitude")),
                 point.criticality or "",
-                "" if math.isnan(point.parameter_error) else repr(point.parameter_error)])
+                "" if math.isnan(point.parameter_error) else repr(point.parameter_error),
+                repr(float(values["state_error"])) if "state_error" in values else ""])
     return text.getvalue()
 
 

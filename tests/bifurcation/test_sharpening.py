@@ -32,7 +32,8 @@ def circle_branch(function, c, intervals, **accuracy):
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
     return orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
-                        method=Collocation(intervals=intervals, **accuracy), bounds=(-0.3, 0.3),
+                        method=Collocation(intervals=intervals, state_tolerance=None, **accuracy),
+                        bounds=(-0.3, 0.3),
                         scales=np.ones(3))
 
 
@@ -64,8 +65,9 @@ def slow_doubling():
 
     def found(intervals):
         return orbit_branch(
-            field, (times, states), "D", method=Collocation(intervals=intervals),
-            bounds=(0.03, 0.05), width=2.0, direction=-1.0, scales=np.full(4, 8.0),
+            field, (times, states), "D",
+            method=Collocation(intervals=intervals, state_tolerance=None), bounds=(0.03, 0.05),
+            width=2.0, direction=-1.0, scales=np.full(4, 8.0),
             options=ContinuationOptions(step=0.002, largest_step=0.01, points=40,
                                         stop_at=["period doubling"]))
 
@@ -149,7 +151,8 @@ def test_doublings_of_a_mesh_too_coarse_are_marked():
     """On ten intervals there are three between B = 7.8 and 8.3; the one there is lies at 8.0922."""
     field = two_masses_field(B=0.3)
     sliding = equilibrium_branch(field, np.zeros(4), "B", bounds=(0.3, 9.6))
-    branch = orbit_branch(field, sliding.of_kind("Hopf")[0], method=Collocation(intervals=10),
+    branch = orbit_branch(field, sliding.of_kind("Hopf")[0],
+                          method=Collocation(intervals=10, state_tolerance=None),
                           bounds=(0.3, 9.6), options=ContinuationOptions(step=0.005))
     fold, *others = branch.special
     assert fold.kind == "fold"
@@ -247,7 +250,7 @@ def test_default_settings_locate_a_doubling_to_a_tenmillionth_of_the_diagram(tmp
     said = dict(branch.summary())["special"]
     assert said == (f"fold at 0.890686833041 +- {fold.parameter_error:.1g}, period doubling at "
                     f"{doubling.parameter_text()}")
-    assert re.fullmatch(r"8\.09219\d+ \+- \de-0\d", doubling.parameter_text())
+    assert re.fullmatch(r"8\.0921923\d+ \+- \de-(0\d|10)", doubling.parameter_text())
     loaded = read_branch(write_branch(tmp_path / "branch.h5", branch))
     for mine, theirs in zip(branch, loaded, strict=True):
         assert theirs.u.tolist() == mine.u.tolist()

@@ -77,8 +77,19 @@ class Branch(Summarised):
             ("points", f"{len(self)}"),
             ("special", listed(special, 5)),
             *([("stable", f"{sum(known)} of {len(known)} regular points")] if known else []),
+            *self._accuracy(),
             ("end", self.status.name.lower()),
         ]
+
+    def _accuracy(self) -> list[tuple[str, str]]:
+        """Error of the states and intervals of orbits by collocation."""
+        found = [point.values for point in self.points if "state_error" in point.values]
+        if not found:
+            return []
+        counts = [len(values["mesh"]) - 1 for values in found]
+        few, many = min(counts), max(counts)
+        return [("state error", f"{max(float(values['state_error']) for values in found):.1e} or "
+                 f"less, on {few if few == many else f'{few} to {many}'} intervals")]
 
     @property
     def parameter(self) -> Array:

@@ -247,9 +247,15 @@ class BranchPoint:
     def parameter_error(self) -> float:
         """Error of a special point's parameter; NaN where it is not estimated.
 
-        On branches of orbits by collocation it is the change of the parameter on a finer mesh.
+        On branches and curves of orbits by collocation it is the change of the parameter on a finer
+        mesh.
         """
         return float(self._details.get("parameter_error", np.nan))
+
+    @property
+    def second_parameter_error(self) -> float:
+        """The same of the second parameter, on curves of orbits over two."""
+        return float(self._details.get("second_parameter_error", np.nan))
 
     def parameter_text(self, digits: int = 7) -> str:
         """The parameter; with its error where that is estimated, and the digits that it leaves."""

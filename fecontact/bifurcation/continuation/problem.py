@@ -200,6 +200,15 @@ class Problem(Protocol):
         """
         return None
 
+    def refined(
+        self, u: Array, tangent: Array, ahead: Any
+    ) -> "tuple[Problem, Array, Array] | None":
+        """Problem, u and tangent on a finer mesh, to make the step to a solution once more.
+
+        ``ahead`` is the :class:`Solution` that the step led to; None where it is accurate enough.
+        """
+        return None
+
     def strider(self, options: "ContinuationOptions") -> Strider | None:
         """What makes plain steps of a branch faster than one by one."""
         return None

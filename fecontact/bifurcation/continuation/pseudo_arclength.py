@@ -88,7 +88,8 @@ def continuation(
         If there is no solution near the start.
     """
     u = np.append(u[:-1], inside(float(u[-1]), options))
-    start = start_of(problem, u, options, tangent, direction)
+    problem, start = _resolved(
+        problem, start_of(problem, u, options, tangent, direction), options, tangent, direction)
     yield BranchPoint(start.u, start.tangent, start.values)
     if _leaves(start, options):
         return End(BranchStatus.BOUND)
@@ -127,6 +128,11 @@ def continuation(
             if step < options.smallest_step:
                 return End(BranchStatus.STALLED, message)
             continue
+        finer = problem.refined(here.u, here.tangent, reached[-1][0])
+        if finer is not None:
+            problem, here = _moved(here, *finer)
+            before = None
+            continue
         last = here
         for there, special in reached:
             for located in special:
@@ -156,12 +162,34 @@ def continuation(
         halved = 0
         adapted = problem.adapted(here.u, here.tangent)
         if adapted is not None:
-            problem, moved, turned = adapted
-            turned = turned / norm(problem, turned)
-            if not np.array_equal(moved, here.u):
+            if not np.array_equal(adapted[1], here.u):
                 before = None
-            here = Solution(moved, here.linearisation, turned, 0, here.values, here.tests)
+            problem, here = _moved(here, *adapted)
     return End(BranchStatus.POINTS)
+
+
+def _moved(
+    here: Solution, problem: Problem, u: Array, tangent: Array
+) -> tuple[Problem, Solution]:
+    """A solution on the mesh of a problem; with as many unknowns its equations still serve."""
+    known = here.linearisation if len(u) == len(here.u) else problem.linearise(u)
+    return problem, Solution(u, known, tangent / norm(problem, tangent), 0, here.values,
+                             here.tests)
+
+
+def _resolved(
+    problem: Problem, start: Solution, options: ContinuationOptions, tangent: Array | None,
+    direction: float,
+) -> tuple[Problem, Solution]:
+    """The start on a mesh that is fine enough for it, as far as Newton's method leads there."""
+    while (finer := problem.refined(start.u, start.tangent, start)) is not None:
+        try:
+            start = start_of(finer[0], finer[1], options,
+                             None if tangent is None else finer[2], direction)
+        except FecontactError:
+            break
+        problem = finer[0]
+    return problem, start
 
 
 def inside(value: float, options: ContinuationOptions) -> float:

@@ -25,6 +25,7 @@ from fecontact.bifurcation.continuation.points import (
     unresolved,
     with_details,
 )
+from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import ContinuationOptions, continuation
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import FLAT
@@ -102,7 +103,7 @@ def sharpened(
     mesh = equidistributed(problem.mesh, problem.nodes(u), problem.degree, problem.intervals)
     _, start, _ = problem.on_mesh(mesh, start, tangent)
     place = _unit(*problem.on_mesh(mesh, u, tangent))
-    found = _found(place, kind) or _found_from(place, start, kind)
+    found = found_near(place, kind) or _found_from(place, start, kind)
     here = place if found is None else (place[0], found.u, place[2])
     located = _Located(kind, [found or with_details(point, located=False)], here,
                        float(problem.scales[-1]), accuracy)
@@ -148,7 +149,7 @@ class _Located:
         """The point on twice the intervals; None if it is not found there."""
         problem, u, tangent = self.place
         self.place = _with_twice_the_intervals(problem, u, tangent)
-        finer = _found(self.place, self.kind)
+        finer = found_near(self.place, self.kind)
         self.found = finer is not None
         if finer is not None:
             self.points.append(finer)
@@ -188,7 +189,7 @@ def _unit(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
     return problem, u, tangent / norm(problem, tangent)
 
 
-def _found(place: Place, kind: str) -> BranchPoint | None:
+def found_near(place: tuple[Problem, Array, Array], kind: str) -> BranchPoint | None:
     """The special point near a place; None if no search finds it."""
     _, u, tangent = place
     for near in _DISTANCES:
@@ -205,7 +206,9 @@ def _found_from(place: Place, start: Array, kind: str) -> BranchPoint | None:
     return _searched(place, start, 1.2 * away, kind) if away > 0.0 else None
 
 
-def _searched(place: Place, start: Array, length: float, kind: str) -> BranchPoint | None:
+def _searched(
+    place: tuple[Problem, Array, Array], start: Array, length: float, kind: str
+) -> BranchPoint | None:
     """The special point nearest to a place on a piece of the branch."""
     problem, u, tangent = place
     row, weights = problem.weights() * tangent, problem.weights()

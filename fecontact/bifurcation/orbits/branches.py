@@ -1,8 +1,8 @@
 """Branches of periodic orbits from any start, by any of the three methods."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias, TypeVar
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,108 +21,28 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
 from fecontact.bifurcation.harmonic import branches as harmonic_branches
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
 from fecontact.bifurcation.orbits import shooting_branches, starts
-from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
+from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
+from fecontact.bifurcation.orbits.mesh import state_error
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
-from fecontact.bifurcation.orbits.shooting import require_segments
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import FecontactError, InputError, require_finite, require_positive
+from fecontact.core.errors import FecontactError, InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
-from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Factors of the first step, tried in this order to leave a special point.
 _FIRST_STEPS = (1.0, 0.2, 0.04)
+# Largest tolerance of Newton's method, in that of the states.
+_NEWTON = 1e-2
 # Special points of orbits at which other orbits branch off.
 _BRANCHING = ("period doubling", "branch point")
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Collocation:
-    """Orthogonal collocation at Gauss points on an adaptive mesh, for any vector field.
-
-    Parameters
-    ----------
-    intervals : int
-        Number of mesh intervals, at least 2.
-    degree : int
-        Degree of the polynomial on each interval, 2 to 7.
-    tolerance : float
-        Largest error of the parameter of special points, in widths of the diagram: each is located
-        again on twice the intervals until its ``parameter_error`` is smaller, up to
-        ``most_intervals``. It then keeps the mesh that suffices.
-    most_intervals : int
-        Limit for that.
-
-    Raises
-    ------
-    InputError
-        If these cannot be used.
-    """
-
-    intervals: int = 50
-    degree: int = 4
-    tolerance: float = 1e-7
-    most_intervals: int = 800
-
-    def __post_init__(self) -> None:
-        require_mesh(self.intervals, self.degree)
-        require_positive("Collocation", tolerance=self.tolerance)
-        if not (isinstance(self.most_intervals, int | np.integer) and self.most_intervals >= 2):
-            raise InputError(f"Collocation: most_intervals = {self.most_intervals!r} must be a "
-                             f"whole number of at least 2.")
-
-
-@dataclass(frozen=True)
-class Shooting:
-    """Multiple shooting with the compiled integrator, for contact systems only.
-
-    Suited to steep friction, impacts and many states, where collocation needs many intervals.
-    Extremes are those of samples; normal forms by ``with_normal_form``, none of set-valued orbits.
-
-    Parameters
-    ----------
-    segments : int
-        Number of segments of the period, integrated separately; use more for unstable orbits.
-    rtol : float
-        Relative tolerance of the runs.
-    derivative_rtol : float, optional
-        Relative tolerance of the derivatives, as for :func:`fecontact.sensitivity`. With many
-        fast modes that the motion hardly excites, 1e-2 saves most of the time and affects only
-        their small multipliers; with impacts it makes all multipliers inaccurate.
-    solver : Rodas5P or SetValued
-        What runs the segments. With SetValued orbits have friction without smoothing, from a motion
-        of the same solver; they go from event to event, whatever ``segments`` says, where their
-        events are known (docs/set-valued.md), else derivatives are differences of its runs.
-
-    Raises
-    ------
-    InputError
-        If these cannot be used.
-    """
-
-    segments: int = 4
-    rtol: float = 1e-9
-    derivative_rtol: float | None = None
-    solver: Solver = RODAS5P
-
-    def __post_init__(self) -> None:
-        require_segments(self.segments)
-        if not isinstance(self.solver, Rodas5P | SetValued):
-            raise InputError(f"Shooting: solver = {self.solver!r} must be Rodas5P() or "
-                             f"SetValued().")
-        require_positive("Shooting", rtol=self.rtol)
-        if self.derivative_rtol is not None:
-            require_positive("Shooting", derivative_rtol=self.derivative_rtol)
-
-
-Method: TypeAlias = Collocation | Shooting | HarmonicBalance
 
 
 def orbit_branch(
@@ -136,9 +56,9 @@ def orbit_branch(
     """Follow periodic orbits over a parameter.
 
     Points store 'period' [s], 'multipliers' (d,), 'unstable' (number outside the unit circle),
-    'stable', 'trivial_error', 'mesh' (N + 1,), 'minimum' and 'maximum' (d,). Special points are
-    'fold', 'period doubling', 'Neimark-Sacker', 'branch point', 'period halving' and 'unresolved';
-    see docs/orbits.md.
+    'stable', 'trivial_error', 'mesh' (N + 1,), 'minimum' and 'maximum' (d,), by collocation also
+    'state_error'. Special points are 'fold', 'period doubling', 'Neimark-Sacker', 'branch point',
+    'period halving' and 'unresolved'; see docs/orbits.md.
 
     Parameters
     ----------
@@ -245,7 +165,8 @@ def _method_of(point: BranchPoint) -> Method:
     # Special points may have more intervals than their branch.
     return Collocation(int(known.get("intervals", len(point.values["mesh"]) - 1)),
                        int(known["degree"]), float(known.get("tolerance", usual.tolerance)),
-                       int(known.get("most_intervals", usual.most_intervals)))
+                       int(known.get("most_intervals", usual.most_intervals)),
+                       known.get("state_tolerance"))
 
 
 def _keeps(point: BranchPoint, method: Method | None) -> bool:
@@ -367,7 +288,7 @@ def _beyond(
     assert isinstance(usual, Collocation)
     intervals = usual.intervals * (2 if point.kind == "period doubling" else 1)
     chosen = method if isinstance(method, Collocation) else replace(usual, intervals=intervals)
-    problem, u, tangent = starts.on_intervals(found, chosen.intervals)
+    problem, u, tangent = _on_own_intervals(found, chosen)
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
 
     # At the point both branches are indistinguishable, and the new one may bend strongly: step off
@@ -398,9 +319,26 @@ def _goes_on(
     problem, u, tangent = restored(field, point)
     problem = replace(rescaled(problem, scales, width), limits=limits)
     chosen: Any = method if isinstance(method, Collocation) else _method_of(point)
-    problem, u, tangent = starts.on_intervals((problem, u, tangent), chosen.intervals)
+    problem, u, tangent = _on_own_intervals((problem, u, tangent), chosen)
     problem, u, tangent = problem.adapted(u, sign * tangent)
     return _followed((problem, u, tangent), chosen, options, limits, both=both)
+
+
+def _on_own_intervals(start: starts.Start, method: Collocation) -> starts.Start:
+    """The start on the intervals of the method, or on more where its orbit needs them."""
+    problem, u, _ = start
+    count, sizes = method.intervals, _sizes(method)
+    if sizes is not None:
+        error = state_error(problem.mesh, problem.nodes(u), problem.degree, problem.scales)
+        count = sizes.at_start(problem.intervals, error, problem.degree)
+    return starts.on_intervals(start, count)
+
+
+def _sizes(method: Collocation) -> Intervals | None:
+    """Numbers of intervals along a branch; None where they are kept."""
+    if method.state_tolerance is None:
+        return None
+    return Intervals(int(method.intervals), int(method.most_intervals), method.state_tolerance)
 
 
 def attributes_of(problem: CollocationProblem, limits: Array | None) -> dict[str, Any]:
@@ -421,13 +359,19 @@ def _followed(
     problem, u, tangent = start
     field = problem.field
     attributes = attributes_of(problem, limits) | {
-        "tolerance": method.tolerance, "most_intervals": method.most_intervals}
+        "intervals": int(method.intervals), "tolerance": method.tolerance,
+        "most_intervals": method.most_intervals}
+    newton = options.tolerance
+    if method.state_tolerance is not None:
+        attributes["state_tolerance"] = method.state_tolerance
+        newton = min(newton, _NEWTON * method.state_tolerance)
     name = list(field.parameters)[problem.free]
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
-    ended = replace(options, stop_at=[*stops, HALVING])
+    ended = replace(options, stop_at=[*stops, HALVING], tolerance=newton)
     # Locate special points coarsely here; they are refined below on meshes of their own.
-    branch = continue_branch(replace(problem, limits=limits, precision=ROUGHLY), u, ended,
-                             name=name, tangent=tangent, attributes=attributes, **how)
+    problem = replace(problem, limits=limits, precision=ROUGHLY, sizes=_sizes(method))
+    branch = continue_branch(problem, u, ended, name=name, tangent=tangent, attributes=attributes,
+                             **how)
     if branch.points[-1].kind == HALVING and HALVING not in stops:
         branch = replace(branch, status=BranchStatus.CLOSED)
     points = list(branch.points)

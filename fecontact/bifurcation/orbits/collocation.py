@@ -1,12 +1,13 @@
 """Continuation problem of periodic orbits by orthogonal collocation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.floquet import FloquetTests
@@ -14,6 +15,7 @@ from fecontact.bifurcation.orbits.mesh import (
     carry_over,
     equidistributed,
     extremes,
+    state_error,
 )
 from fecontact.bifurcation.orbits.normal_forms import examined
 from fecontact.bifurcation.orbits.same_orbit import (
@@ -32,6 +34,63 @@ from fecontact.core.types import Array
 _MOST_BENT = 0.2
 # Largest relative difference in amplitude of the same orbit on two meshes.
 _AMPLITUDE_CHANGE = 0.1
+# Error aimed at with other intervals, in the tolerance, and the part of them below which fewer do.
+_AIM, _FEWER = 0.1, 0.65
+# Largest factor between the intervals of one mesh and the next.
+_MOST_CHANGE = 2.0
+# Steps in a row that have to allow fewer intervals: where a motion begins to stick, errors vary.
+_CALM = 10
+# Numbers of intervals are multiples of this: so many are eliminated at once.
+_AT_ONCE = 8
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """How many intervals orbits get along a branch.
+
+    Attributes
+    ----------
+    least, most : int
+        Limits of their number.
+    tolerance : float
+        Largest error of the states, see :func:`fecontact.bifurcation.orbits.mesh.state_error`.
+    """
+
+    least: int
+    most: int
+    tolerance: float
+
+    def after(self, given: int, error: float, degree: int) -> int:
+        """Number of intervals for orbits like one that has this error on so many.
+
+        More where it is above the tolerance, fewer where two thirds of them would leave it a
+        tenth of that, else as many.
+        """
+        wanted = self._wanted(given, error, degree)
+        if error > self.tolerance:
+            wanted = min(wanted, _MOST_CHANGE * given)
+        elif wanted < _FEWER * given:
+            wanted = max(wanted, given / _MOST_CHANGE)
+        else:
+            return given
+        return min(max(_whole(wanted), self.least), max(self.most, given))
+
+    def at_start(self, given: int, error: float, degree: int) -> int:
+        """The least number for an orbit that has this error on so many, if it is accurate enough.
+
+        Else as many as a tenth of the tolerance needs, but none more than given.
+        """
+        on_least = error * (given / self.least) ** (degree + 1)
+        if given <= self.least or not on_least > self.tolerance:
+            return self.least
+        return min(_whole(self._wanted(given, error, degree)), given)
+
+    def _wanted(self, given: int, error: float, degree: int) -> float:
+        return float(given * (error / (_AIM * self.tolerance)) ** (1.0 / (degree + 1)))
+
+
+def _whole(wanted: float) -> int:
+    return _AT_ONCE * int(np.ceil(wanted / _AT_ONCE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +112,10 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     before : tuple of (n,) arrays
         u and tangent at the start of the last step and, after the first step, the derivative of
         the tangent along the branch; empty before the first step.
+    sizes : Intervals, optional
+        Of orbits along the branch; None keeps their number.
+    calm : int
+        Steps in a row after which fewer of them would have done.
     """
 
     age: int = 0
@@ -60,6 +123,8 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     limits: Array | None = None
     precision: float = 1e-12
     before: tuple[Array, ...] = ()
+    sizes: Intervals | None = None
+    calm: int = 0
 
     keeps_matrix: ClassVar[bool] = True
     confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
@@ -74,13 +139,16 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return CollocationLinearisation(self, u, "nothing")
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
-        """Period, stability, mesh and the extremes of the states."""
+        """Period, stability, mesh, the extremes of the states and their error."""
         stability = linearisation.floquet
         low, high = extremes(self.nodes(u), self.degree)
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
-                "maximum": high}
+                "maximum": high, "state_error": self._error(u)}
+
+    def _error(self, u: Array) -> float:
+        return state_error(self.mesh, self.nodes(u), self.degree, self.scales)
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -144,13 +212,47 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         """The problem for the next step: phase condition at u, periodically a new mesh."""
         bend = self._bend(u, tangent)
         vectors = [u, tangent] if bend is None else [u, tangent, bend]
-        mesh, age = self.mesh, self.age + 1
-        if self.renewal and age >= self.renewal:
-            mesh, age = equidistributed(mesh, self.nodes(u), self.degree, self.intervals), 0
+        mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
+        if self.sizes is not None:
+            fewer = min(count, self.sizes.after(count, self._error(u), self.degree))
+            calm = self.calm + 1 if fewer < count else 0
+            count = fewer if calm >= _CALM else count
+        if (self.renewal and age >= self.renewal) or count < self.intervals:
+            mesh, age = equidistributed(mesh, self.nodes(u), self.degree, count), 0
             vectors = self._on_other_mesh(mesh, vectors)
-        problem = replace(self, mesh=mesh, age=age, reference=self.nodes(vectors[0]).copy(),
-                          scales=self._grown(u), before=tuple(vectors))
+        problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, vectors[0]),
+                          scales=self._grown(u), before=tuple(vectors), calm=calm)
         return problem, vectors[0], vectors[1]
+
+    def refined(
+        self, u: Array, tangent: Array, ahead: Solution
+    ) -> tuple["CollocationProblem", Array, Array] | None:
+        """See :meth:`Problem.refined`: more intervals, distributed for the orbit ahead."""
+        if self.sizes is None:
+            return None
+        count = self.sizes.after(self.intervals, ahead.values["state_error"], self.degree)
+        if count <= self.intervals:
+            return None
+        mesh = equidistributed(self.mesh, self.nodes(ahead.u), self.degree, count)
+        vectors = self._on_other_mesh(mesh, [u, tangent, *self.before[2:]])
+        problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, vectors[0]),
+                          before=tuple(vectors) if self.before else (), calm=0)
+        return problem, vectors[0], vectors[1]
+
+    def note(self, points: Sequence[BranchPoint]) -> str:
+        """Where multipliers are lost, and where the most intervals leave too large an error."""
+        said = super().note(points)
+        if self.sizes is None:
+            return said
+        poor = [point for point in points if point.values["state_error"] > self.sizes.tolerance]
+        if not poor:
+            return said
+        worst = max(poor, key=lambda point: float(point.values["state_error"]))
+        return " ".join(filter(None, (said, (
+            f"The states of {len(poor)} of {len(points)} orbits are less accurate than "
+            f"state_tolerance = {self.sizes.tolerance:g}, off by up to "
+            f"{worst.values['state_error']:.1e} at the parameter {worst.parameter:.6g}: allow more "
+            f"than most_intervals = {self.sizes.most}."))))
 
     def _bend(self, u: Array, tangent: Array) -> Array | None:
         """Derivative of the tangent along the branch, from the last step."""
@@ -175,9 +277,13 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     ) -> tuple["CollocationProblem", Array, Array]:
         """Problem, u and tangent on another mesh."""
         moved, turned = self._on_other_mesh(mesh, [u, tangent])
-        nodal = (len(mesh) - 1) * self.degree * self.field.dimension
-        reference = moved[:nodal].reshape(-1, self.field.dimension).copy()
-        return replace(self, mesh=mesh, age=0, reference=reference, before=()), moved, turned
+        return replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved),
+                       before=()), moved, turned
+
+    def _nodes_on(self, mesh: Array, u: Array) -> Array:
+        """Copy of the nodes (N m, d) of an orbit on another mesh."""
+        d = self.field.dimension
+        return u[: (len(mesh) - 1) * self.degree * d].reshape(-1, d).copy()
 
     def _on_other_mesh(self, mesh: Array, vectors: list[Array]) -> list[Array]:
         """Vectors like u on another mesh."""

@@ -1,0 +1,63 @@
+"""Errors of the special points of curves of orbits over two parameters, from a finer mesh."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
+from fecontact.bifurcation.continuation.newton import norm
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import with_details
+from fecontact.bifurcation.continuation.sharpening import found_near
+from fecontact.bifurcation.orbits.codim2 import OrbitCurve
+from fecontact.bifurcation.orbits.curves.criticality import ContinuedSign
+from fecontact.bifurcation.orbits.mesh import equidistributed
+from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.core.types import Array
+
+
+class Finer(NamedTuple):
+    """A curve on a finer mesh, unknowns and tangent."""
+
+    problem: OrbitCurve
+    u: Array
+    tangent: Array
+
+
+def with_errors(curve: OrbitCurve, branch: Branch, events: Sequence[str]) -> Branch:
+    """The special points with the change of both parameters on twice the intervals as their errors.
+
+    Points that are not found there are not ``located``, and the branch's message tells of them.
+    """
+    points, missing = list(branch.points), []
+    try:
+        for index, point in enumerate(points):
+            if point.kind is None or point.kind == HALVING or point.kind in events:
+                continue
+            finer = found_near(_on_twice(curve, point), point.kind)
+            if finer is None:
+                points[index] = with_details(point, located=False)
+                missing.append(f"{point.kind} at {point.parameter:.6g}")
+                continue
+            first, second = (abs(float(finer.u[place] - point.u[place])) for place in (-1, -2))
+            points[index] = with_details(point, parameter_error=first,
+                                         second_parameter_error=second)
+    except KeyboardInterrupt:
+        branch = replace(branch, status=BranchStatus.INTERRUPTED)
+    said = (f"On twice the intervals these special points are not found nearby: "
+            f"{', '.join(missing)}." if missing else "")
+    return replace(branch, points=tuple(points),
+                   message=" ".join(filter(None, (branch.message, said))))
+
+
+def _on_twice(curve: OrbitCurve, point: BranchPoint) -> Finer:
+    """The curve near a point, on twice its intervals."""
+    mesh, d = np.asarray(point.values["mesh"], dtype=float), curve.orbit.field.dimension
+    nodes = point.u[: (len(mesh) - 1) * curve.orbit.degree * d].reshape(-1, d).copy()
+    orbit = replace(curve.orbit, mesh=mesh, reference=nodes, before=(), renewal=0)
+    twice = equidistributed(mesh, orbit.nodes(point.u), orbit.degree, 2 * orbit.intervals)
+    orbit, u, tangent = orbit.on_mesh(twice, point.u, point.tangent)
+    problem = replace(curve, orbit=orbit, sign=ContinuedSign())
+    return Finer(problem, u, tangent / norm(problem, tangent))

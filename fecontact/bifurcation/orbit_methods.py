@@ -1,0 +1,102 @@
+"""Options of the methods that follow periodic orbits."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.orbits.collocation import require_mesh
+from fecontact.bifurcation.orbits.shooting import require_segments
+from fecontact.core.errors import InputError, require_positive
+from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
+
+
+@dataclass(frozen=True)
+class Collocation:
+    """Orthogonal collocation at Gauss points on an adaptive mesh, for any vector field.
+
+    Parameters
+    ----------
+    intervals : int
+        Least number of mesh intervals, at least 2.
+    degree : int
+        Degree of the polynomial on each interval, 2 to 7.
+    tolerance : float
+        Largest error of the parameter of special points, in widths of the diagram: each is located
+        again on twice the intervals until its ``parameter_error`` is smaller, up to
+        ``most_intervals``. It then keeps the mesh that suffices.
+    most_intervals : int
+        Limit for that, and for the intervals of all other points.
+    state_tolerance : float, optional
+        Largest error of the states of an orbit between the ends of intervals, in their ranges over
+        it: where the estimate 'state_error' exceeds it, a point is found again on more intervals,
+        which become fewer again where that leaves a tenth of it. None keeps ``intervals``.
+        Newton's method ends with steps of a hundredth of it at most.
+
+    Raises
+    ------
+    InputError
+        If these cannot be used.
+    """
+
+    intervals: int = 50
+    degree: int = 4
+    tolerance: float = 1e-7
+    most_intervals: int = 800
+    state_tolerance: float | None = 1e-5
+
+    def __post_init__(self) -> None:
+        require_mesh(self.intervals, self.degree)
+        require_positive("Collocation", tolerance=self.tolerance)
+        if not (isinstance(self.most_intervals, int | np.integer) and self.most_intervals >= 2):
+            raise InputError(f"Collocation: most_intervals = {self.most_intervals!r} must be a "
+                             f"whole number of at least 2.")
+        if self.state_tolerance is not None:
+            require_positive("Collocation", state_tolerance=self.state_tolerance)
+
+
+@dataclass(frozen=True)
+class Shooting:
+    """Multiple shooting with the compiled integrator, for contact systems only.
+
+    Suited to steep friction, impacts and many states, where collocation needs many intervals.
+    Extremes are those of samples; normal forms by ``with_normal_form``, none of set-valued orbits.
+
+    Parameters
+    ----------
+    segments : int
+        Number of segments of the period, integrated separately; use more for unstable orbits.
+    rtol : float
+        Relative tolerance of the runs.
+    derivative_rtol : float, optional
+        Relative tolerance of the derivatives, as for :func:`fecontact.sensitivity`. With many
+        fast modes that the motion hardly excites, 1e-2 saves most of the time and affects only
+        their small multipliers; with impacts it makes all multipliers inaccurate.
+    solver : Rodas5P or SetValued
+        What runs the segments. With SetValued orbits have friction without smoothing, from a motion
+        of the same solver; they go from event to event, whatever ``segments`` says, where their
+        events are known (docs/set-valued.md), else derivatives are differences of its runs.
+
+    Raises
+    ------
+    InputError
+        If these cannot be used.
+    """
+
+    segments: int = 4
+    rtol: float = 1e-9
+    derivative_rtol: float | None = None
+    solver: Solver = RODAS5P
+
+    def __post_init__(self) -> None:
+        require_segments(self.segments)
+        if not isinstance(self.solver, Rodas5P | SetValued):
+            raise InputError(f"Shooting: solver = {self.solver!r} must be Rodas5P() or "
+                             f"SetValued().")
+        require_positive("Shooting", rtol=self.rtol)
+        if self.derivative_rtol is not None:
+            require_positive("Shooting", derivative_rtol=self.derivative_rtol)
+
+
+Method: TypeAlias = Collocation | Shooting | HarmonicBalance
