@@ -12,7 +12,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import with_details
 from fecontact.bifurcation.continuation.sharpening import found_near
 from fecontact.bifurcation.orbits.codim2 import OrbitCurve
-from fecontact.bifurcation.orbits.curves.criticality import ContinuedSign
+from fecontact.bifurcation.orbits.curves.singularity import ContinuedSign
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.core.types import Array

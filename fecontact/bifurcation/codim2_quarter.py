@@ -5,7 +5,8 @@ import numpy as np
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import FoldPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.orbits.branches import Collocation, orbit_branch
+from fecontact.bifurcation.orbit_methods import Collocation
+from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.singularity import of_torus

@@ -172,9 +172,9 @@ def _elimination(
 ) -> tuple[Integers, Integers, Integers]:
     """Places of the modes, first place of each block, and reach, in an order of narrow band."""
     if len(modes) == 1:
-        last = modes[0][1]
-        return (np.arange(last, dtype=np.int64), np.zeros(1, dtype=np.int64),
-                np.full((2, last), last, dtype=np.int64))
+        count = modes[0][1]
+        return (np.arange(count, dtype=np.int64), np.zeros(1, dtype=np.int64),
+                np.full((2, count), count, dtype=np.int64))
     order = reverse_cuthill_mckee(csr_array(coupled), symmetric_mode=True)
     sizes = np.array([last - first for first, last in modes])
     ends = np.cumsum(sizes[order])

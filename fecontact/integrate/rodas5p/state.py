@@ -238,7 +238,7 @@ def room_for(modes: int, nodes: int, states: int, dimension: int, blocks: Blocks
         near_blocks(blocks), np.zeros(nodes + 1),
         np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
         stage, right, base, time_rate, after, rate_after,
-        *np.zeros((2, 3, columns)), np.zeros((2, columns)), np.zeros(motion.GIVEN),
+        np.zeros((3, columns)), np.zeros((3, columns)), np.zeros((2, columns)), np.zeros(motion.GIVEN),
         np.zeros(modes), np.zeros(modes),
         np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)),
         stage_solver.reduced_for(modes, nodes, states, dimension),
