@@ -111,7 +111,8 @@ def test_folds_and_bound_are_met_in_one_call(largest, monkeypatch):
         exact = place in (*places, len(found) - 1)
         assert np.abs(here.residual).max() < (1e-10 if exact else 1e-7)
         scaled = np.abs(here.condensed * tangent).sum(axis=1)
-        assert np.abs(here.condensed @ tangent).max() < 1e-4 * scaled.max()
+        # Tangents of other points are those at the prediction of the step.
+        assert np.abs(here.condensed @ tangent).max() < (1e-8 if exact else 2e-3) * scaled.max()
 
 
 def test_a_branch_stops_at_a_fold():

@@ -48,7 +48,9 @@ def problem_for(
         field, values.copy(), free, method.harmonics, method.count,
         np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout, periods,
         *timing_of(field, values, free), kept, stability=method.stability, limits=limits)
-    return replace(found, compiled=CompiledBalance.of(found))
+    # The problem is new: nobody has it yet.
+    object.__setattr__(found, "compiled", CompiledBalance.of(found))
+    return found
 
 
 def unknowns(problem: HarmonicProblem, states: Array, period: float) -> Array:

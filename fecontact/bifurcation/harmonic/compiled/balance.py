@@ -141,9 +141,9 @@ class CompiledBalance:
         """Whether contact forces depend neither on the parameter nor on time."""
         ground = self.contact_field.system().ground
         return not ground.wavy and ground.friction_variation is None and not any(
-            np.may_share_memory(array, near.flat)
-            for name, array in near.arrays._asdict().items()
-            if isinstance(array, np.ndarray) and name not in _OF_BODY)
+            isinstance(array, np.ndarray) and array.base is not None and name not in _OF_BODY
+            and np.may_share_memory(array, near.flat)
+            for name, array in zip(near.arrays._fields, near.arrays, strict=True))
 
 
     def _plain(self, near: AffineArrays) -> bool:
