@@ -205,7 +205,7 @@ class Problem(Protocol):
     ) -> "tuple[Problem, Array, Array] | None":
         """Problem, u and tangent on a finer mesh, to make the step to a solution once more.
 
-        ``ahead`` is the :class:`Solution` that the step led to; None where it is accurate enough.
+        ``ahead`` is the solution that the step led to; None where it is accurate enough.
         """
         return None
 
