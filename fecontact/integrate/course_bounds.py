@@ -110,7 +110,7 @@ def _restless_modes(step, problem, progress, room):
         set_heights(motion.motion_given(room.given), s, bounds, nodes[0], ends[2, n : 2 * n])
     later = room.given[motion.SPEED]
     some = False
-    for at in range(near.count[0]):
+    for at in range(near.used[0]):
         j = near.nodes[at]
         move, quicken = 0.0, 0.0
         for span in range(blocks.spans.shape[1]):

@@ -72,7 +72,7 @@ def set_end(problem, progress, room):
     s, near = problem.system, room.near
     n = len(s.gap)
     extend_near(room.after, problem, progress, room)
-    every = near.count[0] == n
+    every = near.used[0] == n
     dynamics.set_rate_and_gradients(room.after, s, near, room.given, room.load,
                                     room.nodes if every else room.slots, room.gradients_after,
                                     room.rate_after)
@@ -81,7 +81,7 @@ def set_end(problem, progress, room):
     dynamics.project(problem.blocks, room.after, room.nodes[0], room.nodes[1])
     for j in range(room.nodes.shape[1]):
         room.nodes[2, j] = 0.0
-    for at in range(near.count[0]):
+    for at in range(near.used[0]):
         room.nodes[2, n + near.nodes[at]] = room.slots[2, n + at]
 
 
@@ -101,9 +101,9 @@ def _take(reach, blocks, room):
             near.nodes[found] = j
             found += 1
     clearance[n] = left_out
-    if same == found and found == near.count[0]:
+    if same == found and found == near.used[0]:
         return
-    near.count[0] = found
+    near.used[0] = found
     for i in range(len(near.shapes)):
         here, there = near.shapes[i], blocks.shapes[i]
         for first in range(0, len(here), n):
@@ -127,7 +127,7 @@ def _set_columns(table, out, column, near):
 @helper
 def _number_below(j, near):
     """How many of the near nodes have a lower number than j."""
-    low, high = 0, near.count[0]
+    low, high = 0, near.used[0]
     while low < high:
         middle = (low + high) // 2
         if near.nodes[middle] < j:

@@ -99,7 +99,7 @@ def test_results_are_those_of_all_nodes(case, work):
     assert n > FEW
     counts, closed = [], []
     while own.advance(3) == 0:
-        counts.append(int(own.room.near.count[0]))
+        counts.append(int(own.room.near.used[0]))
         closed.append(np.flatnonzero(own.progress.gradients.partial[:, 0].any(axis=1)))
         assert set(closed[-1]) <= set(own.room.near.nodes[: counts[-1]].tolist())
     other.advance(10**6)
@@ -107,7 +107,7 @@ def test_results_are_those_of_all_nodes(case, work):
     assert min(counts) < 0.6 * n
     assert max(map(len, closed)) > 0.8 * n
     assert own.statistics == other.statistics
-    assert other.room.near.count[0] == n
+    assert other.room.near.used[0] == n
     for name in ("states", "work"):
         a, b = getattr(own, name), getattr(other, name)
         assert np.abs(a - b).max() <= 1e-8 * np.abs(b).max(), name
@@ -133,10 +133,10 @@ def test_states_far_from_the_start_find_their_nodes():
     counts = []
     for size in 10.0 ** rng.uniform(-9.0, -4.0, 40):
         near_nodes.choose_near(1e-12, problem, progress, room)
-        before = near.nodes[: near.count[0]].tolist()
+        before = near.nodes[: near.used[0]].tolist()
         y = progress.state + size * rng.normal(size=10)
         near_nodes.extend_near(y, problem, progress, room)
-        k = near.count[0]
+        k = near.used[0]
         found = near.nodes[:k].tolist()
         touching = np.flatnonzero(problem.system.Ty @ y[:5] + problem.system.gap < 0.0).tolist()
         assert set(before) | set(touching) <= set(found)
@@ -170,7 +170,7 @@ def test_nodes_with_memory_and_derivatives_take_all_nodes():
                 driver.start(*beam(), np.array([0.0, 1e-3]), rtol=1e-5, vary=True)):
         assert np.isneginf(run.problem.control.untouched).all()
         run.advance(5)
-        assert run.room.near.count[0] == NODES
+        assert run.room.near.used[0] == NODES
 
 
 @pytest.mark.parametrize(("rows", "columns", "length"), [

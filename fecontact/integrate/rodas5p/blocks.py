@@ -26,8 +26,8 @@ class Blocks(NamedTuple):
 
     Attributes
     ----------
-    nodes, count : (n,), (1,) integer arrays
-        Numbers of the nodes in ascending order, in the first ``count[0]`` places.
+    nodes, used : (n,), (1,) integer arrays
+        Numbers of the nodes in ascending order, in the first ``used[0]`` places.
     shapes : (m, 2 n) array
         Their rows Tx, then from column n on Ty, side by side, so that sums over nodes vectorise;
         (m, 3 n) in space, T2 last.
@@ -51,7 +51,7 @@ class Blocks(NamedTuple):
     """
 
     nodes: Integers
-    count: Integers
+    used: Integers
     shapes: Array
     parts: Integers
     tiles: Integers
@@ -113,7 +113,7 @@ def near_blocks(blocks: Blocks) -> Blocks:
         return blocks
     return blocks._replace(**{
         name: getattr(blocks, name).copy()
-        for name in ("nodes", "count", "shapes", "parts", "tiles", "pairs")})
+        for name in ("nodes", "used", "shapes", "parts", "tiles", "pairs")})
 
 
 def _blocks(
@@ -131,7 +131,7 @@ def _blocks(
         for place, a in enumerate(np.flatnonzero(moved[b])):
             spans[first:last, place] = modes[a]
     return Blocks(
-        nodes=np.arange(n), count=np.array([n]), shapes=shapes,
+        nodes=np.arange(n), used=np.array([n]), shapes=shapes,
         parts=_table(parts, 4),
         tiles=_table([(*part[:2], *columns) for part in parts
                       for columns in _each(part[2:], n, tangents, n <= FEW)], 4),

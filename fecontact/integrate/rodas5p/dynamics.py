@@ -77,7 +77,7 @@ def project(blocks, y, places, speeds):
     """Fill displacements and velocities (d n,) of the nodes: from 0 on x, n on y, 2 n on across."""
     shapes = blocks.shapes
     m, columns = shapes.shape
-    count = blocks.count[0]
+    count = blocks.used[0]
     for first in range(0, columns, len(blocks.nodes)):
         for j in range(first, first + count):
             places[j] = 0.0
@@ -102,7 +102,7 @@ def project(blocks, y, places, speeds):
 def project_one(blocks, q, places):
     """As :func:`project` for coordinates q (m,) alone."""
     shapes = blocks.shapes
-    count = blocks.count[0]
+    count = blocks.used[0]
     for first in range(0, shapes.shape[1], len(blocks.nodes)):
         for j in range(first, first + count):
             places[j] = 0.0
@@ -161,7 +161,7 @@ def set_rate(y, s, blocks, given, load, w, scratch, rate):
     project(blocks, y, w[0], w[1])
     moved = motion_given(given)
     force, rates = scratch.force[0], scratch.rates[0]
-    for at in range(blocks.count[0]):
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         first = 2 * m + j * states
         F, R, contact = kernels.node_forces(j, motion_of(at, w, s), moved,
@@ -184,7 +184,7 @@ def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     forces = w[2]
     project(blocks, y, w[0], w[1])
     moved = motion_given(given)
-    for at in range(blocks.count[0]):
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         first = 2 * m + j * states
         F, T, contact = kernels.node_gradients(j, motion_of(at, w, s), moved,
@@ -218,7 +218,7 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     if nodes.in_space(s):
         for i in range(m):
             out[m + i] += given[PULL_RATE + 2] * s.drive_shapes[2, i]
-    for at in range(blocks.count[0]):
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         v = nodes.moved_along(j, given[SPEED], given[SECOND_SPEED], s)
         a = nodes.moved_along(j, acceleration[0], acceleration[1], s)

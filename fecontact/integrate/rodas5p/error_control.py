@@ -43,7 +43,7 @@ def slip_error(error, s, control, progress, room):
     near, slips = room.near, room.between[0]
     moved = dynamics.motion_given(room.given)
     dynamics.project_one(near, room.stages[tableau.STAGES - 1, m : 2 * m], slips)
-    for at in range(near.count[0]):
+    for at in range(near.used[0]):
         j = near.nodes[at]
         if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
             slip = slips[at]
@@ -124,7 +124,7 @@ def _powers(t, y, problem, room, out):
     dynamics.project(near, y, room.between[0], room.between[1])
     for j in range(POWER_COUNT, len(out)):
         out[j] = 0.0
-    for at in range(near.count[0]):
+    for at in range(near.used[0]):
         j = near.nodes[at]
         first = 2 * m + j * states
         add_node_powers(j, dynamics.motion_of(at, room.between, s), moved,

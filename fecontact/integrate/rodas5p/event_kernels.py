@@ -335,7 +335,7 @@ def _set_places(step, problem, before, room, watch):
     s, control = problem.system, problem.control
     b, row = room.bound[0], room.bound[2]
     levels = control.levels.shape[0]
-    for place in range(room.near.count[0]):
+    for place in range(room.near.used[0]):
         j, count = room.near.nodes[place], 0
         # Gaps over the levels of the normal law, and slip velocities either way where stick ends.
         for k in range(levels + 2):
@@ -428,7 +428,7 @@ def _note_events(step, problem, progress, room, watch):
         for k in range(len(watch.own)):
             note_own(k, left, right, view, watch)
         # The others stay open.
-        for place in range(room.near.count[0]):
+        for place in range(room.near.used[0]):
             _note_node(room.near.nodes[place], left, right, view, watch)
     return first_stop(step, begun, watch)
 

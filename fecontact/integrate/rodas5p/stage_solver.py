@@ -208,7 +208,7 @@ def set_answers(blocks, g, w):
     states = w.inverse.shape[1]
     c = w.coefficients
     space = len(c) > 4
-    for at in range(blocks.count[0]):
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         p = g.partial[j]
         pressing, slip = 0.0, 0.0

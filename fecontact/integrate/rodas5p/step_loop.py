@@ -322,7 +322,7 @@ def _go_on(step, problem, progress, room, output):
     here, there = progress.gradients, room.gradients_after
     n, states, width = here.rates.shape
     # Those of the other nodes are zero.
-    for at in range(room.near.count[0]):
+    for at in range(room.near.used[0]):
         j = room.near.nodes[at]
         for row in range(here.partial.shape[1]):
             for k in range(here.partial.shape[2]):

@@ -51,7 +51,7 @@ class LinearContact(NormalLaw):
         return 1.0 / float(np.max(self.stiffness))
 
     def untouched(self, nodes: int) -> Array:
-        """Zero (n,), see :class:`NormalLaw`."""
+        """Zero (n,): nodes that are open have no force."""
         return np.full(nodes, 0.0 if self.kernel is _linear else -np.inf)
 
     def pieces(self, share: Array) -> Array | None:

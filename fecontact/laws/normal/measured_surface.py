@@ -230,7 +230,7 @@ class MeasuredSurface(RoughSurface):
         return np.column_stack([self._bed.table(share), np.tile(knots, (len(share), 1))])
 
     def untouched(self, nodes: int) -> Array:
-        """Zero (n,), the place of the highest peak, see :class:`NormalLaw`."""
+        """Zero (n,), the place of the highest peak."""
         return np.full(nodes, 0.0 if self.kernel is _measured else -np.inf)
 
     def _curve(self) -> Any:

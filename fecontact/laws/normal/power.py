@@ -67,7 +67,7 @@ class _Power(NormalLaw):
         return float(np.min(table[:, 1] * table[:, 0] ** (-1.0 / table[:, 2])))
 
     def untouched(self, nodes: int) -> Array:
-        """Zero (n,), see :class:`NormalLaw`."""
+        """Zero (n,): nodes that are open have no force."""
         return np.full(nodes, 0.0 if self.kernel is _power else -np.inf)
 
     def pieces(self, share: Array) -> Array | None:

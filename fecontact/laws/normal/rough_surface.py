@@ -164,7 +164,7 @@ class RoughSurface(NormalLaw):
         return float(np.min(self.roughness_height))
 
     def untouched(self, nodes: int) -> Array:
-        """Zero (n,), the place of the highest peak, see :class:`NormalLaw`."""
+        """Zero (n,), the place of the highest peak."""
         return np.full(nodes, 0.0 if self.kernel in _BEDS else -np.inf)
 
     def pieces(self, share: Array) -> Array | None:
