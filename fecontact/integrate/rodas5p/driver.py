@@ -17,9 +17,10 @@ from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.run import Run
+from fecontact.integrate.rodas5p.small_systems import propagate_for
 from fecontact.integrate.rodas5p.state import Control, Output, Problem, progress_for, room_for
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
-from fecontact.integrate.rodas5p.variational import Vary, propagate, variation_for
+from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.series.branches import chosen_series
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
@@ -32,7 +33,7 @@ _SLIP_PART = 0.01
 _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
 # or of this part of the largest that it has been.
-_LOOSER, _FADED = 10.0, 1e-3
+_LOOSER, _FADED = 10.0, 0.1
 # Steps of a piece of a run: at first, at least and at most.
 _FEWEST, _MOST_STEPS = 200, 10_000_000
 
@@ -77,7 +78,7 @@ def start(
         where normal forces begin, end or pass the depth of their law, at output times too.
     vary_rtol : float, optional
         Error of one step of the derivatives, relative to the largest they have been; ten times
-        ``rtol`` of their size by default, or of a thousandth of the largest.
+        ``rtol`` of their size by default, or of a tenth of the largest.
     events : sequence of ContactEvents, Crossing and Event
         What to watch for.
     series : 'auto', 'always' or 'never'
@@ -120,20 +121,28 @@ def start(
         acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
     first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * longest)
+    problem = Problem(system.arrays, blocks_of(basis, system.arrays), control)
     return Run(
-        Problem(system.arrays, blocks_of(basis, system.arrays), control),
+        problem,
         progress_for(state, float(times[0]), first, m, n, basis.dimension),
         room_for(m, n, states, basis.dimension),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
-        Vary(above.arrays, below.arrays, width, variation_for(
+        Vary(above.arrays, below.arrays, width, _moved_both_ways(system, above, below),
+             variation_for(
             columns, m, n, states, basis.dimension, width, float(vary_rtol or _LOOSER * rtol),
             1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
-             propagate.address if vary else 0),
+             propagate_for(problem) if vary else 0),
         watch_for(system, events, bool(vary)),
         None if vary else chosen_series(
             system, state, times, rtol, max_step, events, work, series))
+
+
+def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: ContactSystem) -> int:
+    """Whether both systems differ from the system itself."""
+    return int(not any(all(map(np.array_equal, system.arrays, one.arrays))
+                       for one in (above, below)))
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

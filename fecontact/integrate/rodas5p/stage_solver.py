@@ -145,8 +145,11 @@ def products(a, b, out):
 
 
 @helper
-def set_answers(blocks, g, w):
-    """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n)."""
+def set_answers(blocks, g, w, answers):
+    """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n).
+
+    ``g`` are the Gradients, ``w`` holds the weights and room for coefficients.
+    """
     shapes = blocks.shapes
     m, n = len(shapes), len(g.partial)
     states = w.inverse.shape[1]
@@ -171,15 +174,17 @@ def set_answers(blocks, g, w):
             if space:
                 across = shapes[k, 2 * n :]
             for first in range(0, shapes.shape[1], n):
-                by_place, by_speed = w.answers[k, first:], w.answers[m + k, first:]
+                by_place, by_speed = answers[k, first:], answers[m + k, first:]
+                c0, c1, c2, c3 = c[0, first:], c[1, first:], c[2, first:], c[3, first:]
                 for j in range(left, right):
-                    by_place[j] = c[0, first:][j] * along[j] + c[1, first:][j] * away[j]
+                    by_place[j] = c0[j] * along[j] + c1[j] * away[j]
                 for j in range(left, right):
-                    by_speed[j] = c[2, first:][j] * along[j] + c[3, first:][j] * away[j]
+                    by_speed[j] = c2[j] * along[j] + c3[j] * away[j]
                 if space:
+                    c4, c5 = c[4, first:], c[5, first:]
                     for j in range(left, right):
-                        by_place[j] += c[4, first:][j] * across[j]
-                        by_speed[j] += c[5, first:][j] * across[j]
+                        by_place[j] += c4[j] * across[j]
+                        by_speed[j] += c5[j] * across[j]
 
 
 @helper
@@ -207,7 +212,7 @@ def _set_coefficients_across(j, g, w, pressing):
 def assemble(s, blocks, g, w):
     """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
     m = len(blocks.shapes)
-    set_answers(blocks, g, w)
+    set_answers(blocks, g, w, w.answers)
     for part in range(len(blocks.coupled)):
         top, bottom, left, right = block_at(blocks.coupled, part)
         for i in range(top, bottom):
