@@ -3,8 +3,10 @@
     python benchmarks/shooting.py [repetitions] [--quick]
 
 A run over 50 ms, from the stuck state, and the same with derivatives to start and belt speed, for
-3, 5 and 20 modes; then points of the stick-slip branch of 20 modes. CPU time, the least of the
-repetitions.
+3, 5 and 20 modes. The problems (b), (b2), (c) and (d) of benchmarks/integrator.py, of 1, 2 and 3
+modes and one node, and 20 modes and 40 nodes: with derivatives to the start, and to the start and
+belt speed, at the steps of the run and at those that the derivatives ask for. Then points of the
+stick-slip branch of 20 modes. CPU time, the least of the repetitions.
 """
 
 import sys
@@ -17,10 +19,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 
 import beam_stick_slip as example
+import integrator_problems as problems
 
 from fecontact import ensemble, sensitivity
 
 SPEED, DURATION, RTOL = 0.05, 0.05, 1e-7
+# Parts of the times of the problems.
+PARTS = {"b": 0.5, "b2": 0.1, "c": 0.1, "d": 0.2}
 
 
 def least(task: Callable[[], object], repetitions: int) -> float:
@@ -48,6 +53,25 @@ def measure(modes: int, repetitions: int) -> list[float]:
         lambda: derivatives(None), lambda: derivatives(1e-2))]
 
 
+def ratios(name: str, repetitions: int, part: float = 1.0) -> list[float]:
+    """Time of a run [s]; that with derivatives to start, and to start and speed, relative to it.
+
+    At the steps of the run, then at those that the derivatives ask for.
+    """
+    problem = problems.shortened(problems.PROBLEMS[name](), PARTS[name] * part)
+    system, end = problem.system, float(problem.times[-1])
+    run = least(lambda: ensemble(system, [0.0, end], initial=problem.state[None], rtol=1e-8),
+                repetitions)
+
+    def cost(rtol: float | None, parameter: str | None) -> float:
+        return least(lambda: sensitivity(system, end, initial=problem.state, rtol=1e-8,
+                                         derivative_rtol=rtol, parameter=parameter),
+                     repetitions) / run
+
+    return [run, *(cost(rtol, parameter) for rtol in (1.0, None)
+                   for parameter in (None, "ground.speed"))]
+
+
 def main(repetitions: int = 5, quick: bool = False) -> None:
     """Print the tables; quickly the first row, once, and no branch."""
     if quick:
@@ -57,6 +81,12 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
         run, tight, loose = measure(modes, repetitions)
         print(f"{modes:5}  {1e3 * run:6.1f} ms  {1e3 * tight:9.1f} ms  {tight / run:12.1f}"
               f"  {1e3 * loose:12.1f} ms  {loose / run:12.1f}")
+    print("problem     run   to start   to start and speed   to start*   to start and speed*")
+    for name in ("b2",) if quick else PARTS:
+        run, *costs = ratios(name, repetitions, 0.2 if quick else 1.0)
+        print(f"({name})".ljust(7) + f"{1e3 * run:6.1f} ms  {costs[0]:7.1f}  {costs[1]:19.1f}"
+              f"  {costs[2]:10.1f}  {costs[3]:20.1f}")
+    print("* at the steps that the derivatives ask for")
     if quick:
         return
     motion = example.stick_slip(SPEED)

@@ -114,8 +114,10 @@ def sensitivity(
         Relative tolerance of the run.
     derivative_rtol : float, optional
         Tolerance of the derivatives per step, relative to their largest values since the last
-        output time; by default ten times ``rtol``, relative to their current values. They are exact
-        for the steps taken at any value; 1e-2 saves steps that only fast disturbances require.
+        output time; by default ten times ``rtol``, relative to their current values or a tenth of
+        the largest. They are exact for the steps taken at any value; 1e-2 saves steps that only
+        fast disturbances require. Derivatives of small motions are not small: where the run's own
+        tolerance is absolute, they take steps that the run does not need.
     max_step : float, optional
         Longest step [s]; see :func:`fecontact.simulate`.
 

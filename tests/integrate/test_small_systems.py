@@ -76,6 +76,34 @@ def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
         assert found == pytest.approx(expected, rel=1e-8, abs=1e-9 * np.abs(expected).max()), name
 
 
+@pytest.mark.parametrize("modes", [1, 2, 3])
+def test_what_derivatives_take_for_granted(modes):
+    said = small_systems.values_of_derivatives(modes, 1)
+    run = run_of(system(modes, 1), vary=True)
+    tuples = (run.problem, run.progress, run.room, run.output, run.variation)
+    found = sum(assert_as_said(values, kind, said)
+                for values, kind in zip(tuples, step_loop.ADVANCE.args, strict=False))
+    assert found >= sum(map(len, said.values()))
+
+
+@pytest.mark.parametrize("modes", [1, 2, 3])
+def test_same_derivatives_as_by_the_code_of_all_systems(modes, monkeypatch):
+    block = system(modes, 1)
+    vary = (block.with_(**{"ground.speed": 1.00001e-3}), block.with_(**{"ground.speed": 0.99999e-3}),
+            2e-8)
+    # Steps of one length, as above; those of the run alone.
+    found = []
+    for small in (True, False):
+        if not small:
+            monkeypatch.setattr(small_systems, "_small", lambda problem: False)
+        run = run_of(block, vary=vary, vary_rtol=1e9, max_step=2e-5)
+        run.advance(300)
+        found.append((run.time, run.variation.variation.columns))
+    assert found[0][0] == pytest.approx(found[1][0], rel=1e-12)
+    sizes = np.abs(found[1][1]).max(axis=0)
+    assert (np.abs(found[0][1] - found[1][1]) <= 1e-7 * sizes).all()
+
+
 def test_systems_with_more_to_them_have_the_step_loop_of_all():
     small = friction_oscillator()
     for other in (system(5, 1), system(2, 3), small.with_(friction=DahlFriction(0.3, 1e6))):

@@ -17,6 +17,7 @@ from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.run import Run
+from fecontact.integrate.rodas5p.small_systems import propagate_for
 from fecontact.integrate.rodas5p.state import (
     Control,
     Output,
@@ -26,7 +27,7 @@ from fecontact.integrate.rodas5p.state import (
     room_for,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
-from fecontact.integrate.rodas5p.variational import Vary, propagate, variation_for
+from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.series.branches import chosen_series, from_state
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
@@ -39,7 +40,7 @@ _SLIP_PART = 0.01
 _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
 # or of this part of the largest that it has been.
-_LOOSER, _FADED = 10.0, 1e-3
+_LOOSER, _FADED = 10.0, 0.1
 # Steps of a piece of a run: at first, at least and at most.
 _FEWEST, _MOST_STEPS = 200, 10_000_000
 
@@ -84,7 +85,7 @@ def start(
         where normal forces begin, end or pass the depth of their law, at output times too.
     vary_rtol : float, optional
         Error of one step of the derivatives, relative to the largest they have been; ten times
-        ``rtol`` of their size by default, or of a thousandth of the largest.
+        ``rtol`` of their size by default, or of a tenth of the largest.
     events : sequence of ContactEvents, Crossing and Event
         What to watch for.
     series : 'auto', 'always' or 'never'
@@ -124,17 +125,19 @@ def start(
         speed_scale=system.velocity_scale, energy_scale=_energy_scale(system, state),
         work=int(work), unfelt=first_unfelt.address)
     blocks = blocks_of(basis, system.arrays)
+    problem = Problem(system.arrays, blocks, control)
     return Run(
-        Problem(system.arrays, blocks, control),
+        problem,
         _progress(system, control, float(times[0]), state),
         room_for(m, n, states, basis.dimension, blocks),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
-        Vary(above.arrays, below.arrays, width, variation_for(
+        Vary(above.arrays, below.arrays, width, _moved_both_ways(system, above, below),
+             variation_for(
             columns, m, n, states, basis.dimension, width, float(vary_rtol or _LOOSER * rtol),
             1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
-             propagate.address if vary else 0),
+             propagate_for(problem) if vary else 0),
         watch_for(system, events, bool(vary)),
         None if vary else chosen_series(
             system, state, times, rtol, max_step, events, work, series))
@@ -174,6 +177,12 @@ def _progress(system: ContactSystem, control: Control, time: float, state: Array
     first = min(0.1 * control.speed_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * control.longest)
     return progress_for(state, time, first, m, basis.contact_nodes, basis.dimension)
+
+
+def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: ContactSystem) -> int:
+    """Whether both systems differ from the system itself."""
+    return int(not any(all(map(np.array_equal, system.arrays, one.arrays))
+                       for one in (above, below)))
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

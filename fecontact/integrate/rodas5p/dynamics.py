@@ -150,16 +150,14 @@ def gather(y, s, blocks, load, forces, rate):
 
 
 @helper
-def set_rate(y, s, blocks, given, load, w, scratch, rate):
-    """Fill ``rate`` (size,) with y', by forces of the nodes of ``blocks``.
+def set_forces(y, s, blocks, moved, w, scratch, rate):
+    """Fill w[2] (d n,) with the node forces of :func:`push`, and the z' of ``rate``.
 
-    ``w`` (3, d n) and ``scratch`` are room to work in.
+    ``w`` (3, d n) holds the nodes as :func:`project` puts them there, ``scratch`` is room.
     """
-    m, n = len(load), len(s.gap)
+    m, n = len(blocks.position), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
-    project(blocks, y, w[0], w[1])
-    moved = motion_given(given)
     force, rates = scratch.force[0], scratch.rates[0]
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
@@ -173,17 +171,29 @@ def set_rate(y, s, blocks, given, load, w, scratch, rate):
                                                 contact.slope_across, s)
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
-    gather(y, s, blocks, load, forces, rate)
 
 
-@routine
-def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
-    """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
-    m, n = len(load), len(s.gap)
-    states = (len(y) - 2 * m) // n
+@helper
+def set_rate(y, s, blocks, given, load, w, scratch, rate):
+    """Fill ``rate`` (size,) with y', by forces of the nodes of ``blocks``.
+
+    ``w`` (3, d n) and ``scratch`` are room to work in.
+    """
+    project(blocks, y, w[0], w[1])
+    set_forces(y, s, blocks, motion_given(given), w, scratch, rate)
+    gather(y, s, blocks, load, w[2], rate)
+
+
+@helper
+def set_gradients(y, s, blocks, moved, w, out):
+    """Fill the :class:`Gradients` ``out`` at the motion ``moved`` of the ground.
+
+    The node forces go to w[2], in the order of :func:`push`.
+    """
+    m, n = len(blocks.position), len(s.gap)
+    states = out.rates.shape[1]
     forces = w[2]
     project(blocks, y, w[0], w[1])
-    moved = motion_given(given)
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         first = 2 * m + j * states
@@ -195,9 +205,71 @@ def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
         if nodes.in_space(s):
             forces[2 * n + at] = -nodes.leaning(
                 F, kernels.friction_across(out.force[j], out.rates[j]), contact.slope_across, s)
+
+
+@routine
+def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
+    """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
+    m, n = len(load), len(s.gap)
+    states = out.rates.shape[1]
+    set_gradients(y, s, blocks, motion_given(given), w, out)
+    for j in range(n):
         for k in range(states):
-            rate[first + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
-    gather(y, s, blocks, load, forces, rate)
+            rate[2 * m + j * states + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
+    gather(y, s, blocks, load, w[2], rate)
+
+
+@helper
+def friction_length(g):
+    """Number of entries of ``force`` that tell of friction."""
+    width = g.rates.shape[2]
+    return 2 * width if g.partial.shape[1] > 3 else width
+
+
+@helper
+def copy_gradients(there, here, blocks):
+    """Make the derivatives ``here`` those ``there``, at the nodes of ``blocks``."""
+    states, width = here.rates.shape[1:]
+    for at in range(blocks.used[0]):
+        j = blocks.nodes[at]
+        for row in range(here.partial.shape[1]):
+            for k in range(here.partial.shape[2]):
+                here.partial[j, row, k] = there.partial[j, row, k]
+        for k in range(friction_length(here)):
+            here.force[j, k] = there.force[j, k]
+        for k in range(width):
+            for row in range(states):
+                here.rates[j, row, k] = there.rates[j, row, k]
+
+
+@helper
+def ground_acceleration(t, later, moved, s):
+    """Accelerations of the ground's two motions, by how fast they are ``later``; 0 at t itself."""
+    if not later > t:
+        return 0.0, 0.0
+    ahead = nodes.ground_motion(later, s)
+    return ((ahead.speed - moved.speed) / (later - t),
+            (ahead.second_speed - moved.second_speed) / (later - t))
+
+
+@helper
+def set_load_rate(t, later, after_t, s, out):
+    """Fill ``out`` (m,) with the rates of the modal loads, but that of the springs of the drive.
+
+    Those of its dashpots by their pull ``later``; ``after_t`` is just after t.
+    """
+    for i in range(len(out)):
+        out[i] = 0.0
+    for axis in range(len(s.drive)):
+        if s.drive_damping[axis] != 0.0 and later > t:
+            rise = (signal_at(s.drive[axis])(later, s.drive_parameters[axis])[1]
+                    - signal_at(s.drive[axis])(after_t, s.drive_parameters[axis])[1])
+            for i in range(len(out)):
+                out[i] += s.drive_damping[axis] * rise / (later - t) * s.drive_shapes[axis, i]
+    for k in range(len(s.load)):
+        rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
+        for i in range(len(out)):
+            out[i] += rate * s.load_shapes[k, i]
 
 
 @routine

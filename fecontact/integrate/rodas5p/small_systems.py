@@ -2,7 +2,8 @@
 
 Their steps take a microsecond, most of it to begin and end loops over one or two numbers. Each size
 here has a step loop of its own, compiled for arrays of that size, in which loops are written out.
-It gives the same numbers up to rounding.
+It gives the same numbers up to rounding. So do derivatives of steps, which are compiled for a size
+when they are first asked for.
 """
 
 from functools import cache
@@ -14,7 +15,13 @@ from fecontact.core.compiled import kernel
 from fecontact.core.references import constants
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, step_loop
 from fecontact.integrate.rodas5p.blocks import BLOCKS, one_block
-from fecontact.integrate.rodas5p.variational import VARIATION, Vary
+from fecontact.integrate.rodas5p.variational import (
+    PROPAGATE,
+    VARIATION,
+    Vary,
+    propagate,
+    variation_for,
+)
 from fecontact.system.nodes import SYSTEM
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
@@ -28,18 +35,41 @@ def advance_for(problem: state.Problem, vary: Vary) -> Any:
     Step loops of small systems are for plane ones of one block, with one motion of the ground,
     without internal variables and without derivatives.
     """
+    if len(vary.variation.columns) or not _small(problem):
+        return step_loop.advance
+    n, m = problem.system.Tx.shape
+    return _advance(m, n)
+
+
+def propagate_for(problem: state.Problem) -> int:
+    """Address of what carries derivatives over a step: that of the size of the system, or of all.
+
+    For the same systems as the step loops, with any number of columns.
+    """
+    n, m = problem.system.Tx.shape
+    return _propagate((m, n) if _small(problem) else None)
+
+
+def _small(problem: state.Problem) -> bool:
     s = problem.system
     n, m = s.Tx.shape
-    if ((m, n) in SIZES and len(problem.blocks.coupled) == 1 and len(s.T2) == 0
-            and s.second_motion == 0 and not s.memory.any() and not len(vary.variation.columns)):
-        return _advance(m, n)
-    return step_loop.advance
+    return bool((m, n) in SIZES and len(problem.blocks.coupled) == 1 and len(s.T2) == 0
+                and s.second_motion == 0 and not s.memory.any())
 
 
 @cache
 def _advance(modes: int, nodes: int) -> Any:
     return kernel(step_loop.ADVANCE, constants=constants(fixed_values(modes, nodes)), nogil=True)(
         step_loop.advance.py_func)
+
+
+@cache
+def _propagate(size: tuple[int, int] | None) -> int:
+    """Address of what carries derivatives over a step, of modes and nodes of a size or of all."""
+    known = "" if size is None else constants(values_of_derivatives(*size))
+    compiled = kernel(PROPAGATE, constants=known, no_cpython_wrapper=True)(propagate)
+    found = compiled.overloads[PROPAGATE.args]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
@@ -64,6 +94,18 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
         state.OUTPUT: {"states": (None, 2 * m), "work": (None, POWER_COUNT + NODE_POWERS * n)},
         VARIATION: {"columns": (0, None)},
     }
+
+
+def values_of_derivatives(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
+    """As :func:`fixed_values` for derivatives of steps, of any number of columns."""
+    room = _shapes(variation_for(2 * modes, modes, nodes, 0, 2, 0.0, 1.0, 1.0))
+    for name in ("columns", "after", "stages", "moved", "pushed", "right"):
+        room[name] = (None, *room[name][1:])
+    room["norms"], room["least"] = (2, None), (None,)
+    values = fixed_values(modes, nodes)
+    # Of the nodes, and in the room for differences of all directions of each of them.
+    gradients = {name: (None, *shape[1:]) for name, shape in values[dynamics.GRADIENTS].items()}
+    return {**values, VARIATION: room, dynamics.GRADIENTS: gradients}
 
 
 def _shapes(arrays: Any) -> dict[str, Any]:

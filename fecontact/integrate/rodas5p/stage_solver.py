@@ -201,8 +201,11 @@ def products(a, b, out):
 
 
 @helper
-def set_answers(blocks, g, w):
-    """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n)."""
+def set_answers(blocks, g, w, answers):
+    """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n).
+
+    ``g`` are the Gradients, ``w`` holds the weights and room for coefficients.
+    """
     shapes = blocks.shapes
     m, n = len(shapes), len(g.partial)
     states = w.inverse.shape[1]
@@ -228,7 +231,7 @@ def set_answers(blocks, g, w):
             if space:
                 across = shapes[k, 2 * n :]
             for first in range(0, shapes.shape[1], n):
-                by_place, by_speed = w.answers[k, first:], w.answers[m + k, first:]
+                by_place, by_speed = answers[k, first:], answers[m + k, first:]
                 # Named outside the loop, or it is not vectorised.
                 c0, c1, c2, c3 = c[0, first:], c[1, first:], c[2, first:], c[3, first:]
                 for j in range(left, right):
@@ -266,7 +269,7 @@ def _set_coefficients_across(at, j, g, w, pressing):
 def assemble(s, blocks, g, w):
     """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
     m = len(blocks.shapes)
-    set_answers(blocks, g, w)
+    set_answers(blocks, g, w, w.answers)
     for part in range(len(blocks.coupled)):
         top, bottom, left, right = block_at(blocks.coupled, part)
         for i in range(top, bottom):

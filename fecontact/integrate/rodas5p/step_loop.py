@@ -39,17 +39,16 @@ from fecontact.integrate.rodas5p.state import (
     STEPS,
     TIME,
     Step,
+    soon,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
     VARY,
     begin_anew,
-    friction_length,
     keep,
     propagate_at,
     write_columns,
 )
-from fecontact.laws.signatures import signal_at
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
@@ -125,26 +124,11 @@ def _linearise(step, after_t, problem, progress, room):
     """What a step needs of the derivatives at its start besides the matrices."""
     s, control = problem.system, problem.control
     m = len(control.largest)
-    later = min(step.t + 1e-4 * step.h, step.latest)
-    first, second = 0.0, 0.0
-    if later > step.t:
-        moved = ground_motion(later, s)
-        first = (moved.speed - room.given[dynamics.SPEED]) / (later - step.t)
-        second = (moved.second_speed - room.given[dynamics.SECOND_SPEED]) / (later - step.t)
-    for i in range(m):
-        room.pull_rate[i] = 0.0
-    for axis in range(len(s.drive)):
-        if s.drive_damping[axis] != 0.0 and later > step.t:
-            rise = (signal_at(s.drive[axis])(later, s.drive_parameters[axis])[1]
-                    - signal_at(s.drive[axis])(after_t, s.drive_parameters[axis])[1])
-            for i in range(m):
-                room.pull_rate[i] += (s.drive_damping[axis] * rise / (later - step.t)
-                                      * s.drive_shapes[axis, i])
-    for k in range(len(s.load)):
-        rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
-        for i in range(m):
-            room.pull_rate[i] += rate * s.load_shapes[k, i]
-    dynamics.set_time_rate(s, room.near, room.given, (first, second), progress.gradients,
+    later = soon(step)
+    acceleration = dynamics.ground_acceleration(step.t, later,
+                                                dynamics.motion_given(room.given), s)
+    dynamics.set_load_rate(step.t, later, after_t, s, room.pull_rate)
+    dynamics.set_time_rate(s, room.near, room.given, acceleration, progress.gradients,
                            room.pull_rate, room.nodes, room.time_rate)
     for i in range(m):
         progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
@@ -319,20 +303,9 @@ def _go_on(step, problem, progress, room, output):
     for k in range(len(progress.state)):
         progress.state[k] = room.after[k]
         progress.rate[k] = room.rate_after[k]
-    here, there = progress.gradients, room.gradients_after
-    n, states, width = here.rates.shape
     # Those of the other nodes are zero.
-    for at in range(room.near.used[0]):
-        j = room.near.nodes[at]
-        for row in range(here.partial.shape[1]):
-            for k in range(here.partial.shape[2]):
-                here.partial[j, row, k] = there.partial[j, row, k]
-        for k in range(friction_length(here)):
-            here.force[j, k] = there.force[j, k]
-        for k in range(width):
-            for row in range(states):
-                here.rates[j, row, k] = there.rates[j, row, k]
-    keep_ends(n, room)
+    dynamics.copy_gradients(room.gradients_after, progress.gradients, room.near)
+    keep_ends(len(problem.system.gap), room)
     progress.counts[STEPS] += 1
 
 

@@ -7,10 +7,11 @@ solve the same systems, with the factors of the step,
     (I / (h gamma) - J) U_i = J(t_i, Y_i) X_i + sum_j C_ij U_j / h + H_i x  [+ p_i]
     X_i = x + sum_j A_ij U_j,     H_i = d/de J(t + e d_i h, y + e u_i) at e = 0
 
-and p_i = df/dp(t_i, Y_i) + d/de df/dp(t + e d_i h, y + e u_i) for the column of the parameter. So
-the result is the derivative of what is computed, not another approximation of the same thing.
-H_i and p_i are differences over steps that are small against the scales of the laws, central ones
-but beside kinks.
+and p_i = df/dp(t_i, Y_i) + dJ/dp(t, y) u_i + d_i h d2f/dt dp(t, y) for the column of the
+parameter. So the result is the derivative of what is computed, not another approximation of the
+same thing. H_i are differences over steps that are small against the scales of the laws, central
+ones but beside kinks: of the forces of each node, once a step along each direction of its motion.
+Derivatives to p are differences between a system above and one below.
 """
 
 from typing import Any, NamedTuple
@@ -18,135 +19,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, compile_law, f8, function_at, helper, i8, matrix, vector
+from fecontact.core.compiled import (
+    block,
+    f8,
+    function_at,
+    helper,
+    i8,
+    matrix,
+    routine,
+    vector,
+)
 from fecontact.core.references import Reference
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
-from fecontact.system.nodes import (
-    SYSTEM,
-    ground_motion,
-    in_space,
-    moved_across,
-    moved_along,
-    node_contact,
-)
-from fecontact.system.space_nodes import contact_in_space, laws_of
-
-# Differences are taken over this part of the scales of the laws.
-_PART = 1e-4
-# Differences of larger parts of the usual size of a derivative are jumps.
-_JUMP = 3.0 * _PART
-
-
-@helper
-def probing_distance(u, blocks, control, w):
-    """Multiple e of the stage u that is small against the scales of all laws."""
-    m, n = len(control.largest), len(control.depth)
-    dynamics.project(blocks, u, w[0], w[1])
-    largest = 1.0
-    for j in range(n):
-        largest = max(largest, abs(w[1, j]) / control.slip_scale[j])
-        largest = max(largest, abs(w[0, n + j]) / control.depth[j])
-        if w.shape[1] > 2 * n:
-            largest = max(largest, abs(w[1, 2 * n + j]) / control.slip_scale[j])
-    for k in range(len(control.memory_scale)):
-        largest = max(largest, abs(u[2 * m + k]) / control.memory_scale[k])
-    return _PART / largest
-
-
-@helper
-def _difference(ahead, here, behind, factor, forward, usual):
-    """Difference quotient, that of one side where a kink or a jump lies within reach.
-
-    A difference that is not small against the ``usual`` size has met a jump. Of two sides that
-    differ without one, that of the step itself counts.
-    """
-    a, b = ahead - here, here - behind
-    jump_ahead, jump_behind = abs(a) > _JUMP * usual, abs(b) > _JUMP * usual
-    if jump_ahead or jump_behind:
-        if jump_ahead and jump_behind:
-            return factor * (a if abs(a) < abs(b) else b)
-        return factor * (b if jump_ahead else a)
-    if abs(a - b) <= 0.5 * max(abs(a), abs(b)):
-        return 0.5 * factor * (a + b)
-    return factor * (a if forward else b)
-
-
-@helper
-def friction_length(g):
-    """Number of entries of ``force`` that tell of friction."""
-    width = g.rates.shape[2]
-    return 2 * width if g.partial.shape[1] > 3 else width
-
-
-@helper
-def learn(here, usual):
-    """Let the usual sizes be the largest seen."""
-    n, states, width = here.rates.shape
-    for j in range(n):
-        for row in range(here.partial.shape[1]):
-            for k in range(here.partial.shape[2]):
-                usual.partial[j, row, k] = max(usual.partial[j, row, k],
-                                               abs(here.partial[j, row, k]))
-        for k in range(friction_length(here)):
-            usual.force[j, k] = max(usual.force[j, k], abs(here.force[j, k]))
-        for k in range(width):
-            for row in range(states):
-                usual.rates[j, row, k] = max(usual.rates[j, row, k], abs(here.rates[j, row, k]))
-
-
-@helper
-def set_sinking(t, y, s, blocks, v, out):
-    """Fill out (2, n): slope of the ground under each node, and rate of its penetration.
-
-    In space (3, n): with the slope along the second tangent.
-    """
-    moved = ground_motion(t, s)
-    dynamics.project(blocks, y, v.nodes[0], v.nodes[1])
-    for j in range(len(s.abscissa)):
-        motion = dynamics.motion_of(j, v.nodes, s)
-        if in_space(s):
-            contact = contact_in_space(motion, moved, laws_of(j, s), s.sides[j],
-                                       s.profile_parameters)
-            out[2, j] = contact.slope_across
-        else:
-            contact = node_contact(j, motion, moved, s)
-        out[0, j], out[1, j] = contact.slope, contact.rate
-
-
-@helper
-def differences(ahead, here, behind, usual, factor, u, travelled, sinking, s, blocks, w):
-    """Put the difference quotients of gradients along the stage u into those ahead.
-
-    A stage that moves a node as the step does shows with its forward side what is within the
-    step. ``travelled`` is what the ground's two motions have done by then.
-    """
-    n, states, width = ahead.rates.shape
-    dynamics.project(blocks, u, w[0], w[1])
-    for j in range(n):
-        sunk = sinking[0, j] * (
-            w[0, j] - moved_along(j, travelled[0], travelled[1], s)) - w[0, n + j]
-        if in_space(s):
-            sunk += sinking[2, j] * (
-                w[0, 2 * n + j] - moved_across(j, travelled[0], travelled[1], s))
-        forward = sunk * sinking[1, j] >= 0.0
-        for row in range(ahead.partial.shape[1]):
-            for k in range(ahead.partial.shape[2]):
-                ahead.partial[j, row, k] = _difference(
-                    ahead.partial[j, row, k], here.partial[j, row, k], behind.partial[j, row, k],
-                    factor, forward, usual.partial[j, row, k])
-        for k in range(friction_length(ahead)):
-            ahead.force[j, k] = _difference(ahead.force[j, k], here.force[j, k],
-                                            behind.force[j, k], factor, forward,
-                                            usual.force[j, k])
-        for k in range(width):
-            for row in range(states):
-                ahead.rates[j, row, k] = _difference(
-                    ahead.rates[j, row, k], here.rates[j, row, k], behind.rates[j, row, k], factor,
-                    forward, usual.rates[j, row, k])
-
+from fecontact.integrate.rodas5p.blocks import block_at
+from fecontact.system.nodes import SYSTEM, ground_motion
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5
@@ -171,12 +60,22 @@ class Variation(NamedTuple):
     tolerance, faded : float
         Error of a column in a step that is allowed, in units of its size; of the part ``faded``
         of the largest size that it has had where it is smaller.
-    moved, right : (k, size) arrays
-        X_i and the right sides of a stage, column by column.
-    pushed, bent : (k, m) arrays
+    moved, right : (k, 2 size), (k, size) arrays
+        [X_i, x] and the right sides of a stage, column by column.
+    pushed : (k, m) array
         Accelerations by X_i and by H_i; solutions u_v.
-    inside_matrix, ahead_matrix, solver : (m, 2 m) arrays
-        What makes these of X_i, x and the right sides.
+    answers, both, solver : (4 m, d n), (m, 4 m), (m, 2 m) arrays
+        Answers of the node forces inside a stage and ahead; what makes these of [X_i, x], and of
+        the right sides.
+    given, load : (2, GIVEN), (2, m) arrays
+        What is given at a stage in the systems above and below.
+    forces : (d n,) array
+        Room for node forces.
+    paths : (STAGES, D, n) array
+        What the stages move the nodes; see :func:`columns.set_paths`.
+    inside, ahead, behind, usual, between, bends : Gradients
+        Those inside a stage, their change along it, room, their usual sizes, their derivatives to
+        the parameter, and their change along each direction of each node.
     """
 
     columns: Array
@@ -188,48 +87,53 @@ class Variation(NamedTuple):
     faded: float
     moved: Array
     pushed: Array
-    bent: Array
     right: Array
-    inside_matrix: Array
-    ahead_matrix: Array
+    answers: Array
+    both: Array
     solver: Array
     vectors: Array
     nodes: Array
-    sinking: Array
     given: Array
     load: Array
     none: Array
+    forces: Array
+    paths: Array
     inside: dynamics.Gradients
     ahead: dynamics.Gradients
     behind: dynamics.Gradients
     usual: dynamics.Gradients
+    between: dynamics.Gradients
+    bends: dynamics.Gradients
 
 
 VARIATION = types.NamedTuple(
-    [matrix] * 3 + [vector, matrix, f8, f8] + [matrix] * 10 + [vector] * 3
-    + [dynamics.GRADIENTS] * 4, Variation)
+    [matrix] * 3 + [vector, matrix, f8, f8] + [matrix] * 10 + [vector] * 2 + [block]
+    + [dynamics.GRADIENTS] * 6, Variation)
 
 
 class Vary(NamedTuple):
     """Derivatives that go with a run.
 
     ``above`` and ``below`` are the system with the parameter moved up and down, ``width`` apart;
-    with width = 0 no parameter varies. ``transitions`` (N, k, size) holds, for each output time,
-    the columns since the one before. ``propagate`` is the address of :data:`propagate`.
+    with width = 0 no parameter varies; ``central`` says that it could be moved both ways.
+    ``transitions`` (N, k, size) holds, for each output time, the columns since the one before.
+    ``propagate`` is the address of the compiled
+    :func:`propagate`: runs without derivatives do not need it.
     """
 
     above: Any
     below: Any
     width: float
+    central: int
     variation: Variation
     transitions: Array
     propagate: int
 
 
-VARY = types.NamedTuple([SYSTEM, SYSTEM, f8, VARIATION, block, i8], Vary)
-_PROPAGATE = f8(run_arrays.STEP_TYPE, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
+VARY = types.NamedTuple([SYSTEM, SYSTEM, f8, i8, VARIATION, block, i8], Vary)
+PROPAGATE = f8(run_arrays.STEP_TYPE, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
                 Reference(run_arrays.ROOM), Reference(VARY))
-propagate_at = function_at(_PROPAGATE)
+propagate_at = function_at(PROPAGATE)
 
 
 def variation_for(
@@ -241,7 +145,9 @@ def variation_for(
     ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
     """
     size = 2 * modes + nodes * states
-    room = [run_arrays.gradients_for(nodes, states, dimension) for _ in range(4)]
+    directions = 2 * dimension + states if columns else 1
+    room = [run_arrays.gradients_for(count, states, dimension)
+            for count in (*[nodes] * 5, directions * nodes)]
     start = np.zeros((columns, size))
     np.fill_diagonal(start, 1.0)
     least = np.zeros(columns)
@@ -250,26 +156,71 @@ def variation_for(
         least[-1] = 0.1 * MOVE * 2.0 / (width * faded)
     return Variation(start, np.zeros((columns, size)), np.tile(least, (2, 1)), least,
                      np.zeros((tableau.STAGES * columns, size)), tolerance, faded,
-                     np.zeros((columns, size)), np.zeros((columns, modes)),
-                     np.zeros((columns, modes)), np.zeros((columns, size)),
-                     np.zeros((modes, 2 * modes)), np.zeros((modes, 2 * modes)),
-                     np.zeros((modes, 2 * modes)), np.zeros((7, size)),
-                     np.zeros((3, dimension * nodes)), np.zeros((dimension, nodes)),
-                     np.zeros(dynamics.GIVEN),
-                     np.zeros(modes), np.zeros(modes), *room)
+                     np.zeros((columns, 2 * size)), np.zeros((columns, modes)),
+                     np.zeros((columns, size)), np.zeros((4 * modes, dimension * nodes)),
+                     np.zeros((modes, 4 * modes)), np.zeros((modes, 2 * modes)),
+                     np.zeros((7, size)),
+                     np.zeros((3, dimension * nodes)), np.zeros((2, dynamics.GIVEN)),
+                     np.zeros((2, modes)), np.zeros(modes), np.zeros(dimension * nodes),
+                     np.zeros((tableau.STAGES, directions, nodes)), *room)
+
+
+@routine
+def _expand(step, y, s, blocks, given, load, v, g, time_rate):
+    """Fill gradients g and the rate at a fixed state of y' of a system at the begin of a step."""
+    after_t, later = np.nextafter(step.t, np.inf), run_arrays.soon(step)
+    dynamics.set_given(after_t, s, given, load)
+    dynamics.set_gradients(y, s, blocks, dynamics.motion_given(given), v.nodes, g)
+    acceleration = dynamics.ground_acceleration(step.t, later, dynamics.motion_given(given), s)
+    dynamics.set_load_rate(step.t, later, after_t, s, v.none)
+    dynamics.set_time_rate(s, blocks, given, acceleration, g, v.none, v.nodes, time_rate)
+    v.none[:] = 0.0
 
 
 @helper
-def _rates_between(t, Y, blocks, vary, factor, out):
-    """Fill out = factor (f of the system above less f of that below)."""
-    v = vary.variation
-    rate, other = v.vectors[4], v.vectors[5]
-    dynamics.set_given(t, vary.above, v.given, v.load)
-    dynamics.set_rate(Y, vary.above, blocks, v.given, v.load, v.nodes, v.behind, rate)
-    dynamics.set_given(t, vary.below, v.given, v.load)
-    dynamics.set_rate(Y, vary.below, blocks, v.given, v.load, v.nodes, v.behind, other)
-    for k in range(len(Y)):
-        out[k] = factor * (rate[k] - other[k])
+def _begin_parameter(step, progress, blocks, vary):
+    """Fill d2f/dt dp (v.vectors[6]) and v.between at the begin of a step."""
+    v, y = vary.variation, progress.state
+    drift, other = v.vectors[6], v.vectors[5]
+    _expand(step, y, vary.above, blocks, v.given[0], v.load[0], v, v.ahead, drift)
+    _expand(step, y, vary.below, blocks, v.given[1], v.load[1], v, v.behind, other)
+    for k in range(len(y)):
+        drift[k] = (drift[k] - other[k]) / vary.width
+    columns.set_between(v.ahead, progress.gradients, v.behind, vary.width, vary.central != 0,
+                        v.usual, v.between)
+
+
+@routine
+def _set_forced(part, Y, u, blocks, vary, out):
+    """Fill ``out`` with df/dp at Y, and dJ/dp u + ``part`` d2f/dt dp at the begin of the step.
+
+    By what is given in the systems above and below at the time of Y.
+    """
+    v, above, below = vary.variation, vary.above, vary.below
+    w, forces, rate = v.nodes, v.forces, v.vectors[4]
+    m = len(v.none)
+    dynamics.project(blocks, Y, w[0], w[1])
+    dynamics.set_forces(Y, below, blocks, dynamics.motion_given(v.given[1]), w, v.behind, rate)
+    for k in range(len(forces)):
+        forces[k] = w[2, k]
+    dynamics.set_forces(Y, above, blocks, dynamics.motion_given(v.given[0]), w, v.behind, out)
+    for k in range(len(forces)):
+        w[2, k] = (w[2, k] - forces[k]) / vary.width
+    for k in range(2 * m, len(out)):
+        out[k] = (out[k] - rate[k]) / vary.width + part * v.vectors[6, k]
+    for i in range(m):
+        out[i] = 0.0
+        out[m + i] = (v.load[0, i] - v.load[1, i]) / vary.width + part * v.vectors[6, m + i]
+    columns.push(v.between, above, blocks, u, w, out)
+    dynamics.push(blocks, w[2], out[m : 2 * m])
+    for own in range(len(blocks.own)):
+        top, bottom, left, right = block_at(blocks.own, own)
+        for i in range(top, bottom):
+            total = 0.0
+            for k in range(left, right):
+                total += ((above.stiffness[i, k] - below.stiffness[i, k]) * (Y[k] + u[k])
+                          + (above.damping[i, k] - below.damping[i, k]) * (Y[m + k] + u[m + k]))
+            out[m + i] -= total / vary.width
 
 
 @helper
@@ -289,7 +240,7 @@ def _largest_error(scale, v):
     return largest
 
 
-def _propagate(step, problem, progress, room, vary):
+def propagate(step, problem, progress, room, vary):
     """Carry the columns over the step whose stages and factors the room holds.
 
     Returns the largest error of a column in units of its size, or of the part ``faded`` of the
@@ -301,49 +252,40 @@ def _propagate(step, problem, progress, room, vary):
                                          room.stages)
     size = len(state)
     m = len(v.none)
-    w = v.nodes
-    Y, right, forced, rate = v.vectors[0], v.vectors[1], v.vectors[3], v.vectors[4]
+    Y, forced = v.vectors[0], v.vectors[3]
     varies = vary.width != 0.0
     G = 1.0 / (step.h * tableau.GAMMA)
     if size == 2 * m:
         columns.set_solver(G, blocks, reduced, v)
-    set_sinking(step.t, state, s, blocks, v, v.sinking)
-    moved = ground_motion(step.t, s)
+    acceleration = dynamics.ground_acceleration(step.t, run_arrays.soon(step), step.moved, s)
+    columns.learn(gradients, v.usual)
+    columns.set_paths(step, acceleration, s, blocks, stages, v)
+    columns.set_bends(step, acceleration, problem, progress, room, v)
+    if varies:
+        _begin_parameter(step, progress, blocks, vary)
+    moved, last = step.moved, step.t
     for i in range(tableau.STAGES):
-        now = step.t if i == 0 else min(step.t + tableau.NODES[i] * step.h, step.latest)
         tableau.combined(tableau.A[i], 1.0, state, stages, Y)
-        dynamics.set_given(now, s, v.given, v.load)
-        dynamics.set_rate_and_gradients(Y, s, blocks, v.given, v.load, w, v.inside, rate)
-        learn(v.inside, v.usual)
-        advance = tableau.TIME[i] * step.h
-        reach = probing_distance(stages[i], blocks, problem.control, w)
+        if i == 0:
+            dynamics.copy_gradients(gradients, v.inside, blocks)
+        else:
+            now = min(step.t + tableau.NODES[i] * step.h, step.latest)
+            if now != last:
+                moved = ground_motion(now, s)
+                if varies:
+                    dynamics.set_given(now, vary.above, v.given[0], v.load[0])
+                    dynamics.set_given(now, vary.below, v.given[1], v.load[1])
+            last = now
+            dynamics.set_gradients(Y, s, blocks, moved, v.nodes, v.inside)
+            columns.learn(v.inside, v.usual)
         if varies:
-            _rates_between(now, Y, blocks, vary, 1.0 / vary.width, forced)
-        for side in range(2):
-            e = reach if side == 0 else -reach
-            for k in range(size):
-                Y[k] = state[k] + e * stages[i, k]
-            later = step.t + e * advance
-            if varies:
-                _rates_between(later, Y, blocks, vary, 0.5 / (e * vary.width), right)
-                for k in range(size):
-                    forced[k] += right[k]
-            dynamics.set_given(later, s, v.given, v.load)
-            if side == 0:
-                dynamics.set_rate_and_gradients(Y, s, blocks, v.given, v.load, w, v.ahead, rate)
-            else:
-                dynamics.set_rate_and_gradients(Y, s, blocks, v.given, v.load, w, v.behind, rate)
-        differences(v.ahead, gradients, v.behind, v.usual, 1.0 / reach, stages[i],
-                    (moved.speed * advance, moved.second_speed * advance), v.sinking, s, blocks, w)
+            _set_forced(tableau.TIME[i] * step.h, Y, stages[i], blocks, vary, forced)
+        columns.set_ahead(i, v)
         if size > 2 * m:
             columns.one_by_one(i, step.h, G, s, blocks, gradients, reduced, forced, varies, v)
         else:
             columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
     return _largest_error(room.right, v)
-
-
-# By its address: runs without derivatives do not need it compiled.
-propagate = compile_law(_PROPAGATE, "propagate(step, problem, progress, room, vary)", _propagate)
 
 
 @helper

@@ -3,17 +3,275 @@
 The stage systems are those of :mod:`fecontact.integrate.rodas5p.variational`, with the derivatives
 of the node forces ``inside`` a stage and ``ahead``, along it. Without internal variables all
 columns go at once, by dense matrices of the size of the modes; else each goes from node to node.
+
+Forces of a node depend on its own motion and internal variables only. So the derivatives ``ahead``
+are sums, over these few directions, of what a stage moves the node and how its derivatives bend
+there; this is found once a step, by differences.
 """
 
 import numpy as np
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import solve_within
+from fecontact.integrate.courses import STEEPEST
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
-from fecontact.system.nodes import in_space
+from fecontact.system.kernels import node_gradients
+from fecontact.system.nodes import (
+    NodeMotion,
+    in_space,
+    moved_across,
+    moved_along,
+    node_contact,
+)
+from fecontact.system.space_nodes import contact_in_space, laws_of
 
 # Products of matrices with more multiplications than these go to BLAS.
 _LARGE = 2000
+# Differences are taken over this part of the scales of the laws.
+_PART = 1e-4
+# Differences of larger parts of the usual size of a derivative are jumps.
+_JUMP = 3.0 * _PART
+# The same of differences to parameters, which may be a tenth of the smoothing of friction wide.
+_STEEP = 0.3
+
+
+@helper
+def learn(here, usual):
+    """Let the usual sizes be the largest seen."""
+    n, states, width = here.rates.shape
+    for j in range(n):
+        for row in range(here.partial.shape[1]):
+            for k in range(here.partial.shape[2]):
+                usual.partial[j, row, k] = max(usual.partial[j, row, k],
+                                               abs(here.partial[j, row, k]))
+        for k in range(dynamics.friction_length(here)):
+            usual.force[j, k] = max(usual.force[j, k], abs(here.force[j, k]))
+        for k in range(width):
+            for row in range(states):
+                usual.rates[j, row, k] = max(usual.rates[j, row, k], abs(here.rates[j, row, k]))
+
+
+@helper
+def set_paths(step, acceleration, s, blocks, stages, v):
+    """Fill v.paths (STAGES, D, n) with what each stage moves the nodes against the other side.
+
+    Along the D directions of a node: its motion, in the order of the columns of
+    ``Gradients.partial``, and its internal variables. ``acceleration`` is that of the ground.
+    """
+    paths, w = v.paths, v.nodes
+    m, n = len(v.none), len(s.gap)
+    states, motions = v.inside.rates.shape[1], v.inside.partial.shape[2]
+    first, second = step.moved.speed, step.moved.second_speed
+    for i in range(tableau.STAGES):
+        dynamics.project(blocks, stages[i], w[0], w[1])
+        part = tableau.TIME[i] * step.h
+        for j in range(n):
+            paths[i, 0, j] = w[0, j] - part * moved_along(j, first, second, s)
+            paths[i, 1, j] = w[0, n + j]
+            paths[i, 2, j] = w[1, j] - part * moved_along(j, acceleration[0], acceleration[1], s)
+            paths[i, 3, j] = w[1, n + j]
+            if in_space(s):
+                paths[i, 4, j] = w[0, 2 * n + j] - part * moved_across(j, first, second, s)
+                paths[i, 5, j] = w[1, 2 * n + j] - part * moved_across(
+                    j, acceleration[0], acceleration[1], s)
+            for k in range(states):
+                paths[i, motions + k, j] = stages[i, 2 * m + j * states + k]
+
+
+@helper
+def _reach(direction, j, control, v):
+    """Distance along a direction that is small against the law's scale, and against the stages."""
+    motions = v.inside.partial.shape[2]
+    reach = 0.0
+    for i in range(tableau.STAGES):
+        reach = max(reach, abs(v.paths[i, direction, j]))
+    if direction == 1:
+        reach = min(reach, control.depth[j])
+    elif direction in (2, 5) and direction < motions:
+        reach = min(reach, control.slip_scale[j])
+    elif direction >= motions:
+        states = v.paths.shape[1] - motions
+        reach = min(reach, control.memory_scale[j * states + direction - motions])
+    return _PART * reach
+
+
+@helper
+def _onward(direction, j, motion, acceleration, step, s, v, between, rate):
+    """Rate of a node's motion or internal variable; of places, that towards the other side.
+
+    Its sign says on which side of a kink the step goes on. ``between`` (2, d n) holds velocities
+    and accelerations of the nodes, ``rate`` (size,) is y'.
+    """
+    n, motions = len(s.gap), v.inside.partial.shape[2]
+    if in_space(s):
+        contact = contact_in_space(motion, step.moved, laws_of(j, s), s.sides[j],
+                                   s.profile_parameters)
+    else:
+        contact = node_contact(j, motion, step.moved, s)
+    if direction >= motions:
+        states = v.paths.shape[1] - motions
+        return rate[2 * len(v.none) + j * states + direction - motions]
+    if direction == 0:
+        return contact.slope * contact.rate if contact.slope != 0.0 else contact.slip
+    if direction == 1:
+        return -contact.rate
+    if direction == 2:
+        return between[1, j] - moved_along(j, acceleration[0], acceleration[1], s)
+    if direction == 3:
+        return between[1, n + j]
+    if direction == 4:
+        return (contact.slope_across * contact.rate if contact.slope_across != 0.0
+                else contact.slip_across)
+    return between[1, 2 * n + j] - moved_across(j, acceleration[0], acceleration[1], s)
+
+
+@routine
+def _gradients_aside(direction, e, j, motion, moved, z, s, v, out):
+    """Fill row j of the gradients ``out`` at the distance e along a direction.
+
+    ``z`` (size,) holds internal variables where the state does.
+    """
+    states, motions = out.rates.shape[1], out.partial.shape[2]
+    first = 2 * len(v.none) + j * states
+    aside = NodeMotion(motion.along + (e if direction == 0 else 0.0),
+                       motion.height + (e if direction == 1 else 0.0),
+                       motion.along_rate + (e if direction == 2 else 0.0),
+                       motion.height_rate + (e if direction == 3 else 0.0),
+                       motion.across + (e if direction == 4 and motions > 4 else 0.0),
+                       motion.across_rate + (e if direction == 5 and motions > 4 else 0.0))
+    changed, before = first + direction - motions, 0.0
+    if direction >= motions:
+        before = z[changed]
+        z[changed] += e
+    node_gradients(j, aside, moved, z[first : first + s.memory[j]], s, out.force[j], out.rates[j],
+                   out.partial[j])
+    if direction >= motions:
+        z[changed] = before
+
+
+@helper
+def _difference(ahead, here, behind, factor, forward, usual):
+    """Difference quotient, that of one side where a kink or a jump lies within reach.
+
+    A difference that is not small against the ``usual`` size has met a jump. Of two sides that
+    differ without one, that of the step itself counts.
+    """
+    a, b = ahead - here, here - behind
+    jump_ahead, jump_behind = abs(a) > _JUMP * usual, abs(b) > _JUMP * usual
+    if jump_ahead or jump_behind:
+        if jump_ahead and jump_behind:
+            return factor * (a if abs(a) < abs(b) else b)
+        return factor * (b if jump_ahead else a)
+    if abs(a - b) <= 0.5 * max(abs(a), abs(b)):
+        return 0.5 * factor * (a + b)
+    return factor * (a if forward else b)
+
+
+@helper
+def _set_bend(j, row, factor, forward, here, v):
+    """Fill a row of v.bends with the differences of the gradients of node j."""
+    ahead, behind, usual, out = v.ahead, v.behind, v.usual, v.bends
+    states, width = here.rates.shape[1], here.rates.shape[2]
+    for k in range(here.partial.shape[1]):
+        for c in range(here.partial.shape[2]):
+            out.partial[row, k, c] = _difference(
+                ahead.partial[j, k, c], here.partial[j, k, c], behind.partial[j, k, c], factor,
+                forward, usual.partial[j, k, c])
+    if states == 0:
+        return
+    for k in range(dynamics.friction_length(here)):
+        out.force[row, k] = _difference(ahead.force[j, k], here.force[j, k], behind.force[j, k],
+                                        factor, forward, usual.force[j, k])
+    for k in range(states):
+        for c in range(width):
+            out.rates[row, k, c] = _difference(
+                ahead.rates[j, k, c], here.rates[j, k, c], behind.rates[j, k, c], factor, forward,
+                usual.rates[j, k, c])
+
+
+@routine
+def set_bends(step, acceleration, problem, progress, room, v):
+    """Fill v.bends, whose row D_k n + j is how the gradients of node j change along direction k.
+
+    Where no stage moves a node along it, or nothing depends on it, v.paths becomes zero instead.
+    """
+    s, blocks, control = problem.system, problem.blocks, problem.control
+    n, motions = len(s.gap), v.inside.partial.shape[2]
+    w, between, z = v.nodes, room.between, v.vectors[0]
+    dynamics.project(blocks, progress.state, w[0], w[1])
+    dynamics.project(blocks, progress.rate, between[0], between[1])
+    even = control.ground[STEEPEST] == 0.0 and s.friction_scale == 0
+    for k in range(2 * len(v.none), len(z)):
+        z[k] = progress.state[k]
+    for j in range(n):
+        motion = dynamics.motion_of(j, w, s)
+        for direction in range(v.paths.shape[1]):
+            reach = _reach(direction, j, control, v)
+            if reach == 0.0 or (even and (direction == 0 or (direction == 4 and motions > 4))):
+                for i in range(tableau.STAGES):
+                    v.paths[i, direction, j] = 0.0
+                continue
+            _gradients_aside(direction, reach, j, motion, step.moved, z, s, v, v.ahead)
+            _gradients_aside(direction, -reach, j, motion, step.moved, z, s, v, v.behind)
+            forward = _onward(direction, j, motion, acceleration, step, s, v, between,
+                              progress.rate) >= 0.0
+            _set_bend(j, direction * n + j, 1.0 / reach, forward, progress.gradients, v)
+
+
+@helper
+def set_ahead(i, v):
+    """Fill v.ahead with the change of the gradients along stage i."""
+    g, bends, paths = v.ahead, v.bends, v.paths
+    states, width = g.rates.shape[1], g.rates.shape[2]
+    n, entries = paths.shape[2], g.partial.shape[1] * g.partial.shape[2]
+    partial = g.partial.reshape((n, entries))
+    changes = bends.partial.reshape((len(bends.partial), entries))
+    length = dynamics.friction_length(g) if states > 0 else 0
+    partial[:] = 0.0
+    g.force[:, :length] = 0.0
+    g.rates[:] = 0.0
+    for direction in range(paths.shape[1]):
+        for j in range(n):
+            path, row = paths[i, direction, j], direction * n + j
+            if path == 0.0:
+                continue
+            out, change = partial[j], changes[row]
+            for k in range(entries):
+                out[k] += path * change[k]
+            for k in range(length):
+                g.force[j, k] += path * bends.force[row, k]
+            for k in range(states):
+                for c in range(width):
+                    g.rates[j, k, c] += path * bends.rates[row, k, c]
+
+
+@helper
+def _between(above, here, below, width, central, usual):
+    """Difference quotient to a parameter; where one side has met a jump, that of the other."""
+    a, b = above - here, here - below
+    if central and abs(a + b) > _STEEP * usual and abs(a - b) > 0.5 * max(abs(a), abs(b)):
+        return 2.0 / width * (a if abs(a) < abs(b) else b)
+    return (a + b) / width
+
+
+@helper
+def set_between(above, here, below, width, central, usual, out):
+    """Fill ``out`` with the derivatives of the gradients to a parameter."""
+    n, states, length = here.rates.shape
+    for j in range(n):
+        for row in range(here.partial.shape[1]):
+            for k in range(here.partial.shape[2]):
+                out.partial[j, row, k] = _between(
+                    above.partial[j, row, k], here.partial[j, row, k], below.partial[j, row, k],
+                    width, central, usual.partial[j, row, k])
+        for k in range(dynamics.friction_length(here)):
+            out.force[j, k] = _between(above.force[j, k], here.force[j, k], below.force[j, k],
+                                       width, central, usual.force[j, k])
+        for row in range(states):
+            for k in range(length):
+                out.rates[j, row, k] = _between(
+                    above.rates[j, row, k], here.rates[j, row, k], below.rates[j, row, k], width,
+                    central, usual.rates[j, row, k])
 
 
 @helper
@@ -21,14 +279,19 @@ def set_solver(G, blocks, reduced, v):
     """Fill v.solver (m, 2 m), which makes u_v of a right side: the factors' F^-1 [Jq, G I]."""
     m = len(reduced.pivots)
     x = reduced.room
-    for c in range(2 * m):
-        for i in range(m):
-            x[blocks.position[i]] = reduced.J[i, c] if c < m else 0.0
-        if c >= m:
-            x[blocks.position[c - m]] = G
+    for c in range(m):
+        x[:] = 0.0
+        x[blocks.position[c]] = G
         solve_within(reduced.factors, blocks.reach, reduced.starts, reduced.pivots, x)
         for i in range(m):
-            v.solver[i, c] = x[blocks.position[i]]
+            v.solver[i, m + c] = x[blocks.position[i]]
+    for i in range(m):
+        for k in range(m):
+            v.solver[i, k] = 0.0
+        for c in range(m):
+            part = v.solver[i, m + c] / G
+            for k in range(m):
+                v.solver[i, k] += part * reduced.J[c, k]
 
 
 @helper
@@ -45,41 +308,47 @@ def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
     """Solve stage i of all columns; systems without internal variables."""
     count, size = v.columns.shape
     m = len(v.none)
-    for matrix, gradients in ((v.inside_matrix, v.inside), (v.ahead_matrix, v.ahead)):
-        stage_solver.set_answers(blocks, gradients, reduced)
-        _products(blocks.shapes, reduced.answers, matrix)
+    stage_solver.set_answers(blocks, v.inside, reduced, v.answers)
+    stage_solver.set_answers(blocks, v.ahead, reduced, v.answers[2 * m :])
+    _products(blocks.shapes, v.answers, v.both)
     for row in range(m):
         for k in range(m):
-            v.inside_matrix[row, k] -= s.stiffness[row, k]
-            v.inside_matrix[row, m + k] -= s.damping[row, k]
+            v.both[row, k] -= s.stiffness[row, k]
+            v.both[row, m + k] -= s.damping[row, k]
     for c in range(count):
         own = v.stages[tableau.STAGES * c : tableau.STAGES * (c + 1)]
-        tableau.combined(tableau.A[i], 1.0, v.columns[c], own, v.moved[c])
-    _products(v.moved, v.inside_matrix, v.pushed)
-    _products(v.columns, v.ahead_matrix, v.bent)
-    rate = v.vectors[4]
-    for c in range(count):
-        for k in range(m):
-            rate[k] = v.moved[c, m + k]
-            rate[m + k] = v.pushed[c, k] + v.bent[c, k]
-        if varies and c == count - 1:
+        moved, right = v.moved[c], v.right[c]
+        tableau.combined_twice(i, h, v.columns[c], own, moved[:size], right)
+        if i == 0:
             for k in range(size):
-                rate[k] += forced[k]
-        own = v.stages[tableau.STAGES * c : tableau.STAGES * (c + 1)]
-        tableau.combined(tableau.C[i], 1.0 / h, rate, own, v.right[c])
-    _products(v.right, v.solver, v.pushed)
+                moved[size + k] = v.columns[c, k]
+    _products(v.moved, v.both, v.pushed)
     for c in range(count):
-        out = v.stages[tableau.STAGES * c + i]
+        moved, right, pushed = v.moved[c, m:], v.right[c], v.pushed[c]
+        faster = right[m:]
         for k in range(m):
-            out[m + k] = v.pushed[c, k]
-            out[k] = (v.right[c, k] + v.pushed[c, k]) / G
+            right[k] += moved[k]
+        for k in range(m):
+            faster[k] += pushed[k]
+    if varies:
+        for k in range(size):
+            v.right[count - 1, k] += forced[k]
+    _products(v.right, v.solver, v.pushed)
+    time = 1.0 / G
+    for c in range(count):
+        out, right, pushed = v.stages[tableau.STAGES * c + i], v.right[c], v.pushed[c]
+        faster = out[m:]
+        for k in range(m):
+            out[k] = time * (right[k] + pushed[k])
+        for k in range(m):
+            faster[k] = pushed[k]
         if i == tableau.STAGES - 1:
             for k in range(size):
                 v.after[c, k] = v.moved[c, k] + out[k]
 
 
 @helper
-def _push(g, s, blocks, x, w, rate):
+def push(g, s, blocks, x, w, rate):
     """Add to w[2] (d n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
     n, states, _ = g.rates.shape
     m = len(blocks.position)
@@ -124,8 +393,8 @@ def one_by_one(i, h, G, s, blocks, gradients, reduced, forced, varies, v):
         tableau.combined(tableau.A[i], 1.0, v.columns[c], own, X)
         w[2, :] = 0.0
         rate[2 * m :] = 0.0
-        _push(v.ahead, s, blocks, v.columns[c], w, rate)
-        _push(v.inside, s, blocks, X, w, rate)
+        push(v.ahead, s, blocks, v.columns[c], w, rate)
+        push(v.inside, s, blocks, X, w, rate)
         dynamics.gather(X, s, blocks, v.none, w[2], rate)
         if varies and c == count - 1:
             for k in range(size):
