@@ -104,16 +104,16 @@ def measure(problem: Problem, quick: bool) -> None:
             print(f"{problem.name:3s} {name:16s} rtol {rtol:7.1e}  {seconds * 1e3:10.2f} ms  "
                   f"error {error:.1e}")
     print(f"{problem.name:3s} ms at error of   " + "".join(f"{level:>22.0e}" for level in LEVELS))
-    ours = [_time_at(points["fecontact"], level) for level in LEVELS]
+    ours = [time_at(points["fecontact"], level) for level in LEVELS]
     for name, rows in points.items():
         cells = []
         for level, best in zip(LEVELS, ours, strict=True):
-            seconds = _time_at(rows, level)
+            seconds = time_at(rows, level)
             cells.append(f"{seconds * 1e3:12.2f} ({seconds / best:6.1f} x)")
         print(f"{problem.name:3s} {name:16s} " + "".join(cells), flush=True)
 
 
-def _time_at(rows: list[tuple[float, float, float]], level: float) -> float:
+def time_at(rows: list[tuple[float, float, float]], level: float) -> float:
     """Least time in which an error is reached, between measured points on logarithmic axes."""
     best = np.inf
     for (_, t0, e0), (_, t1, e1) in itertools.pairwise(rows):

@@ -89,7 +89,7 @@ def diagram(values: Array) -> list[ContactSystem]:
 
 
 def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Problem:
-    """(b), (b2), (c): section 4 with one, two and three modes."""
+    """(b), (b2), (c): section 4 with one, two and three modes; (r): (c) on rigid ground."""
     w, r = 13.8, 1.0 / np.sqrt(_BELT_MASS)
     elastic = 2.0 * np.pi * 30.0
     basis = {
@@ -98,15 +98,18 @@ def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Pro
         "c": lambda: _basis([0.0, 0.0, elastic], [0.0, 0.0, 0.01],
                             [[r, 0.0, 0.5 * r], [0.0, r, 0.0]],
                             [[r, 0.0, -0.5 * r], [0.0, r, 0.0]]),
+        "r": lambda: _basis([0.0, elastic], [0.0, 0.01], [[r, 0.5 * r], [0.0, 0.0]],
+                            [[r, -0.5 * r], [0.0, 0.0]]),
     }[name]()
-    normal = PrescribedForce(14.0) if name == "b" else RoughSurface(10e6, 10e-6, 40.0)
+    given = name in ("b", "r")
+    normal = PrescribedForce(14.0) if given else RoughSurface(10e6, 10e-6, 40.0)
     system = ContactSystem(
         basis, normal=normal, friction=FRICTION, ground=Ground(speed=1e-3),
         drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3, angular_frequency=w),
-        # (b) does not move in y: the load is the prescribed force.
-        load=Load(0.0 if name == "b" else 14.0))
+        # (b) and (r) do not move in y: the load is the prescribed force.
+        load=Load(0.0 if given else 14.0))
     times = np.linspace(0.0, periods * 2.0 * np.pi / w, periods * outputs + 1)
-    entries = [(0, 0, 0), (0, 0, 1)] + ([] if name == "b" else [(0, 1, 0)])
+    entries = [(0, 0, 0), (0, 0, 1)] + ([] if given else [(0, 1, 0)])
     return Problem(name, system, np.zeros(2 * basis.modes), times, _observed(basis, entries))
 
 

@@ -21,6 +21,9 @@ BENCHMARKS = {
     "laws": ((), [(r"lugre .* us, (\d) internal", 1.0, 0.0),
                    (r"iwan .* us, (\d) internal", 8.0, 0)]),
     "many_contacts": ((), [(r"^ +400 .* (\S+) +\S+$", 0.1, 0.03)]),
+    "nonsmooth": ((), [(r"^b event-driven +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-5),
+                       (r"^b smoothed +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4),
+                       (r"^c event-driven +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4)]),
     "output": ((), [(r"^(\d+) nodes", 205.0, 50.0)]),
     # With all residual vectors nothing is missing of the compliance.
     "reduction": ((), [(r"^slender beam, P2 +0 .* (\S+)$", 0.0, 1e-9)]),
@@ -28,7 +31,8 @@ BENCHMARKS = {
     "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
-HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems"}
+HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems",
+           "nonsmooth_peer"}
 
 
 def test_every_benchmark_is_here():

@@ -15,6 +15,7 @@ G. Farin, Curves and Surfaces for CAGD, 5th ed., chapters 4 and 5 (de Casteljau'
 the convex hull, multiplication by s and 1 - s).
 """
 
+from fractions import Fraction
 from math import comb
 
 import numpy as np
@@ -199,3 +200,17 @@ def fit(places):
     return np.ascontiguousarray(np.linalg.inv(np.array(
         [[comb(degree, k) * s**k * (1.0 - s) ** (degree - k) for k in range(degree + 1)]
          for s in places])))
+
+
+def of_nested(degree):
+    """Bernstein coefficients, row by row, of 1, s, s (1 - s), s^2 (1 - s), s^2 (1 - s)^2, ...
+
+    These are what :func:`from_nested` sums up.
+    """
+    powers, rows = [1] + [0] * degree, []
+    for k in range(degree + 1):
+        rows.append([float(sum(Fraction(comb(i, j) * powers[j], comb(degree, j))
+                               for j in range(i + 1))) for i in range(degree + 1)])
+        raised = [0, *powers[:-1]]
+        powers = raised if k % 2 == 0 else [a - b for a, b in zip(powers, raised, strict=True)]
+    return np.array(rows)

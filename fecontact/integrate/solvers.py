@@ -228,8 +228,8 @@ class SetValued(Solver):
             task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
             impact_law=self.impact_law, tangential_restitution=self.tangential_restitution,
             static_coefficient=self.static_coefficient, scheme=self.scheme,
-            longest=longest_step(task.system, task.times, task.max_step), events=task.events,
-            progress=task.progress)
+            longest=longest_step(task.system, task.times, task.max_step), max_step=task.max_step,
+            events=task.events, progress=task.progress)
         # Options in the statistics make the run reproducible.
         told = {name: getattr(self, name) for name in (
             "restitution", "impact_law", "tangential_restitution", "static_coefficient")}

@@ -4,7 +4,7 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ from fecontact.system.powers import POWER_COUNT
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
 _STEPS_PER_CALL = 2000
+# Longest step in periods of the excitation, where it is the only thing given in time.
+_PERIOD_PART = 0.125
 # Errors of velocities count relative to this part of what drive and loads bring about.
 _DRIVEN = 1e-3
 # How runs end before their last output time.
@@ -48,6 +50,7 @@ def integrate_set_valued(
     tangential_restitution: float = 0.0,
     static_coefficient: float | Sequence[float] | None = None,
     longest: float | None = None,
+    max_step: float | None = None,
     events: Sequence[AnyEvent] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Solution:
@@ -88,7 +91,10 @@ def integrate_set_valued(
     static_coefficient : float or (n,) sequence, optional
         Limit of \|R\|/F in stick, at least the law's mu(0+) [-]; default is that.
     longest : float, optional
-        Longest step [s]; default from the run, the excitation and the ground.
+        Longest step [s]; default from the run, the excitation and the ground. Event-driven runs
+        with compliant contact take longer ones if it is the default.
+    max_step : float, optional
+        Limit of these [s].
     events : sequence of ContactEvents, Crossing and Event
         Events to locate, from event to event only.
     progress : callable, optional
@@ -111,47 +117,18 @@ def integrate_set_valued(
     Constraints, Springer 2008. V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical
     Systems, Springer 2008.
     """
-    times = np.ascontiguousarray(times, dtype=float)
-    longest = longest_step(system, times) if longest is None else longest
-    problem, rubbing = nonsmooth_problem(system, restitution, static_coefficient, longest)
-    problem = problem._replace(tangential=float(tangential_restitution),
-                               poisson=int(impact_law == "poisson"))
-    scheme = _chosen(problem, scheme)
     begin = clock.perf_counter()
+    run = start(system, state, times, rtol=rtol, scheme=scheme, restitution=restitution,
+                impact_law=impact_law, tangential_restitution=tangential_restitution,
+                static_coefficient=static_coefficient, longest=longest, max_step=max_step,
+                events=events)
+    course, output, found = run.course, run.output, run.found
+    counts, reached, times = course.counts, course.clock, output.times
     n, m, solid = system.basis.contact_nodes, system.basis.modes, system.basis.dimension == 3
-    course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
-    limits = kinds.Limits(
-        np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
-        _floor(system, state, times, longest), rtol, longest)
-    output = kinds.Output(times, np.empty((len(times), len(course.state))),
-                          np.empty((len(times), len(course.carried))), np.empty((len(times), n)))
-    workspace = kinds.workspace_for(problem)
-    run: Callable[..., int]
-    found = _Found(system, events)
-    if solid and restitution is not None:
-        from fecontact.integrate.nonsmooth.impact_steps import run_impact_steps
-        from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
-        _require_no_events(events)
-        run = partial(run_impact_steps, problem, limits, course, output,
-                      impact_room_for(problem))
-    elif scheme == "events":
-        from fecontact.integrate.nonsmooth.event_driven import run_events
-        from fecontact.integrate.nonsmooth.event_search import room_for
-        run = partial(run_events, problem, limits, course, output, workspace,
-                      room_for(problem, len(course.state)), found.watch)
-    else:
-        from fecontact.integrate.nonsmooth.space_contact import in_space
-        from fecontact.integrate.nonsmooth.stepping_room import IN_PLANE
-        from fecontact.integrate.nonsmooth.stepping_room import room_for as stepping_room
-        from fecontact.integrate.nonsmooth.time_stepping import run_steps
-        _require_no_events(events)
-        run = partial(run_steps, problem, limits, course, output, workspace,
-                      stepping_room(problem, in_space() if solid else IN_PLANE))
-    counts, reached = course.counts, course.clock
     outcome, ended = kinds.GOING_ON, Status.FINISHED
     try:
         while outcome == kinds.GOING_ON:
-            outcome = run(_STEPS_PER_CALL)
+            outcome = run.go(_STEPS_PER_CALL)
             found.empty()
             if progress is not None:
                 progress(float(reached[kinds.TIME]))
@@ -160,7 +137,7 @@ def integrate_set_valued(
             raise
         ended = Status.INTERRUPTED
     statistics: dict[str, Any] = {
-        "scheme": scheme, "steps": int(counts[kinds.STEPS]),
+        "scheme": run.scheme, "steps": int(counts[kinds.STEPS]),
         "rejected": int(counts[kinds.REJECTED]), "events": int(counts[kinds.EVENTS]),
         "impacts": int(counts[kinds.IMPACTS]),
         "seconds": clock.perf_counter() - begin}
@@ -180,6 +157,75 @@ def integrate_set_valued(
     return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
                     statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
                     friction_force=friction, events=found.events)
+
+
+class Run(NamedTuple):
+    """A run: what goes on by so many steps and tells how that ended, and what is filled by it."""
+
+    go: Callable[[int], int]
+    course: kinds.Progress
+    output: kinds.Output
+    found: "_Found"
+    scheme: str
+
+
+def start(
+    system: ContactSystem,
+    state: Array,
+    times: Array,
+    *,
+    rtol: float,
+    scheme: str = "auto",
+    restitution: float | None = None,
+    impact_law: str = "newton",
+    tangential_restitution: float = 0.0,
+    static_coefficient: float | Sequence[float] | None = None,
+    longest: float | None = None,
+    max_step: float | None = None,
+    events: Sequence[AnyEvent] = (),
+) -> Run:
+    """A run before its first step; see :func:`integrate_set_valued`."""
+    times = np.ascontiguousarray(times, dtype=float)
+    default = longest_step(system, times)
+    longest = default if longest is None else longest
+    problem, rubbing = nonsmooth_problem(system, restitution, static_coefficient, longest)
+    problem = problem._replace(tangential=float(tangential_restitution),
+                               poisson=int(impact_law == "poisson"))
+    scheme = _chosen(problem, scheme)
+    solid = system.basis.dimension == 3
+    course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
+    limits = kinds.Limits(
+        np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        _floor(system, state, times, longest), rtol, longest)
+    if longest == default and scheme == "events" and restitution is None:
+        most = np.inf if max_step is None else float(max_step)
+        limits = limits._replace(longest=min(_longest_between_events(system, times), most))
+    output = kinds.Output(times, np.empty((len(times), len(course.state))),
+                          np.empty((len(times), len(course.carried))),
+                          np.empty((len(times), system.basis.contact_nodes)))
+    workspace = kinds.workspace_for(problem)
+    run: Callable[..., int]
+    found = _Found(system, events)
+    if solid and restitution is not None:
+        from fecontact.integrate.nonsmooth.impact_steps import run_impact_steps
+        from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
+        _require_no_events(events)
+        run = partial(run_impact_steps, problem, limits, course, output,
+                      impact_room_for(problem))
+    elif scheme == "events":
+        from fecontact.integrate.nonsmooth.event_search import room_for
+        from fecontact.integrate.nonsmooth.steps.small_systems import run_for
+        run = partial(run_for(problem), problem, limits, course, output, workspace,
+                      room_for(problem, len(course.state)), found.watch)
+    else:
+        from fecontact.integrate.nonsmooth.space_contact import in_space
+        from fecontact.integrate.nonsmooth.stepping_room import IN_PLANE
+        from fecontact.integrate.nonsmooth.stepping_room import room_for as stepping_room
+        from fecontact.integrate.nonsmooth.time_stepping import run_steps
+        _require_no_events(events)
+        run = partial(run_steps, problem, limits, course, output, workspace,
+                      stepping_room(problem, in_space() if solid else IN_PLANE))
+    return Run(run, course, output, found, scheme)
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:
@@ -349,6 +395,14 @@ def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
         raise InputError(f"scheme = 'events' needs independent slip velocities, but the "
                          f"{len(moving)} different ones depend on fewer modes; use 'stepping'.")
     return scheme
+
+
+def _longest_between_events(system: ContactSystem, times: Array) -> float:
+    """Longest step [s] of an event-driven run with compliant contact."""
+    if not system.prescribed_motion.constant or system.ground.wavy:
+        return longest_step(system, times)
+    start, end = float(times[0]), float(times[-1])
+    return min((end - start) / 50.0, _PERIOD_PART * system.shortest_period(start, end))
 
 
 def _floor(system: ContactSystem, state: Array, times: Array, longest: float) -> Array:

@@ -70,6 +70,8 @@ def solve_small(w, size):
 def speed_rate(t, p):
     """Acceleration of the ground, from its speed."""
     s, d = p.system, p.tick
+    if p.steady != 0:
+        return 0.0
     near = (signal_at(s.ground_motion)(t + d, s.ground_motion_parameters)[1]
             - signal_at(s.ground_motion)(t - d, s.ground_motion_parameters)[1])
     far = (signal_at(s.ground_motion)(t + 2.0 * d, s.ground_motion_parameters)[1]
@@ -95,7 +97,7 @@ def contact_powers(moved, s, nodes, friction, elastic, out):
         force, R, speed = nodes[j, FORCE], friction[j], s.sliding[j] * moved.speed
         out[BELT_NORMAL] += belt_normal_power(force, nodes[j, SLOPE], nodes[j, SLIP], speed, s)
         out[BELT_FRICTION] -= R * speed
-        if elastic:
+        if elastic and nodes[j, RATE] != 0.0:
             # Damping may bring the force to zero while the spring is still compressed.
             stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
             out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
@@ -113,8 +115,8 @@ def stick_limit(j, pressing, p):
 
 
 @helper
-def observe(moved, Y, p, nodes):
-    """Fill ``nodes`` from the positions and velocities in Y; rigid stops have no force yet."""
+def observe_forces(moved, Y, p, nodes):
+    """Fill ``nodes`` but for limits of stick; rigid stops have no force yet."""
     s = p.system
     for j in range(len(nodes)):
         contact = node_contact(j, node_motion(j, Y, s), moved, s)
@@ -126,13 +128,34 @@ def observe(moved, Y, p, nodes):
             grip = pressing_force(j, contact, 1.0, s)
             if stick_limit(j, grip, p) == 0.0:
                 grip = 0.0
-        pressing = pressing_force(j, contact, force, s)
-        nodes[j, FORCE], nodes[j, PRESSING] = force, pressing
-        nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
+        nodes[j, FORCE], nodes[j, PRESSING] = force, pressing_force(j, contact, force, s)
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
         nodes[j, SLIP], nodes[j, SLOPE] = contact.slip, contact.slope
         nodes[j, GRIP] = grip
         nodes[j, CURVED] = contact.curvature * contact.slip * contact.slip
+
+
+@helper
+def _set_node_limits(p, nodes):
+    for j in range(len(nodes)):
+        pressing = nodes[j, PRESSING]
+        nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
+
+
+@helper
+def observe(moved, Y, p, nodes):
+    """Fill ``nodes`` from the positions and velocities in Y; rigid stops have no force yet."""
+    observe_forces(moved, Y, p, nodes)
+    _set_node_limits(p, nodes)
+
+
+@helper
+def set_limits(p, w):
+    """Put the limits of stick of nodes and clusters into w, whose forces are known."""
+    _set_node_limits(p, w.nodes)
+    w.limit[:] = 0.0
+    for j in range(len(p.cluster)):
+        w.limit[p.cluster[j]] += w.nodes[j, LIMIT]
 
 
 @helper
@@ -234,9 +257,7 @@ def hold_contacts(t, p, status, closed, w, acceleration):
     for j in range(n):
         c, force = p.cluster[j], w.nodes[j, FORCE]
         w.nodes[j, PRESSING] = force * w.nodes[j, GRIP]
-        w.nodes[j, LIMIT] = stick_limit(j, w.nodes[j, PRESSING], p)
         w.pressing[c] += w.nodes[j, PRESSING]
-        w.limit[c] += w.nodes[j, LIMIT]
         w.friction[j] *= force
         if status[c] != STICK:
             w.total[c] += w.friction[j]
@@ -245,10 +266,14 @@ def hold_contacts(t, p, status, closed, w, acceleration):
 @helper
 def share_friction(p, status, w):
     """Put the parts of the nodes in the friction of sticking clusters into ``w.friction``."""
+    alone = len(p.rows) == len(p.cluster)
     for j in range(len(p.cluster)):
         c = p.cluster[j]
-        if status[c] == STICK and w.limit[c] > 0.0:
-            w.friction[j] = w.total[c] * w.nodes[j, LIMIT] / w.limit[c]
+        if status[c] == STICK:
+            if alone:
+                w.friction[j] = w.total[c]
+            elif w.limit[c] > 0.0:
+                w.friction[j] = w.total[c] * w.nodes[j, LIMIT] / w.limit[c]
 
 
 @helper
@@ -263,6 +288,17 @@ def hold_clusters(t, p, status, w, acceleration):
     if count == 0:
         return
     ground = speed_rate(t, p)
+    if count == 1:
+        c = w.indices[0]
+        right, total = -p.sliding[c] * ground, 0.0
+        for i in range(m):
+            right += p.rows[c, i] * acceleration[i]
+            total += p.rows[c, i] * p.rows[c, i]
+        force = right / total
+        w.total[c] = force
+        for i in range(m):
+            acceleration[i] -= p.rows[c, i] * force
+        return
     for a in range(count):
         c = w.indices[a]
         w.right[a] = -p.sliding[c] * ground
@@ -281,39 +317,49 @@ def hold_clusters(t, p, status, w, acceleration):
             acceleration[i] -= p.rows[c, i] * w.right[a]
 
 
+@helper
+def add_contact_forces(t, Y, moved, p, status, closed, w, acceleration):
+    """Put the contact forces at Y into w and into ``acceleration``, which is that without them.
+
+    Limits of stick are left out.
+    """
+    s = p.system
+    n, m = s.Tx.shape
+    observe_forces(moved, Y, p, w.nodes)
+    w.total[:] = 0.0
+    w.pressing[:] = 0.0
+    w.friction[:] = 0.0
+    if p.restitution >= 0.0:
+        hold_contacts(t, p, status, closed, w, acceleration)
+        return
+    for j in range(n):
+        c = p.cluster[j]
+        slip, pressing = w.nodes[j, SLIP], w.nodes[j, PRESSING]
+        w.slip[c] = slip
+        w.pressing[c] += pressing
+        direction = sense(status[c], slip)
+        if pressing > 0.0 and direction != 0:
+            w.friction[j] = slipping_force(j, slip, float(direction), pressing, s)
+            w.total[c] += w.friction[j]
+        force = w.nodes[j, FORCE]
+        for i in range(m):
+            acceleration[i] += (lifting_row(j, i, w, s) * force
+                                - s.Tx[j, i] * w.friction[j])
+    hold_clusters(t, p, status, w, acceleration)
+
+
 def _derivative(t, held_Y, p, held_status, held_closed, w, held_out):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
     Y, out = borrowed(held_Y), borrowed(held_out)
     status, closed = borrowed(held_status), borrowed(held_closed)
     s = p.system
-    n, m = s.Tx.shape
+    m = s.Tx.shape[1]
     for i in range(m):
         out[i] = Y[m + i]
     acceleration = out[m : 2 * m]
     moved = free_acceleration(t, Y, s, acceleration)
-    observe(moved, Y, p, w.nodes)
-    w.total[:] = 0.0
-    w.limit[:] = 0.0
-    w.pressing[:] = 0.0
-    w.friction[:] = 0.0
-    if p.restitution >= 0.0:
-        hold_contacts(t, p, status, closed, w, acceleration)
-    else:
-        for j in range(n):
-            c = p.cluster[j]
-            slip, pressing = w.nodes[j, SLIP], w.nodes[j, PRESSING]
-            w.slip[c] = slip
-            w.pressing[c] += pressing
-            w.limit[c] += w.nodes[j, LIMIT]
-            direction = sense(status[c], slip)
-            if pressing > 0.0 and direction != 0:
-                w.friction[j] = slipping_force(j, slip, float(direction), pressing, s)
-                w.total[c] += w.friction[j]
-            force = w.nodes[j, FORCE]
-            for i in range(m):
-                acceleration[i] += (lifting_row(j, i, w, s) * force
-                                    - s.Tx[j, i] * w.friction[j])
-        hold_clusters(t, p, status, w, acceleration)
+    add_contact_forces(t, Y, moved, p, status, closed, w, acceleration)
+    set_limits(p, w)
     share_friction(p, status, w)
     body_powers(t, Y, s, out[2 * m :])
     contact_powers(moved, s, w.nodes, w.friction, p.restitution < 0.0, out[2 * m :])

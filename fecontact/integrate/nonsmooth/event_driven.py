@@ -15,7 +15,7 @@ from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
-from fecontact.integrate.nonsmooth.event_search import ROOM, first_changes
+from fecontact.integrate.nonsmooth.event_search import ROOM, first_changes, holding, set_left
 from fecontact.integrate.nonsmooth.problem import (
     DEPTH_SIZE,
     DIVERGED,
@@ -24,6 +24,7 @@ from fecontact.integrate.nonsmooth.problem import (
     FORCE,
     GOING_ON,
     IMPACTS,
+    LAST_ERROR,
     LENGTH,
     LIMITS,
     OUTPUT,
@@ -35,6 +36,7 @@ from fecontact.integrate.nonsmooth.problem import (
     RATE,
     RATE_SIZE,
     REJECTED,
+    REPEATED,
     SLIP_SIZE,
     STARTED,
     STEPS,
@@ -52,12 +54,15 @@ from fecontact.integrate.nonsmooth.rigid_stops import (
     change_contacts_at,
     settle,
 )
+from fecontact.integrate.nonsmooth.steps.rates import set_rates, set_slips, share
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
 from fecontact.integrate.rodas5p.event_kernels import WATCH
 from fecontact.system.powers import DRIVE, drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
 EARLY = 0.25
+# Weight of the error before in the control of the steps, and the least one that counts.
+_DAMPED, _SMALLEST_ERROR = 0.03, 1e-4
 # Events in a row without any time between them after which a run is stuck.
 _MOST_IDLE = 200
 
@@ -111,11 +116,12 @@ def _write_within(step, reached, with_end, p, progress, output, w, room):
             times[counts[OUTPUTS]] < reached
             or (with_end and times[counts[OUTPUTS]] == reached)):
         row = counts[OUTPUTS]
-        interpolate((times[row] - step.t) / step.h, progress.state, room.parts,
-                    output.states[row])
-        derivative(times[row], output.states[row], p, progress.status, progress.closed, w,
-                   room.rate)
-        output.friction[row], output.normal[row] = w.friction, w.nodes[:, FORCE]
+        state = output.states[row]
+        interpolate((times[row] - step.t) / step.h, progress.state, room.parts, state)
+        set_rates(times[row], state, p, progress, w, room, room.rate)
+        share(p, progress.status, w)
+        for j in range(len(w.friction)):
+            output.friction[row, j], output.normal[row, j] = w.friction[j], w.nodes[j, FORCE]
         counts[OUTPUTS] += 1
 
 
@@ -140,10 +146,19 @@ def _shortened(length, size_of_error):
 
 
 @helper
-def _lengthened(length, size_of_error):
-    """Length of the step after an accepted one."""
-    h = length * min(5.0, max(0.5, 0.9 * max(size_of_error, 1e-12) ** -0.125))
-    return length if length < h < 1.1 * length else h
+def _lengthened(length, size_of_error, clock):
+    """Length of the step after an accepted one.
+
+    By its error and a little of the one before (PI control), so that steps at the limit of
+    stability do not fail by turns; after a step that failed not longer.
+    """
+    size = max(size_of_error, _SMALLEST_ERROR)
+    last = clock[LAST_ERROR] if clock[LAST_ERROR] > 0.0 else size
+    factor = min(5.0, max(0.5, 0.9 * size ** (0.75 * _DAMPED - 0.125) * last**_DAMPED))
+    if clock[REPEATED] != 0.0:
+        factor = min(factor, 1.0)
+    clock[LAST_ERROR], clock[REPEATED] = size, 0.0
+    return length if 1.0 < factor < 1.1 else length * factor
 
 
 @helper
@@ -188,7 +203,7 @@ def _accept(step, t, passing, p, progress, output, w, room):
     if p.restitution >= 0.0:
         settle(t, p, status, closed, w, room.rate, Y)
     elif any_held:
-        derivative(t, Y, p, status, closed, w, room.rate)
+        set_slips(t, Y, p, w)
         hold_velocity(p, room.held, w, Y)
     if passing:
         derivative(t, Y, p, status, closed, w, room.slopes[0])
@@ -258,7 +273,10 @@ def _stop_within(step, part, p, progress, output, w, room):
     progress.clock[TIME] = reached
 
 
-@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, WATCH, i8), nogil=True)
+RUN = types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, WATCH, i8)
+
+
+@kernel(RUN, nogil=True)
 def run_events(held_p, held_limits, held_progress, held_output, held_w, held_room, held_watch,
                most):
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
@@ -273,7 +291,7 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
     clock, largest, longest = progress.clock, progress.largest, limits.longest
     t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
     tiny = 1e-14 * max(abs(output.times[0]), abs(end), longest)
-    stop, idle = 0, 0
+    stop, idle, ends_known = 0, 0, False
     while stop < len(limits.stops) and limits.stops[stop] <= t:
         stop += 1
     room.fresh[:] = False
@@ -301,12 +319,20 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
         reaching = length == left
         # At the end of a step that ends at a break, signals are as before the break.
         step = Step(t, length, np.nextafter(goal, t))
+        holds = holding(progress)
+        if holds and not ends_known:
+            set_rates(t, Y, p, progress, w, room, room.rate)
+            set_left(p, progress, w, room.ends[0])
+            ends_known = True
         take(step, p, progress, w, room)
         size_of_error = error(length, Y, limits, room)
         counts[STEPS] += 1
         if not size_of_error <= 1.0:
             counts[REJECTED] += 1
+            clock[REPEATED] = 1.0
             h = _shortened(length, size_of_error)
+            if not math.isfinite(size_of_error):
+                room.slopes[1:, :] = 0.0
             if not math.isfinite(size_of_error) and length < 1e-6 * longest:
                 clock[TIME], clock[LENGTH] = t, length
                 return DIVERGED
@@ -315,6 +341,8 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
                 return STUCK
             continue
         quick, fast, deep = _sizes(progress, w)
+        if holds:
+            set_left(p, progress, w, room.ends[1])
         prepare_dense(step, p, progress, w, room)
         shorter = first_changes(step, p, limits, progress, w, room)
         high, found = _first_place(room.place)
@@ -344,9 +372,12 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
                 stop += 1
             largest[SLIP_SIZE], largest[RATE_SIZE], largest[DEPTH_SIZE] = quick, fast, deep
             _accept(step, t, passing, p, progress, output, w, room)
-            h = _lengthened(length, size_of_error)
+            room.ends[0] = room.ends[1]
+            ends_known = ends_known and not passing
+            h = _lengthened(length, size_of_error, clock)
             continue
 
+        ends_known = False
         idle = idle + 1 if high * length <= tiny else 0
         if idle > _MOST_IDLE:
             clock[TIME], clock[LENGTH] = t, length

@@ -16,8 +16,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import helper, kernel, matrix, vector
-from fecontact.core.references import borrowed
+from fecontact.core.compiled import helper, matrix, routine, vector
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import (
     DEPTH,
@@ -25,25 +24,16 @@ from fecontact.integrate.bernstein import (
     NOWHERE,
     first_below,
     fit,
-    from_nested,
     largest,
+    of_nested,
     smallest,
     split,
     value,
 )
 from fecontact.integrate.nonsmooth.dop853 import PARTS, SLOPES, interpolate
-from fecontact.integrate.nonsmooth.equations import derivative
-from fecontact.integrate.nonsmooth.problem import (
-    FORCE,
-    LIMITS,
-    OPEN,
-    PROBLEM,
-    PROGRESS,
-    STEP,
-    STICK,
-    WORKSPACE,
-    NonsmoothProblem,
-)
+from fecontact.integrate.nonsmooth.equations import set_limits
+from fecontact.integrate.nonsmooth.problem import FORCE, OPEN, STICK, NonsmoothProblem
+from fecontact.integrate.nonsmooth.steps.rates import nothing_given, set_rates
 from fecontact.laws.signatures import ground_at, normal_at
 from fecontact.system.nodes import ground_motion
 
@@ -54,6 +44,8 @@ _WAVE = 0.25
 _PLACES = 0.5 - 0.5 * np.cos(np.pi * np.arange(PARTS + 1) / PARTS)
 _PLACES[-1] = 1.0
 _FIT = fit(_PLACES)
+
+_NESTED = of_nested(PARTS)
 # Forces are looked at in quarters of a part of the step.
 _QUARTERS = 4
 _FIT_QUARTERS = fit(np.arange(_QUARTERS + 1) / _QUARTERS)
@@ -82,6 +74,8 @@ class Room(NamedTuple):
         Parts of the step that are left to look at.
     left, scale : (_QUARTERS + 1, 2 k + n), (2 k + n,) arrays
         What forces have left at some places, and their sizes.
+    ends : (2, 2 k + n) array
+        What they have left at both ends of the step.
     waiting : (DEPTH, 2) array
         Begins and widths of parts whose forces are left to look at.
     past, fresh : (k + n,) boolean arrays
@@ -91,6 +85,8 @@ class Room(NamedTuple):
         Clusters that reach the limit of stick, that come to rest, and that stick.
     touched, parting : (n,) boolean arrays
         Stops that are struck, and that open.
+    given, loads, pushes : (GIVEN,), (m,), (m,) arrays
+        What is given in time, see :mod:`fecontact.integrate.nonsmooth.steps.rates`.
     """
 
     slopes: Array
@@ -106,6 +102,7 @@ class Room(NamedTuple):
     halves: Array
     left: Array
     scale: Array
+    ends: Array
     waiting: Array
     past: NDArray[np.bool_]
     fresh: NDArray[np.bool_]
@@ -114,35 +111,44 @@ class Room(NamedTuple):
     held: NDArray[np.bool_]
     touched: NDArray[np.bool_]
     parting: NDArray[np.bool_]
+    given: Array
+    loads: Array
+    pushes: Array
 
 
 _flags = types.Array(types.boolean, 1, "C")
-ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix]
-                        + [_flags] * 7, Room)
+ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix, matrix]
+                        + [_flags] * 7 + [vector] * 3, Room)
 
 
 def room_for(problem: NonsmoothProblem, size: int) -> Room:
     """Room for a problem whose state is of this size."""
-    n, k = len(problem.cluster), len(problem.rows)
+    n, (k, m) = len(problem.cluster), problem.rows.shape
     new, state, rate = np.zeros((3, size))
     nested, bound, along, values = np.zeros((4, PARTS + 1))
     return Room(np.zeros((SLOPES, size)), np.zeros((PARTS, size)), new, state, rate,
                 np.zeros(k + n), nested, bound, along, values, np.zeros((DEPTH, PARTS + 2)),
-                np.zeros((_QUARTERS + 1, 2 * k + n)), np.zeros(2 * k + n), np.zeros((DEPTH, 2)),
-                *(np.zeros(count, dtype=bool) for count in (k + n, k + n, k, k, k, n, n)))
+                np.zeros((_QUARTERS + 1, 2 * k + n)), np.zeros(2 * k + n), np.zeros((2, 2 * k + n)),
+                np.zeros((DEPTH, 2)),
+                *(np.zeros(count, dtype=bool) for count in (k + n, k + n, k, k, k, n, n)),
+                *(nothing_given(), *np.zeros((2, m))))
 
 
 @helper
 def _along(row, first, Y, room, b):
     """Coefficients b of ``row Y[first:]`` over the step; returns the size of its terms."""
-    c, parts, size = room.nested, room.parts, 0.0
-    c[:] = 0.0
+    parts, begin, size = room.parts, 0.0, 0.0
     for i in range(len(row)):
-        c[0] += row[i] * Y[first + i]
+        begin += row[i] * Y[first + i]
         size += abs(row[i]) * (abs(Y[first + i]) + abs(parts[0, first + i]))
-        for k in range(PARTS):
-            c[1 + k] += row[i] * parts[k, first + i]
-    from_nested(c, b)
+    for i in range(PARTS + 1):
+        b[i] = begin
+    for k in range(PARTS):
+        c = 0.0
+        for i in range(len(row)):
+            c += row[i] * parts[k, first + i]
+        for i in range(PARTS + 1):
+            b[i] += c * _NESTED[1 + k, i]
     return size
 
 
@@ -229,13 +235,24 @@ def first_pressed(b, above, finest, j, s, room):
 
 
 @helper
-def _forces(part, step, p, progress, w, room, out):
-    """Fill out (2 k + n,) with what sticking clusters and closed stops have left, both ways."""
-    status, closed = progress.status, progress.closed
-    interpolate(part, progress.state, room.parts, room.state)
-    derivative(min(step.t + part * step.h, step.latest), room.state, p, status, closed, w,
-               room.rate)
-    clusters = len(p.rows)
+def holding(progress):
+    """Whether any cluster sticks or any stop is closed."""
+    held = False
+    for c in range(len(progress.status)):
+        held = held or progress.status[c] == STICK
+    for j in range(len(progress.closed)):
+        held = held or progress.closed[j] != 0
+    return held
+
+
+@routine
+def set_left(p, progress, w, out):
+    """Fill out (2 k + n,) with what sticking clusters and closed stops have left, both ways.
+
+    Forces are those in w.
+    """
+    status, closed, clusters = progress.status, progress.closed, len(p.rows)
+    set_limits(p, w)
     out[:] = 1.0
     for k in range(clusters):
         if status[k] == STICK:
@@ -247,6 +264,15 @@ def _forces(part, step, p, progress, w, room, out):
     for j in range(len(closed)):
         if closed[j]:
             out[2 * clusters + j] = w.nodes[j, FORCE]
+
+
+@routine
+def _forces(part, step, p, progress, w, room, out):
+    """Fill out (2 k + n,) with what is left at a part of the step."""
+    interpolate(part, progress.state, room.parts, room.state[: 2 * p.rows.shape[1]])
+    set_rates(min(step.t + part * step.h, step.latest), room.state, p, progress, w, room,
+              room.rate)
+    set_left(p, progress, w, out)
 
 
 @helper
@@ -294,7 +320,7 @@ def _clear(left, size):
 @helper
 def _first_let_go(end, step, p, progress, w, room):
     """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
-    left, size = room.left, room.scale
+    left, size, known = room.left, room.scale, holding(progress)
     size[:] = 0.0
     room.waiting[0, 0], room.waiting[0, 1], waiting = 0.0, end, 1
     while waiting > 0:
@@ -302,7 +328,10 @@ def _first_let_go(end, step, p, progress, w, room):
         low, high = 0.0, NOWHERE
         for i in range(_QUARTERS + 1):
             here = begin + width * i / _QUARTERS
-            _forces(here, step, p, progress, w, room, left[i])
+            if known and (here == 0.0 or here == 1.0):
+                left[i, :] = room.ends[int(here)]
+            else:
+                _forces(here, step, p, progress, w, room, left[i])
             for r in range(len(size)):
                 size[r] = max(size[r], abs(left[i, r]))
             if i > 0 and _past(left[i], size):
@@ -375,8 +404,9 @@ def _search_nodes(first, forces, step, p, limits, progress, room):
             depth = max(depth, abs(s.Ty[j, i]) * limits.floor[i])
         for i in range(len(b)):
             b[i] = -b[i] - s.gap[j]
-        if (pressed(smallest(b) + p.relief[0], j, s) == 0.0
-            and pressed(largest(b) + p.relief[1], j, s) == 0.0):
+        low = pressed(smallest(b) + p.relief[0], j, s)
+        high = pressed(largest(b) + p.relief[1], j, s)
+        if low == 0.0 and high == 0.0:
             continue
         part = _add_ground(j, step, p, Y, room)
         before, c = pressed(b[0], j, s), p.cluster[j]
@@ -391,22 +421,22 @@ def _search_nodes(first, forces, step, p, limits, progress, room):
             continue
         above = UNFELT * max(before, pressed(b[PARTS], j, s)) + pressed(
             0.01 * limits.rtol * depth, j, s)
+        if max(low, high) <= above and p.relief[0] == p.relief[1] == 0.0:
+            continue
         if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:
             shorter = min(shorter, part, first_pressed(b, above, ROUGHLY, j, s, room.halves))
     return first, shorter, forces
 
 
-@kernel(types.f8(STEP, PROBLEM, LIMITS, PROGRESS, WORKSPACE, ROOM))
-def first_changes(step, held_p, held_limits, held_progress, held_w, held_room):
+@routine
+def first_changes(step, p, limits, progress, w, room):
     """Fill ``room.place`` with the part of a step at which each cluster and stop first changes.
 
-    ``room.parts`` is the interpolation of the step. NOWHERE for those that do not change. Of what
-    comes after the first change nothing is promised.
+    ``room.parts`` is the interpolation of the step, ``room.ends`` what is left at its ends where
+    anything holds. NOWHERE for those that do not change; of what comes later nothing is promised.
     Returns the part to which the step has to be shortened because it passes a contact that its
     stages have not felt, or waves too short for it; 1 if it has not.
     """
-    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
-    w, room = borrowed(held_w), borrowed(held_room)
     room.place[:] = NOWHERE
     if p.restitution >= 0.0:
         first, shorter, forces = _search_stops(step, p, progress, room)

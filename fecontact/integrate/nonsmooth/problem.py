@@ -27,8 +27,9 @@ OPEN, STICK, FIXED = 0, 2, 3
 # accelerations at rigid stops, no impulses of an impact, an event at which it is to end.
 GOING_ON, FINISHED, STUCK, DIVERGED, PARADOX, UNSOLVED, STOPPED = range(7)
 
-# Entries of Progress.clock: the time reached, and the length of the next step.
-TIME, LENGTH = range(2)
+# Entries of Progress.clock: the time reached, the length of the next step, the error of the last
+# one, and whether the next one repeats one that failed.
+TIME, LENGTH, LAST_ERROR, REPEATED = range(4)
 # Entries of Progress.counts: what the run has done, outputs written, whether it has begun, impacts
 # that gained energy.
 COUNTS = 7
@@ -180,6 +181,6 @@ def progress_for(
     n = len(problem.cluster)
     status = np.where(rubbing, OPEN, FIXED)
     return Progress(
-        np.array([time, length]), np.zeros(COUNTS, dtype=np.int64),
+        np.array([time, length, 0.0, 0.0]), np.zeros(COUNTS, dtype=np.int64),
         np.concatenate([state, np.zeros(POWER_COUNT + n)]), status,
         np.zeros(n, dtype=np.int64), np.zeros(SIZES), np.zeros(n * tangents(problem)))
