@@ -27,7 +27,7 @@ from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.
-_SLIP_PART = 0.01
+SLIP_PART = 0.01
 # Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
 _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
@@ -88,38 +88,15 @@ def start(
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)
-    largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
-    largest = np.where(largest > 0.0, largest, 1.0)
-    slip_scale, depth, stick_speed = np.empty(n), np.empty(n), np.zeros(n)
-    for nodes, _, law in system.law_groups("friction"):
-        slip_scale[nodes] = law.velocity_scale
-        if not law.memory:
-            stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
-    for nodes, _, law in system.law_groups("normal"):
-        depth[nodes] = law.penetration_scale
-    longest = longest_step(system, times, max_step)
-    with np.errstate(over="ignore", invalid="ignore"):
-        energy = energy_scale(system, state)
-    breaks = np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float)
+    control = control_for(system, state, times, rtol=rtol, max_step=max_step, work=work)
     above, below, width, columns = system, system, 0.0, 0
     if vary:
-        breaks = np.union1d(breaks, times[1:-1])
+        control = control._replace(breaks=np.union1d(control.breaks, times[1:-1]))
         columns = len(state)
         if not isinstance(vary, bool):
             above, below, width = vary
             columns += 1
-    control = Control(
-        displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
-        slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
-        largest=largest,
-        breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
-        rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
-        speed_scale=system.velocity_scale, energy_scale=energy,
-        work=int(work), unfelt=first_unfelt.address)
-    with np.errstate(over="ignore", invalid="ignore"):
-        acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * largest
-    first = min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
-                0.01 * longest)
+    first = first_step(system, state, float(times[0]), control)
     return Run(
         Problem(system.arrays, blocks_of(basis, system.arrays), control),
         progress_for(state, float(times[0]), first, m, n, basis.dimension),
@@ -134,6 +111,42 @@ def start(
         watch_for(system, events, bool(vary)),
         None if vary else chosen_series(
             system, state, times, rtol, max_step, events, work, series))
+
+
+def control_for(
+    system: ContactSystem, state: Array, times: Array, *, rtol: float, max_step: float | None,
+    work: bool,
+) -> Control:
+    """What limits the steps of a run; see :func:`start`."""
+    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    slip_scale, depth, stick_speed = np.zeros((3, system.basis.contact_nodes))
+    for nodes, _, law in system.law_groups("friction"):
+        slip_scale[nodes] = law.velocity_scale
+        if work and not law.memory:
+            stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
+    for nodes, _, law in system.law_groups("normal"):
+        depth[nodes] = law.penetration_scale
+    with np.errstate(over="ignore", invalid="ignore"):
+        energy = energy_scale(system, state) if work else np.inf
+    return Control(
+        displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
+        slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
+        largest=largest,
+        breaks=np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        levels=_levels(system), ground=_ground_bounds(system, times),
+        rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
+        speed_scale=system.velocity_scale, energy_scale=energy,
+        work=int(work), unfelt=first_unfelt.address)
+
+
+def first_step(system: ContactSystem, state: Array, time: float, control: Control) -> float:
+    """Length of the first step to try [s]."""
+    m = system.basis.modes
+    with np.errstate(over="ignore", invalid="ignore"):
+        acceleration = np.abs(system.rhs(time, state)[m : 2 * m]) * control.largest
+    return min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
+               0.01 * control.longest)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
