@@ -10,6 +10,7 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.lanes import arrays, step_loop
+from fecontact.integrate.lanes.small_systems import advance_for
 from fecontact.integrate.lanes.arrays import OPEN, TAKEN, WAITING, LaneRuns, lanes_for, rows_of
 from fecontact.integrate.rodas5p.driver import ENDS, control_for, first_step, start
 from fecontact.integrate.rodas5p.state import Control
@@ -124,7 +125,7 @@ class SideBySide:
                       max_step=self._max_step, work=False)
         problem = _own(spare.problem)
         runs = self.runs._replace(counts=np.zeros(4, dtype=np.int64))
-        advance = step_loop.advance
+        advance = advance_for(modes, nodes)
         while wanted():
             runs = self._deal(runs, workers)
             if advance(lanes, runs, problem, spare.progress, spare.room,
