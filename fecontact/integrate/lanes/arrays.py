@@ -4,6 +4,7 @@ Each quantity of a run is a row (8,), with one entry for each lane. All rows of 
 in one table (rows, 8), those of the progress in another, so that a run is loaded as one column.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -203,19 +204,19 @@ LANE_RUNS = types.NamedTuple(
     [matrix, matrix, matrix, block, _table, integers, integers], LaneRuns)
 
 
-def _views(table: Array, shapes: list[tuple[int, ...]]) -> list[Array]:
+def _views(table: Array, shapes: Sequence[tuple[int, ...]]) -> list[Array]:
     """Parts of a table (rows, 8), of given shapes without the lanes."""
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
     return [part.reshape(*shape, WIDTH)
             for part, shape in zip(np.split(table, ends[:-1]), shapes, strict=True)]
 
 
-def rows_of(shapes: list[tuple[int, ...]]) -> int:
+def _rows_of(shapes: Sequence[tuple[int, ...]]) -> int:
     """Number of rows of a table with parts of these shapes."""
     return int(sum(np.prod(shape) for shape in shapes))
 
 
-def progress_shapes(modes: int) -> list[tuple[int, ...]]:
+def _progress_shapes(modes: int) -> list[tuple[int, ...]]:
     """Shapes of what a run starts with: numbers, state, extremes."""
     return [(NUMBERS,), (2 * modes,), (modes,)]
 
@@ -236,8 +237,8 @@ LANES = types.NamedTuple(
 
 
 def lanes_for(
-    system_shapes: list[tuple[int, ...]], control_shapes: list[tuple[int, ...]],
-    laws: list[Any], modes: int, nodes: int,
+    system_shapes: Sequence[tuple[int, ...]], control_shapes: Sequence[tuple[int, ...]],
+    laws: Sequence[Any], modes: int, nodes: int,
 ) -> Lanes:
     """Empty lanes for systems whose parameters have these shapes."""
     m, n = modes, nodes
@@ -246,18 +247,19 @@ def lanes_for(
         return np.zeros((*shape, WIDTH))
 
     shapes = [*system_shapes, *control_shapes]
-    parameters = np.ones((rows_of(shapes), WIDTH))
-    start = zeros(rows_of(progress_shapes(m)))
-    views = _views(parameters, shapes)
+    parameters = np.ones((_rows_of(shapes), WIDTH))
+    start = zeros(_rows_of(_progress_shapes(m)))
+    views: list[Any] = list(_views(parameters, shapes))
     counted = len(system_shapes)
+    numbers, state, extremes = _views(start, _progress_shapes(m))
     progress = LaneProgress(
-        *_views(start, progress_shapes(m)), zeros(2 * m), zeros(n, FORCES), zeros(2 * n),
-        zeros(2 * n), zeros(), np.zeros((2, WIDTH), dtype=np.int64),
-        np.full(WIDTH, -1, dtype=np.int64), np.zeros(WIDTH, dtype=np.int64),
-        np.zeros(1, dtype=np.int64))
+        numbers, state, extremes, zeros(2 * m), zeros(n, FORCES), zeros(2 * n), zeros(2 * n),
+        zeros(), np.zeros((2, WIDTH), dtype=np.int64), np.full(WIDTH, -1, dtype=np.int64),
+        np.zeros(WIDTH, dtype=np.int64), np.zeros(1, dtype=np.int64))
+    square, state_room = zeros(5, m, m), zeros(4, 2 * m)
     room = LaneRoom(
-        zeros(tableau.STAGES, 2 * m), *(zeros(m, m) for _ in range(5)),
-        *(zeros(2 * m) for _ in range(4)), zeros(3, 2 * m), zeros(m), zeros(m), zeros(2 * n),
-        zeros(2 * n), zeros(n, FORCES))
+        zeros(tableau.STAGES, 2 * m), square[0], square[1], square[2], square[3], square[4],
+        state_room[0], state_room[1], state_room[2], state_room[3], zeros(3, 2 * m), zeros(m),
+        zeros(m), zeros(2 * n), zeros(2 * n), zeros(n, FORCES))
     return Lanes(parameters, start, LaneSystem(*views[:counted], *laws),
                  LaneControl(*views[counted:]), progress, room)

@@ -9,13 +9,16 @@ import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.courses import QUICKEST
 from fecontact.integrate.lanes import arrays, step_loop
+from fecontact.integrate.lanes.arrays import OPEN, TAKEN, WAITING, LaneRuns, lanes_for
 from fecontact.integrate.lanes.small_systems import advance_for
-from fecontact.integrate.lanes.arrays import OPEN, TAKEN, WAITING, LaneRuns, lanes_for, rows_of
+from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import ENDS, control_for, first_step, start
 from fecontact.integrate.rodas5p.state import Control
-from fecontact.integrate.series.branches import chosen_series
+from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.trajectory import Status
+from fecontact.laws.ground.motion import constant_speed
 from fecontact.laws.lanes import lane_address
 from fecontact.system.contact_system import ContactSystem
 
@@ -38,7 +41,7 @@ class Kind:
     limits: tuple[tuple[int, ...], ...]
 
 
-def kind_of(system: ContactSystem, times: Array) -> Kind | None:
+def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     """The kind of a system; None if it does not go side by side with others.
 
     It does if it is small and plane, on level ground, without friction with memory, and if there
@@ -48,24 +51,26 @@ def kind_of(system: ContactSystem, times: Array) -> Kind | None:
     n, m = s.Tx.shape
     if (m > MOST_MODES or n > MOST_NODES or len(s.T2) or s.memory.any() or s.second_motion
             or s.friction_scale or system.ground.wavy
-            or system.breakpoints(float(times[0]), float(times[-1]))):
+            or system.breakpoints(begin, end)):
         return None
     acts = (s.drive_stiffness != 0.0) | (s.drive_damping != 0.0)
     drive = np.where(acts, s.drive, 0)
-    laws = [tuple(lane_address(int(law)) if law else 0 for law in given)
-            for given in (s.normal, s.friction, drive, s.load, [s.ground_motion])]
-    if any(law is None for given in laws for law in given):
-        return None
+    laws = []
+    for given in (s.normal, s.friction, drive, s.load, [s.ground_motion]):
+        found = [lane_address(int(law)) if law else 0 for law in given]
+        if None in found:
+            return None
+        laws.append(tuple(law for law in found if law is not None))
     levels = max(len(law.onsets(nodes.stop - nodes.start))
                  for nodes, _, law in system.law_groups("normal"))
-    return Kind(tuple(laws), not system._motions(),
+    return Kind(tuple(laws), s.ground_motion == constant_speed.address,
                 tuple(getattr(s, name).shape for name in _FIELDS),
                 ((m,), (n,), (n,), (n,), (m,), (levels, n), (arrays.LIMITS,)))
 
 
 def _parameters(system: ContactSystem, control: Control) -> Array:
     """The column of a run in the table of parameters."""
-    limits = [control.rtol, control.longest, control.speed_scale, control.ground[4]]
+    limits = [control.rtol, control.longest, control.speed_scale, control.ground[QUICKEST]]
     return np.concatenate([
         *(getattr(system.arrays, name).ravel() for name in _FIELDS), control.displacement_scale,
         control.slip_scale, control.slow, control.depth, control.largest, control.levels.ravel(),
@@ -88,6 +93,8 @@ class SideBySide:
 
     Parameters
     ----------
+    numbers : list of int
+        Those of the runs in their ensemble.
     members, states, times : sequences
         System, initial state and output times of each run.
     rtol, max_step : float
@@ -95,14 +102,13 @@ class SideBySide:
     """
 
     def __init__(
-        self, kind: Kind, members: Sequence[ContactSystem], states: Sequence[Array],
-        times: Array, rtol: float, max_step: float | None,
+        self, kind: Kind, numbers: list[int], members: Sequence[ContactSystem],
+        states: Sequence[Array], times: Array, rtol: float, max_step: float | None,
     ) -> None:
         for state in states:
             if not np.isfinite(state).all():
                 raise InputError("The initial state holds values that are not finite.")
-        self.kind, self._members, self._states = kind, members, states
-        self._rtol, self._max_step = rtol, max_step
+        self.numbers, self._kind = numbers, kind
         count, modes = len(members), kind.shapes[0][0]
         controls = [control_for(member, state, row, rtol=rtol, max_step=max_step, work=False)
                     for member, state, row in zip(members, states, times, strict=True)]
@@ -112,41 +118,87 @@ class SideBySide:
             np.ascontiguousarray(times), np.full((count, times.shape[1], 2 * modes), np.nan),
             np.zeros((count, 4), dtype=np.int64), np.zeros(0, dtype=np.int64),
             np.zeros(4, dtype=np.int64))
+        self._spare = start(members[0], states[0], times[0], rtol=rtol, max_step=max_step,
+                            work=False, series="never")
         self._dealt, self._lock = 0, Lock()
+
+    @property
+    def done(self) -> int:
+        """Number of runs that have ended."""
+        return int(np.count_nonzero(self.runs.ends[:, arrays.STATUS]))
+
+    @property
+    def steps(self) -> Integers:
+        """Steps of each run."""
+        return self.runs.ends[:, arrays.STEPS]
+
+    @property
+    def status(self) -> list[Status]:
+        """How each run ended."""
+        return [ENDS.get(int(ended), Status.INTERRUPTED)
+                for ended in self.runs.ends[:, arrays.STATUS]]
 
     def work(self, workers: int, wanted: Callable[[], bool]) -> None:
         """Go on with runs that no other worker has until none is left, or they are not wanted."""
-        kind = self.kind
-        nodes, modes = kind.shapes[7]
-        lanes = lanes_for(list(kind.shapes), list(kind.limits),
-                          [np.array(given, dtype=np.int64) for given in kind.laws[:4]]
-                          + [kind.laws[4][0], int(kind.steady)], modes, nodes)
-        spare = start(self._members[0], self._states[0], self.runs.times[0], rtol=self._rtol,
-                      max_step=self._max_step, work=False)
-        problem = _own(spare.problem)
+        nodes, modes = self._kind.shapes[7]
+        *laws, ground = (np.array(given, dtype=np.int64) for given in self._kind.laws)
+        lanes = lanes_for(self._kind.shapes, self._kind.limits,
+                          [*laws, int(ground[0]), int(self._kind.steady)], modes, nodes)
+        # Checks of single lanes are made with the arrays of a run, which take their numbers.
+        spare = self._spare.problem
+        problem = _copied(spare._replace(
+            blocks=one_block(spare.blocks.shapes, nodes),
+            control=spare.control._replace(speed_scale=0.0)))
+        progress, room = _copied(self._spare.progress), _copied(self._spare.room)
         runs = self.runs._replace(counts=np.zeros(4, dtype=np.int64))
         advance = advance_for(modes, nodes)
-        while wanted():
-            runs = self._deal(runs, workers)
-            if advance(lanes, runs, problem, spare.progress, spare.room,
-                       _STEPS) == step_loop.DONE:
-                return
+        ended = step_loop.GOES_ON
+        while ended != step_loop.DONE and wanted():
+            runs = self._dealt_to(runs, workers)
+            ended = advance(lanes, runs, problem, progress, room, _STEPS)
 
-    def _deal(self, runs: LaneRuns, workers: int) -> LaneRuns:
-        """Fill the queue of a worker."""
+    def _dealt_to(self, runs: LaneRuns, workers: int) -> LaneRuns:
+        """The same with more runs that wait; at the end each worker takes few at once."""
         rest = runs.queue[runs.counts[TAKEN] : runs.counts[WAITING]]
         with self._lock:
-            left = len(self._members) - self._dealt
-            more = min(left, max(_DEALT - len(rest), 0), max(1, -(-left // (2 * workers))))
+            left = len(runs.ends) - self._dealt
+            more = min(max(_DEALT - len(rest), 0), -(-left // (2 * workers)))
             queue = np.concatenate([rest, np.arange(self._dealt, self._dealt + more)])
             self._dealt += more
-            left -= more
-        runs.counts[TAKEN], runs.counts[WAITING], runs.counts[OPEN] = 0, len(queue), left > 0
+        runs.counts[TAKEN], runs.counts[WAITING] = 0, len(queue)
+        runs.counts[OPEN] = left > more
         return runs._replace(queue=queue)
 
 
-def _own(problem: Any) -> Any:
-    """A problem whose arrays may be overwritten."""
-    if isinstance(problem, tuple):
-        return type(problem)(*map(_own, problem))
-    return problem.copy() if isinstance(problem, np.ndarray) else problem
+def side_by_side(
+    members: Sequence[Any], state_of: Callable[[int], Array], times: Array, rtol: float,
+    max_step: float | None, series: str,
+) -> list[SideBySide]:
+    """The runs of an ensemble that go through lanes, kind by kind.
+
+    Those whose motion is expanded in power series, which takes less time, are not among them.
+    """
+    kinds: dict[Kind, list[int]] = {}
+    known: dict[int, Kind | None] = {}
+    for index, member in enumerate(members):
+        if isinstance(member, ContactSystem) and series != "always":
+            begin, end = float(times[index, 0]), float(times[index, -1])
+            key = id(member)
+            if key not in known or member.breakpoints(begin, end):
+                found = kind_of(member, begin, end)
+                if series == "auto" and found is not None and series_pay(member, begin, end):
+                    found = None
+                known[key] = found
+            kind = known[key]
+            if kind is not None:
+                kinds.setdefault(kind, []).append(index)
+    return [SideBySide(kind, numbers, [members[index] for index in numbers],
+                       [state_of(index) for index in numbers], times[numbers], rtol, max_step)
+            for kind, numbers in kinds.items()]
+
+
+def _copied(item: Any) -> Any:
+    """A tuple of arrays, all of which may be overwritten."""
+    if isinstance(item, tuple):
+        return type(item)(*map(_copied, item))
+    return item.copy() if isinstance(item, np.ndarray) else item

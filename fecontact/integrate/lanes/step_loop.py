@@ -1,14 +1,13 @@
 """The compiled time integrator for many small runs: eight at once, one in each lane.
 
-Every lane has its own time and step; all try a step together, and each goes on by the outcome of its
-own. A lane whose run has ended takes the next one that waits. No lane has a part in what another
-one computes, so that results do not depend on which runs are side by side.
+Every lane has its own time and step; all try a step together, and each goes on by the outcome of
+its own. A lane whose run has ended takes the next one that waits. No lane has a part in what
+another one computes, so that results do not depend on which runs are side by side.
 """
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel, routine
+from fecontact.core.compiled import helper, i8, routine
 from fecontact.core.lanes.functions import reciprocal_fifth_root
 from fecontact.core.lanes.vectors import (
     WIDTH,
@@ -21,7 +20,7 @@ from fecontact.core.lanes.vectors import (
 )
 from fecontact.core.references import borrowed
 from fecontact.integrate.course_bounds import doubtful
-from fecontact.integrate.courses import set_courses
+from fecontact.integrate.courses import QUICKEST, set_courses
 from fecontact.integrate.lanes import arrays, checks, equations, stages
 from fecontact.integrate.lanes.arrays import (
     AGAIN,
@@ -160,7 +159,7 @@ def _unfelt_part(lane, t, h, target, b, problem, progress, room):
     """Part of a lane's step to which it has to be shortened; 1 if none.
 
     By the functions for one run, on ``problem``, ``progress`` and ``room``, which take the lane's
-    numbers.
+    numbers; but ``problem.control.speed_scale`` is zero.
     """
     mine, w, s, control = b.progress, b.room, problem.system, problem.control
     again, smallest = mine.numbers[AGAIN, lane], mine.numbers[SMALLEST, lane]
@@ -185,8 +184,9 @@ def _unfelt_part(lane, t, h, target, b, problem, progress, room):
         control.displacement_scale[i] = b.control.displacement_scale[i, lane]
         control.largest[i] = b.control.largest[i, lane]
         progress.extremes[i] = mine.extremes[i, lane]
-    progress.numbers[run_arrays.SPEED_SCALE] = mine.numbers[SPEED_SCALE, lane]
-    control.ground[4] = b.control.numbers[arrays.QUICKEST, lane]
+    progress.numbers[run_arrays.SPEED_SCALE] = max(
+        mine.numbers[SPEED_SCALE, lane], b.control.numbers[arrays.LEAST_SPEED, lane])
+    control.ground[QUICKEST] = b.control.numbers[arrays.QUICKEST, lane]
     for k in range(2 * m):
         progress.state[k], room.after[k] = mine.state[k, lane], w.after[k, lane]
         for row in range(3):
@@ -331,12 +331,12 @@ def advance_by(b, runs, problem, progress, room, most):
     return GOES_ON
 
 
-@kernel(ADVANCE, nogil=True)
 def advance(b, runs, problem, progress, room, most):
     """Go on until ``most`` steps have been tried in all lanes; returns how it ended.
 
     ``problem``, ``progress`` and ``room`` are those of some run of the same kind, as room for
-    checks of single lanes.
+    checks of single lanes. It is compiled for each size, in
+    :mod:`fecontact.integrate.lanes.small_systems`.
     """
     return advance_by(borrowed(b), borrowed(runs), borrowed(problem), borrowed(progress),
                       borrowed(room), most)
