@@ -11,11 +11,19 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.courses import QUICKEST
 from fecontact.integrate.lanes import arrays, step_loop
-from fecontact.integrate.lanes.arrays import OPEN, TAKEN, WAITING, LaneRuns, lanes_for
+from fecontact.integrate.lanes.arrays import (
+    ATTEMPTS,
+    OPEN,
+    TAKEN,
+    WAITING,
+    LaneRuns,
+    Lanes,
+    lanes_for,
+)
 from fecontact.integrate.lanes.small_systems import advance_for
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import ENDS, control_for, first_step, start
-from fecontact.integrate.rodas5p.state import Control
+from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.ground.motion import constant_speed
@@ -39,6 +47,16 @@ class Kind:
     steady: bool
     shapes: tuple[tuple[int, ...], ...]
     limits: tuple[tuple[int, ...], ...]
+
+    @property
+    def modes(self) -> int:
+        """Number of modes."""
+        return self.shapes[_FIELDS.index("Tx")][1]
+
+    @property
+    def nodes(self) -> int:
+        """Number of contact nodes."""
+        return self.shapes[_FIELDS.index("Tx")][0]
 
 
 def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
@@ -99,6 +117,13 @@ class SideBySide:
         System, initial state and output times of each run.
     rtol, max_step : float
         As for :func:`fecontact.integrate.rodas5p.driver.start`.
+
+    Attributes
+    ----------
+    runs : LaneRuns
+        The runs and what is known of them.
+    attempts : int
+        Steps that workers which are done have tried, each in all lanes at once.
     """
 
     def __init__(
@@ -109,7 +134,7 @@ class SideBySide:
             if not np.isfinite(state).all():
                 raise InputError("The initial state holds values that are not finite.")
         self.numbers, self._kind = numbers, kind
-        count, modes = len(members), kind.shapes[0][0]
+        count, modes = len(members), kind.modes
         controls = [control_for(member, state, row, rtol=rtol, max_step=max_step, work=False)
                     for member, state, row in zip(members, states, times, strict=True)]
         self.runs = LaneRuns(
@@ -120,7 +145,7 @@ class SideBySide:
             np.zeros(4, dtype=np.int64))
         self._spare = start(members[0], states[0], times[0], rtol=rtol, max_step=max_step,
                             work=False, series="never")
-        self._dealt, self._lock = 0, Lock()
+        self._dealt, self._lock, self.attempts = 0, Lock(), 0
 
     @property
     def done(self) -> int:
@@ -140,22 +165,30 @@ class SideBySide:
 
     def work(self, workers: int, wanted: Callable[[], bool]) -> None:
         """Go on with runs that no other worker has until none is left, or they are not wanted."""
-        nodes, modes = self._kind.shapes[7]
-        *laws, ground = (np.array(given, dtype=np.int64) for given in self._kind.laws)
-        lanes = lanes_for(self._kind.shapes, self._kind.limits,
-                          [*laws, int(ground[0]), int(self._kind.steady)], modes, nodes)
-        # Checks of single lanes are made with the arrays of a run, which take their numbers.
-        spare = self._spare.problem
-        problem = _copied(spare._replace(
-            blocks=one_block(spare.blocks.shapes, nodes),
-            control=spare.control._replace(speed_scale=0.0)))
-        progress, room = _copied(self._spare.progress), _copied(self._spare.room)
+        lanes, spare = self.lanes(), self.spare()
         runs = self.runs._replace(counts=np.zeros(4, dtype=np.int64))
-        advance = advance_for(modes, nodes)
+        advance = advance_for(self._kind.modes, self._kind.nodes)
         ended = step_loop.GOES_ON
         while ended != step_loop.DONE and wanted():
             runs = self._dealt_to(runs, workers)
-            ended = advance(lanes, runs, problem, progress, room, _STEPS)
+            ended = advance(lanes, runs, *spare, _STEPS)
+        with self._lock:
+            self.attempts += int(runs.counts[ATTEMPTS])
+
+    def lanes(self) -> Lanes:
+        """Empty lanes for these runs."""
+        kind = self._kind
+        *laws, ground = (np.array(given, dtype=np.int64) for given in kind.laws)
+        return lanes_for(kind.shapes, kind.limits, [*laws, int(ground[0]), int(kind.steady)],
+                         kind.modes, kind.nodes)
+
+    def spare(self) -> tuple[Problem, Progress, Room]:
+        """Arrays of a run for checks of single lanes, which take the numbers of a lane."""
+        problem = self._spare.problem
+        own = problem._replace(
+            blocks=one_block(problem.blocks.shapes, self._kind.nodes),
+            control=problem.control._replace(speed_scale=0.0))
+        return _copied(own), _copied(self._spare.progress), _copied(self._spare.room)
 
     def _dealt_to(self, runs: LaneRuns, workers: int) -> LaneRuns:
         """The same with more runs that wait; at the end each worker takes few at once."""

@@ -13,7 +13,7 @@ from fecontact.integrate.lanes import arrays, step_loop
 from fecontact.integrate.rodas5p import small_systems
 
 # Modes and nodes that installations compile the step loop for.
-USUAL = ((1, 1), (2, 1), (3, 1), (4, 1), (2, 2))
+USUAL = ((1, 1), (2, 1), (3, 1), (2, 2))
 
 
 def compile_usual() -> None:
