@@ -93,8 +93,8 @@ def ensemble(
     The results are those of :func:`fecontact.simulate`, except that Rodas5P does not integrate
     powers, which do not limit its steps. Threads share the cores. On each of them eight runs of
     small systems go side by side: plane ones of up to four modes and two nodes on level ground,
-    with common laws without memory, and without chains and events. Results differ from single
-    runs by rounding; they do not depend on workers, nor on which runs there are.
+    with common laws without memory, without events. Results differ from single runs by rounding;
+    they do not depend on workers, nor on which runs there are.
 
     Parameters
     ----------
@@ -186,8 +186,9 @@ def ensemble(
 
     run_one = compiled if isinstance(solver, Rodas5P) else other
     together: list[SideBySide] = []
-    if isinstance(solver, Rodas5P) and chain == 1 and not watched:
-        together = side_by_side(members, starts, instants, float(rtol), max_step, series)
+    if isinstance(solver, Rodas5P) and not watched:
+        together = side_by_side(members, starts, instants, float(rtol), max_step, series,
+                                int(chain))
     apart = set(range(count)).difference(*(one.numbers for one in together))
     threads = workers or os.cpu_count() or 1
 

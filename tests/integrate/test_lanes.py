@@ -131,6 +131,36 @@ def test_results_do_not_depend_on_what_runs_beside():
         assert (alone.states[0] == wanted.states[k]).all()
 
 
+def test_a_chain_hands_on_its_states():
+    """As runs one after the other, each from where the one before has ended."""
+    frequencies = np.linspace(11.0, 16.0, 11)
+    systems = [slider().with_(**{"drive.angular_frequency": w}) for w in frequencies]
+    times = np.linspace(0.0, 0.2, 3)
+    found = ensemble(systems, times, initial=np.array([1e-4, 0.0]), chain=4, workers=2)
+    assert found.finished.all()
+    for first in (0, 4, 8):
+        state = np.array([1e-4, 0.0])
+        for index in range(first, min(first + 4, 11)):
+            assert (found.states[index, 0] == state).all()
+            alone = ensemble(systems[index], times, initial=state)
+            assert (found.states[index] == alone.states[0]).all()
+            assert found.steps[index] == alone.steps[0]
+            state = alone.states[0, -1]
+
+
+def test_a_chain_goes_on_behind_a_run_that_failed():
+    """From the own initial state of the next one."""
+    starts = np.zeros((6, 4))
+    starts[0], starts[1, 2], starts[2, 2] = [1e308, 0.0, 1e308, 0.0], 1e-3, 3e-3
+    found = ensemble(friction_oscillator(2), [0.0, 0.1], initial=starts, chain=3)
+    assert found.finished.tolist() == [False] + [True] * 5
+    assert (found.states[1, 0] == starts[1]).all()
+    assert (found.states[2, 0] == found.states[1, -1]).all()
+    assert (found.states[3, 0] == 0.0).all()
+    alone = ensemble(friction_oscillator(2), [0.0, 0.1], initial=starts[1])
+    assert (found.states[1] == alone.states[0]).all()
+
+
 def test_a_run_that_was_left_goes_on_bit_for_bit(monkeypatch):
     systems = [slider().with_(**{"drive.angular_frequency": w}) for w in np.linspace(11, 16, 13)]
     times = np.linspace(0.0, 0.4, 5)
@@ -145,7 +175,7 @@ def test_lanes_are_at_work():
     """Runs of very different lengths: a lane that is done takes the next run at once."""
     times = np.linspace(0.0, 1.0, 2) * np.linspace(0.2, 2.0, 240)[::-1, None]
     one = SideBySide(kind_of(slider(), 0.0, 2.0), list(range(240)), [slider()] * 240,
-                     [np.zeros(2)] * 240, times, 1e-6, None)
+                     lambda _: np.zeros(2), [False] * 240, times, 1e-6, None)
     one.work(1, lambda: True)
     assert one.done == 240
     assert set(one.status) == {Status.FINISHED}
@@ -199,6 +229,8 @@ def test_a_run_that_cannot_go_on_leaves_the_others():
 
 
 def test_one_output_time_gives_the_start():
+    chained = ensemble(slider(), [0.5], initial=np.array([[1e-3, 0.0], [2e-3, 1e-3]]), chain=2)
+    assert chained.states[:, 0].tolist() == [[1e-3, 0.0], [1e-3, 0.0]]
     found = ensemble(slider(), [0.5], initial=np.array([[1e-3, 0.0], [2e-3, 1e-3]]))
     assert found.finished.all()
     assert found.states[:, 0].tolist() == [[1e-3, 0.0], [2e-3, 1e-3]]

@@ -181,6 +181,8 @@ class LaneRuns(NamedTuple):
         Columns of the tables of parameters and of progress for each run.
     times, states : (E, K), (E, K, 2 m) arrays
         Output times, and states there.
+    follows : (E,) integer array
+        Whether a run begins in its lane where the one before it has ended.
     ends : (E, 4) integer array
         Status of each run, outputs, steps and steps that failed.
     queue : (L,) integer array
@@ -193,6 +195,7 @@ class LaneRuns(NamedTuple):
     starts: Array
     times: Array
     states: Array
+    follows: Integers
     ends: Integers
     queue: Integers
     counts: Integers
@@ -201,7 +204,7 @@ class LaneRuns(NamedTuple):
 TAKEN, WAITING, OPEN, ATTEMPTS = range(4)
 STATUS, OUTPUTS, STEPS, REJECTIONS = range(4)
 LANE_RUNS = types.NamedTuple(
-    [matrix, matrix, matrix, block, _table, integers, integers], LaneRuns)
+    [matrix, matrix, matrix, block, integers, _table, integers, integers], LaneRuns)
 
 
 def _views(table: Array, shapes: Sequence[tuple[int, ...]]) -> list[Array]:

@@ -73,7 +73,7 @@ def state_error(control, progress, w):
                        * per_speed)
         finite = (finite & (magnitude(after) < np.inf)
                   & (magnitude(read(w.after[m + i])) < np.inf))
-    return chosen(finite, error / read(control.numbers[RTOL]), np.inf)
+    return chosen(finite & (error < np.inf), error / read(control.numbers[RTOL]), np.inf)
 
 
 @helper

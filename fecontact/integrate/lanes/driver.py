@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -22,7 +23,7 @@ from fecontact.integrate.lanes.arrays import (
 )
 from fecontact.integrate.lanes.small_systems import advance_for
 from fecontact.integrate.rodas5p.blocks import one_block
-from fecontact.integrate.rodas5p.driver import ENDS, control_for, first_step, start
+from fecontact.integrate.rodas5p.driver import ENDS, control_for, start
 from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.trajectory import Status
@@ -95,15 +96,14 @@ def _parameters(system: ContactSystem, control: Control) -> Array:
         limits])
 
 
-def _begin(system: ContactSystem, state: Array, times: Array, control: Control) -> Array:
-    """The column of a run in the table of progress."""
+def _begin(state: Array, times: Array) -> Array:
+    """The column of a run in the table of progress, which the first step is not yet in."""
     numbers = np.zeros(arrays.NUMBERS)
     begin, end = float(times[0]), float(times[-1])
     numbers[arrays.TIME], numbers[arrays.END] = begin, end
-    numbers[arrays.STEP] = first_step(system, state, begin, control)
     numbers[arrays.SMALLEST] = 1e-14 * max(abs(begin), abs(end))
     numbers[arrays.NEXT_OUTPUT] = times[min(1, len(times) - 1)]
-    return np.concatenate([numbers, state, np.zeros(system.basis.modes)])
+    return np.concatenate([numbers, state, np.zeros(len(state) // 2)])
 
 
 class SideBySide:
@@ -113,8 +113,13 @@ class SideBySide:
     ----------
     numbers : list of int
         Those of the runs in their ensemble.
-    members, states, times : sequences
-        System, initial state and output times of each run.
+    members, times : sequences
+        System and output times of each run.
+    state_of : callable
+        Initial state of a run, by its number here.
+    follows : list of bool
+        Whether a run begins where the one before it has ended; from its own initial state if that
+        one has failed.
     rtol, max_step : float
         As for :func:`fecontact.integrate.rodas5p.driver.start`.
 
@@ -128,24 +133,31 @@ class SideBySide:
 
     def __init__(
         self, kind: Kind, numbers: list[int], members: Sequence[ContactSystem],
-        states: Sequence[Array], times: Array, rtol: float, max_step: float | None,
+        state_of: Callable[[int], Array], follows: Sequence[bool], times: Array, rtol: float,
+        max_step: float | None,
     ) -> None:
-        for state in states:
-            if not np.isfinite(state).all():
-                raise InputError("The initial state holds values that are not finite.")
-        self.numbers, self._kind = numbers, kind
-        count, modes = len(members), kind.modes
-        controls = [control_for(member, state, row, rtol=rtol, max_step=max_step, work=False)
-                    for member, state, row in zip(members, states, times, strict=True)]
+        self.numbers, self._kind, self._state_of = numbers, kind, state_of
+        count, rest = len(members), np.zeros(2 * kind.modes)
+        controls = [control_for(member, rest, row, rtol=rtol, max_step=max_step, work=False)
+                    for member, row in zip(members, times, strict=True)]
+        starts = [rest if later else self._start(run) for run, later in enumerate(follows)]
         self.runs = LaneRuns(
             np.array([_parameters(*pair) for pair in zip(members, controls, strict=True)]),
-            np.array([_begin(*row) for row in zip(members, states, times, controls, strict=True)]),
-            np.ascontiguousarray(times), np.full((count, times.shape[1], 2 * modes), np.nan),
-            np.zeros((count, 4), dtype=np.int64), np.zeros(0, dtype=np.int64),
-            np.zeros(4, dtype=np.int64))
-        self._spare = start(members[0], states[0], times[0], rtol=rtol, max_step=max_step,
-                            work=False, series="never")
-        self._dealt, self._lock, self.attempts = 0, Lock(), 0
+            np.array([_begin(*pair) for pair in zip(starts, times, strict=True)]),
+            np.ascontiguousarray(times), np.full((count, times.shape[1], len(rest)), np.nan),
+            np.array(follows, dtype=np.int64), np.zeros((count, 4), dtype=np.int64),
+            np.zeros(0, dtype=np.int64), np.zeros(4, dtype=np.int64))
+        self._spare = start(members[0], rest, times[0], rtol=rtol, max_step=max_step, work=False,
+                            series="never")
+        self._waiting = np.flatnonzero(self.runs.follows == 0).tolist()
+        self._lock, self.attempts = Lock(), 0
+
+    def _start(self, run: int) -> Array:
+        """Initial state of a run."""
+        state = self._state_of(run)
+        if not np.isfinite(state).all():
+            raise InputError("The initial state holds values that are not finite.")
+        return state
 
     @property
     def done(self) -> int:
@@ -169,7 +181,7 @@ class SideBySide:
         runs = self.runs._replace(counts=np.zeros(4, dtype=np.int64))
         advance = advance_for(self._kind.modes, self._kind.nodes)
         ended = step_loop.GOES_ON
-        while ended != step_loop.DONE and wanted():
+        while wanted() and (ended != step_loop.DONE or self._resume()):
             runs = self._dealt_to(runs, workers)
             ended = advance(lanes, runs, *spare, _STEPS)
         with self._lock:
@@ -194,40 +206,64 @@ class SideBySide:
         """The same with more runs that wait; at the end each worker takes few at once."""
         rest = runs.queue[runs.counts[TAKEN] : runs.counts[WAITING]]
         with self._lock:
-            left = len(runs.ends) - self._dealt
+            left = len(self._waiting)
             more = min(max(_DEALT - len(rest), 0), -(-left // (2 * workers)))
-            queue = np.concatenate([rest, np.arange(self._dealt, self._dealt + more)])
-            self._dealt += more
+            queue = np.concatenate([rest, np.array(self._waiting[:more], dtype=np.int64)])
+            del self._waiting[:more]
         runs.counts[TAKEN], runs.counts[WAITING] = 0, len(queue)
         runs.counts[OPEN] = left > more
         return runs._replace(queue=queue)
 
+    def _resume(self) -> bool:
+        """Let chains go on behind runs that have failed; whether runs wait for a lane."""
+        with self._lock:
+            status = self.runs.ends[:, arrays.STATUS]
+            failed = (status != step_loop.FINISHED) & (status != step_loop.RUNNING)
+            for run in np.flatnonzero(failed[:-1] & (self.runs.follows[1:] != 0)).tolist():
+                later = run + 1
+                self.runs.starts[later] = _begin(self._start(later), self.runs.times[later])
+                self.runs.follows[later] = 0
+                self._waiting.append(later)
+            return bool(self._waiting)
+
 
 def side_by_side(
     members: Sequence[Any], state_of: Callable[[int], Array], times: Array, rtol: float,
-    max_step: float | None, series: str,
+    max_step: float | None, series: str, chain: int = 1,
 ) -> list[SideBySide]:
-    """The runs of an ensemble that go through lanes, kind by kind.
+    """The runs of an ensemble that go through lanes, kind by kind; chains as a whole.
 
     Those whose motion is expanded in power series, which takes less time, are not among them.
     """
     kinds: dict[Kind, list[int]] = {}
-    known: dict[int, Kind | None] = {}
-    for index, member in enumerate(members):
-        if isinstance(member, ContactSystem) and series != "always":
-            begin, end = float(times[index, 0]), float(times[index, -1])
-            key = id(member)
-            if key not in known or member.breakpoints(begin, end):
-                found = kind_of(member, begin, end)
-                if series == "auto" and found is not None and series_pay(member, begin, end):
-                    found = None
-                known[key] = found
-            kind = known[key]
-            if kind is not None:
-                kinds.setdefault(kind, []).append(index)
-    return [SideBySide(kind, numbers, [members[index] for index in numbers],
-                       [state_of(index) for index in numbers], times[numbers], rtol, max_step)
-            for kind, numbers in kinds.items()]
+    known: dict[tuple[int, float, float], Kind | None] = {}
+
+    def kind(index: int) -> Kind | None:
+        member, begin, end = members[index], float(times[index, 0]), float(times[index, -1])
+        if not isinstance(member, ContactSystem) or series == "always":
+            return None
+        key = id(member), begin, end
+        if key not in known:
+            found = kind_of(member, begin, end)
+            if series == "auto" and found is not None and series_pay(member, begin, end):
+                found = None
+            known[key] = found
+        return known[key]
+
+    for first in range(0, len(members), chain):
+        links = range(first, min(first + chain, len(members)))
+        common = {kind(index) for index in links}
+        one = common.pop()
+        if one is not None and not common:
+            kinds.setdefault(one, []).extend(links)
+    return [SideBySide(one, numbers, [members[index] for index in numbers],
+                       partial(_state_of, state_of, numbers),
+                       [index % chain != 0 for index in numbers], times[numbers], rtol, max_step)
+            for one, numbers in kinds.items()]
+
+
+def _state_of(state_of: Callable[[int], Array], numbers: list[int], run: int) -> Array:
+    return state_of(numbers[run])
 
 
 def _copied(item: Any) -> Any:

@@ -13,6 +13,7 @@ from fecontact.core.lanes.vectors import (
     WIDTH,
     bits,
     chosen,
+    magnitude,
     mask_of,
     read,
     spread,
@@ -30,6 +31,7 @@ from fecontact.integrate.lanes.arrays import (
     EXACTLY,
     LAST_ROOT,
     LAST_STEP,
+    LEAST_SPEED,
     LONGEST,
     NEXT_OUTPUT,
     OPEN,
@@ -43,12 +45,14 @@ from fecontact.integrate.lanes.arrays import (
 )
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.state import Step
-from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
+from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE, RUNNING
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.system.nodes import GroundMotion
 
 ADVANCE = i8(arrays.LANES, arrays.LANE_RUNS, run_arrays.PROBLEM, run_arrays.PROGRESS,
              run_arrays.ROOM, i8)
+__all__ = ["DONE", "FINISHED", "GOES_ON", "HUNGRY", "RUNNING", "advance"]
+
 # How a call returned: so many attempts were made, lanes are free that more runs may take, or all
 # runs have ended.
 GOES_ON, HUNGRY, DONE = range(3)
@@ -62,27 +66,37 @@ _MOST_AGAIN = 20.0
 
 @helper
 def _load(lane, run, b, runs):
-    """Begin a run in a lane."""
+    """Begin a run in a lane; one that follows another from its last state."""
     for row in range(len(b.parameters)):
         b.parameters[row, lane] = runs.parameters[run, row]
     for row in range(len(b.start)):
         b.start[row, lane] = runs.starts[run, row]
-    progress = b.progress
+    progress, last = b.progress, runs.times.shape[1] - 1
     for row in range(runs.states.shape[2]):
+        if runs.follows[run] != 0:
+            progress.state[row, lane] = runs.states[run - 1, last, row]
         runs.states[run, 0, row] = progress.state[row, lane]
     progress.runs[lane], progress.rows[lane] = run, 1
     progress.counts[0, lane], progress.counts[1, lane] = 0, 0
     progress.fresh[0] |= 1 << lane
 
 
-@helper
-def _end(lane, status, progress, runs):
-    """Note how the run in a lane has ended, and free the lane."""
-    run = progress.runs[lane]
-    runs.ends[run, arrays.STATUS], runs.ends[run, arrays.OUTPUTS] = status, progress.rows[lane]
-    runs.ends[run, arrays.STEPS] = progress.counts[0, lane]
-    runs.ends[run, arrays.REJECTIONS] = progress.counts[1, lane]
-    progress.runs[lane] = -1
+@routine
+def _end(lane, status, b, runs):
+    """Note how the run in a lane has ended; begin the one that follows, or free the lane."""
+    progress = b.progress
+    run, going = progress.runs[lane], True
+    while going:
+        runs.ends[run, arrays.STATUS], runs.ends[run, arrays.OUTPUTS] = status, progress.rows[lane]
+        runs.ends[run, arrays.STEPS] = progress.counts[0, lane]
+        runs.ends[run, arrays.REJECTIONS] = progress.counts[1, lane]
+        run += 1
+        going = False
+        if status == FINISHED and run < len(runs.follows) and runs.follows[run] != 0:
+            _load(lane, run, b, runs)
+            going = runs.times.shape[1] == 1
+        else:
+            progress.runs[lane] = -1
 
 
 @routine
@@ -95,7 +109,7 @@ def _fill(b, runs):
             runs.counts[TAKEN] += 1
             _load(lane, run, b, runs)
             if runs.times.shape[1] == 1:
-                _end(lane, FINISHED, b.progress, runs)
+                _end(lane, FINISHED, b, runs)
         if b.progress.runs[lane] >= 0:
             active |= 1 << lane
     return active
@@ -110,7 +124,7 @@ def _take(where, values, out):
 
 @routine
 def _begin(b):
-    """Rates and forces of lanes that have just been filled."""
+    """Rates, forces and first steps of lanes that have just been filled."""
     s, progress, w = b.system, b.progress, b.room
     t, new = read(progress.numbers[TIME]), mask_of(progress.fresh[0])
     equations.set_given(t, s, w.load)
@@ -120,6 +134,14 @@ def _begin(b):
     write(progress.ground, chosen(new, speed, read(progress.ground)))
     _take(new, w.base, progress.rate)
     _go_to_end(new, progress, w)
+    m, quickest = len(w.load), spread(1e-300)
+    for i in range(m):
+        quickest = checks.larger(
+            quickest, magnitude(read(w.base[m + i])) * read(b.control.largest[i]))
+    limits, numbers = b.control.numbers, progress.numbers
+    first = checks.smaller(0.1 * read(limits[LEAST_SPEED]) / quickest,
+                           0.01 * read(limits[LONGEST]))
+    write(numbers[STEP], chosen(new, first, read(numbers[STEP])))
     progress.fresh[0] = 0
 
 
@@ -185,7 +207,7 @@ def _unfelt_part(lane, t, h, target, b, problem, progress, room):
         control.largest[i] = b.control.largest[i, lane]
         progress.extremes[i] = mine.extremes[i, lane]
     progress.numbers[run_arrays.SPEED_SCALE] = max(
-        mine.numbers[SPEED_SCALE, lane], b.control.numbers[arrays.LEAST_SPEED, lane])
+        mine.numbers[SPEED_SCALE, lane], b.control.numbers[LEAST_SPEED, lane])
     control.ground[QUICKEST] = b.control.numbers[arrays.QUICKEST, lane]
     for k in range(2 * m):
         progress.state[k], room.after[k] = mine.state[k, lane], w.after[k, lane]
@@ -304,9 +326,9 @@ def _attempt(active, b, runs, problem, progress, room):
         write(w.stage[0], error)
         for lane in range(WIDTH):
             if (complete >> lane) & 1:
-                _end(lane, FINISHED, mine, runs)
+                _end(lane, FINISHED, b, runs)
             elif (stopped >> lane) & 1:
-                _end(lane, MINIMUM_STEP if w.stage[0, lane] < np.inf else NOT_FINITE, mine, runs)
+                _end(lane, MINIMUM_STEP if w.stage[0, lane] < np.inf else NOT_FINITE, b, runs)
 
 
 @helper

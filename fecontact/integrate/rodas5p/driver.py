@@ -96,7 +96,10 @@ def start(
         if not isinstance(vary, bool):
             above, below, width = vary
             columns += 1
-    first = first_step(system, state, float(times[0]), control)
+    with np.errstate(over="ignore", invalid="ignore"):
+        acceleration = np.abs(system.rhs(float(times[0]), state)[m : 2 * m]) * control.largest
+    first = min(0.1 * control.speed_scale / max(float(acceleration.max()), 1e-300),
+                0.01 * control.longest)
     return Run(
         Problem(system.arrays, blocks_of(basis, system.arrays), control),
         progress_for(state, float(times[0]), first, m, n, basis.dimension),
@@ -138,15 +141,6 @@ def control_for(
         rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), unfelt=first_unfelt.address)
-
-
-def first_step(system: ContactSystem, state: Array, time: float, control: Control) -> float:
-    """Length of the first step to try [s]."""
-    m = system.basis.modes
-    with np.errstate(over="ignore", invalid="ignore"):
-        acceleration = np.abs(system.rhs(time, state)[m : 2 * m]) * control.largest
-    return min(0.1 * system.velocity_scale / max(float(acceleration.max()), 1e-300),
-               0.01 * control.longest)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
