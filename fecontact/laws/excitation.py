@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from numbers import Integral
 from typing import Annotated, Any, Literal
 
@@ -105,7 +106,7 @@ class Drive:
         """b_x, b_y and b_z [N s/m]."""
         return self.damping_x, self.damping_y, self.damping_z
 
-    @property
+    @cached_property
     def motions(self) -> tuple[Signal, Signal, Signal]:
         """Motions of the driven ends of the springs in x, y and z [m]."""
         w = self.angular_frequency

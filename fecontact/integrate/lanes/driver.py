@@ -138,8 +138,12 @@ class SideBySide:
     ) -> None:
         self.numbers, self._kind, self._state_of = numbers, kind, state_of
         count, rest = len(members), np.zeros(2 * kind.modes)
-        controls = [control_for(member, rest, row, rtol=rtol, max_step=max_step, work=False)
-                    for member, row in zip(members, times, strict=True)]
+        limits: dict[tuple[int, float, float], Control] = {}
+        for member, row in zip(members, times, strict=True):
+            if _key(member, row) not in limits:
+                limits[_key(member, row)] = control_for(member, rest, row, rtol=rtol,
+                                                        max_step=max_step, work=False)
+        controls = [limits[_key(*pair)] for pair in zip(members, times, strict=True)]
         starts = [rest if later else self._start(run) for run, later in enumerate(follows)]
         self.runs = LaneRuns(
             np.array([_parameters(*pair) for pair in zip(members, controls, strict=True)]),
@@ -239,11 +243,11 @@ def side_by_side(
     known: dict[tuple[int, float, float], Kind | None] = {}
 
     def kind(index: int) -> Kind | None:
-        member, begin, end = members[index], float(times[index, 0]), float(times[index, -1])
+        member, key = members[index], _key(members[index], times[index])
         if not isinstance(member, ContactSystem) or series == "always":
             return None
-        key = id(member), begin, end
         if key not in known:
+            begin, end = key[1:]
             found = kind_of(member, begin, end)
             if series == "auto" and found is not None and series_pay(member, begin, end):
                 found = None
@@ -260,6 +264,11 @@ def side_by_side(
                        partial(_state_of, state_of, numbers),
                        [index % chain != 0 for index in numbers], times[numbers], rtol, max_step)
             for one, numbers in kinds.items()]
+
+
+def _key(member: Any, times: Array) -> tuple[int, float, float]:
+    """What tells runs apart whose steps have the same limits."""
+    return id(member), float(times[0]), float(times[-1])
 
 
 def _state_of(state_of: Callable[[int], Array], numbers: list[int], run: int) -> Array:
