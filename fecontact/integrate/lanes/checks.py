@@ -27,9 +27,8 @@ from fecontact.integrate.lanes.arrays import (
     RTOL,
     SPEED_SCALE,
 )
+from fecontact.integrate.rodas5p.driver import SLIP_PART as _SLIP_PART
 from fecontact.integrate.rodas5p.tableau import STAGES
-
-_SLIP_PART = 0.01
 
 
 @helper

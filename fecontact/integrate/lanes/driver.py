@@ -25,6 +25,7 @@ from fecontact.integrate.lanes.small_systems import advance_for
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import ENDS, control_for, start
 from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
+from fecontact.integrate.rodas5p.step_loop import FINISHED, RUNNING
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.ground.motion import constant_speed
@@ -76,7 +77,8 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     drive = np.where(acts, s.drive, 0)
     laws = []
     for given in (s.normal, s.friction, drive, s.load, [s.ground_motion]):
-        found = [lane_address(int(law)) if law else 0 for law in given]
+        # Along axes without spring or dashpot nothing is driven.
+        found = [0 if given is drive and not law else lane_address(int(law)) for law in given]
         if None in found:
             return None
         laws.append(tuple(law for law in found if law is not None))
@@ -222,7 +224,7 @@ class SideBySide:
         """Let chains go on behind runs that have failed; whether runs wait for a lane."""
         with self._lock:
             status = self.runs.ends[:, arrays.STATUS]
-            failed = (status != step_loop.FINISHED) & (status != step_loop.RUNNING)
+            failed = (status != FINISHED) & (status != RUNNING)
             for run in np.flatnonzero(failed[:-1] & (self.runs.follows[1:] != 0)).tolist():
                 later = run + 1
                 self.runs.starts[later] = _begin(self._start(later), self.runs.times[later])

@@ -45,18 +45,17 @@ from fecontact.integrate.lanes.arrays import (
 )
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.state import Step
-from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE, RUNNING
+from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.system.nodes import GroundMotion
 
 ADVANCE = i8(arrays.LANES, arrays.LANE_RUNS, run_arrays.PROBLEM, run_arrays.PROGRESS,
              run_arrays.ROOM, i8)
-__all__ = ["DONE", "FINISHED", "GOES_ON", "HUNGRY", "RUNNING", "advance"]
-
 # How a call returned: so many attempts were made, lanes are free that more runs may take, or all
 # runs have ended.
 GOES_ON, HUNGRY, DONE = range(3)
 
+# As in the step loop of one run.
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
 # Errors are counted as within these bounds, and as the third at least, for the length of a step.
 _LEAST_ERROR, _LARGEST_ERROR = 1e-6, 1e10
