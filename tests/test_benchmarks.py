@@ -47,6 +47,13 @@ def test_benchmark(name, tmp_path, monkeypatch, capsys):
     assert left == set()
 
 
+def test_ensemble_of_friction_oscillators(tmp_path, monkeypatch, capsys):
+    printed, left = run_script("benchmarks/ensemble.py", ("4", "3", "--problem", "b"), tmp_path,
+                               monkeypatch, capsys)
+    check_numbers(printed, [(r"1 thread +rtol 1e-05 .* error (\S+)$", 0.0, 1e-5)])
+    assert left == set()
+
+
 @pytest.mark.parametrize("problem", ["a", "b"])
 def test_integrator(problem, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")

@@ -9,9 +9,9 @@ from unittest import mock
 import numba
 import pytest
 
-from fecontact.bifurcation.linalg import simd
-from fecontact.bifurcation.linalg.simd import WIDTH
 from fecontact.core import compiled
+from fecontact.core.lanes import vectors
+from fecontact.core.lanes.vectors import WIDTH
 
 MODULE = '''
 from fecontact.core.compiled import compile_law, f8, kernel
@@ -158,9 +158,9 @@ def test_digest_depends_on_options_and_is_that_of_any_copy():
 
 def test_intrinsics_count_with_their_whole_file():
     """Operators on their values are overloads, which no kernel names."""
-    digest = compiled.source_digest(simd.read)
-    source = Path(simd.__file__).read_bytes()
+    digest = compiled.source_digest(vectors.read)
+    source = Path(vectors.__file__).read_bytes()
     with mock.patch.object(Path, "read_bytes", return_value=source + b"# more"):
         compiled._own_digest.cache_clear()
-        assert compiled.source_digest(simd.read) != digest
+        assert compiled.source_digest(vectors.read) != digest
     compiled._own_digest.cache_clear()

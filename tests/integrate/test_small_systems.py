@@ -5,7 +5,12 @@ import pytest
 from systems import friction_oscillator, two_mass_system
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
+from fecontact.integrate.lanes import small_systems as lane_systems
+from fecontact.integrate.lanes.driver import side_by_side
+from fecontact.integrate.lanes.step_loop import ADVANCE as ADVANCE_LANES
 from fecontact.integrate.rodas5p import driver, small_systems, step_loop
+from fecontact.integrate.rodas5p.state import OUTPUT
+from fecontact.integrate.rodas5p.variational import VARIATION
 from fecontact.laws import DahlFriction, ExponentialFriction, RoughSurface
 
 
@@ -59,6 +64,19 @@ def test_what_step_loops_take_for_granted(modes, nodes):
     found = sum(assert_as_said(values, kind, said)
                 for values, kind in zip(tuples, step_loop.ADVANCE.args, strict=False))
     assert found >= sum(map(len, said.values()))
+
+
+@pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
+def test_what_step_loops_of_lanes_take_for_granted(modes, nodes):
+    one, times = system(modes, nodes), np.array([[0.0, 0.1]])
+    begun = side_by_side([one], lambda _: np.zeros(2 * modes), times, 1e-6, None, "auto")[0]
+    said = lane_systems.fixed_values(modes, nodes)
+    lanes, runs = begun.lanes(), begun.runs
+    spare = begun.spare()
+    found = sum(assert_as_said(values, kind, said)
+                for values, kind in zip((lanes, runs, *spare), ADVANCE_LANES.args, strict=False))
+    unused = sum(len(said[kind]) for kind in said if kind in (OUTPUT, VARIATION))
+    assert found >= sum(map(len, said.values())) - unused
 
 
 @pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)

@@ -169,7 +169,8 @@ def basins(
                          f"before passages of the section count, without transient_periods.")
     settle = _Settle(moving, solver, rtol, keep, transient_periods, float(transient or 0.0),
                      section, tolerance, np.abs(states).max(axis=0))
-    size_of_block = int(np.clip(len(states) // 64, 16, _LARGEST))
+    size_of_block = len(states) if folder is None else int(
+        np.clip(len(states) // 64, 16, _LARGEST))
     blocks = [_Starts(settle, part) for part
               in np.split(states, range(size_of_block, len(states), size_of_block))]
     with shown(progress, lambda: progress_bar("Running", len(states))) as tell:
@@ -195,10 +196,12 @@ class _Settle:
     tolerance: float
     farthest: Array
 
-    def settled(self, states: Array, tell: Callable[[int], None] | None) -> Settled:
+    def settled(
+        self, states: Array, tell: Callable[[int], None] | None, workers: int | None,
+    ) -> Settled:
         """Where runs from some states settle."""
         settings: dict[str, Any] = {"initial": states, "solver": self.solver, "rtol": self.rtol,
-                                    "workers": 1, "progress": tell}
+                                    "workers": workers, "progress": tell}
         rows, still = np.full(len(states), -1), np.zeros(len(states), dtype=np.int64)
         if self.section is None:
             found = strobe(self.moving, transient_periods=self.transient_periods or 0,
@@ -238,8 +241,8 @@ class _Starts:
         number, size = self.states.shape
         return {"points": (number, self.settle.keep, size), "rows": (number,), "still": (number,)}
 
-    def found(self, tell: Callable[[int], None] | None = None) -> Found:
-        return self.settle.settled(self.states, tell)._asdict()
+    def found(self, tell: Callable[[int], None] | None = None, workers: int | None = 1) -> Found:
+        return self.settle.settled(self.states, tell, workers)._asdict()
 
 
 def _values(name: str, given: Any) -> Array:

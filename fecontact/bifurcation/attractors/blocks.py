@@ -51,8 +51,8 @@ class Block(Protocol):
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shapes of the arrays that are found, by name."""
 
-    def found(self, tell: Callable[[int], None] | None = None) -> Found:
-        """Compute them; ``tell`` is called with the number of runs done, and may raise."""
+    def found(self, tell: Callable[[int], None] | None = None, workers: int | None = 1) -> Found:
+        """Compute them on some threads; ``tell`` is called with the number of runs done."""
 
 
 @dataclass(frozen=True)
@@ -136,8 +136,7 @@ def work_off(
         If the executor broke; finished blocks are kept.
     """
     if place.folder is None:
-        kept: dict[int, Found] = {}
-        _compute(blocks, range(len(blocks)), place, kept.__setitem__, tell)
+        kept = [block.found(tell, place.workers) for block in blocks]
         return [partial(kept.__getitem__, number) for number in range(len(blocks))]
     files = [place.folder / f"{number:06d}.npz" for number in range(len(blocks))]
     with _owned(place.folder, mark, len(blocks)):

@@ -23,6 +23,7 @@ from fecontact.system.forcing_period import forcing_period
 
 # Chains each way where their number is not given, and the longest of many values.
 _CHAINS, _LONGEST = 16, 1000
+_TOGETHER = 8  # chains of a block
 
 Change = str | Callable[[Any, float], Moving]
 
@@ -164,15 +165,18 @@ def poincare_scan(
     order = np.arange(length * -(-count // length)).reshape(-1, length)
     order = np.minimum(order, count - 1)
     ways = [order] + ([count - 1 - order] if down else [])
-    blocks = [_Chain(task, points[chain]) for way in ways for chain in way]
+    together = len(order) if folder is None else _TOGETHER
+    places = [(way, chains_of_way[first : first + together])
+              for way, chains_of_way in enumerate(ways)
+              for first in range(0, len(order), together)]
+    blocks = [_Chains(task, points[chosen]) for _, chosen in places]
     mark = "" if folder is None else "".join(
         mark_of(made, *task.settings, points, length, down) for made in ends)
-    with shown(progress, lambda: progress_bar("Running", len(blocks) * length)) as tell:
+    with shown(progress, lambda: progress_bar("Running", sum(one.runs for one in blocks))) as tell:
         readers = work_off(blocks, place, mark, tell)
     states = np.empty((2, count, keep, state_size(moving)))
-    for way, chains_of_way in enumerate(ways):
-        for number, chain in enumerate(chains_of_way):
-            states[way, chain] = readers[way * len(order) + number]()["states"]
+    for (way, chosen), read in zip(places, readers, strict=True):
+        states[way, chosen.ravel()] = read()["states"]
     name = parameter if isinstance(parameter, str) else getattr(parameter, "__name__", "parameter")
     return PoincareScan(moving, name, points, states[0], states[1] if down else states[1, :0])
 
@@ -204,27 +208,27 @@ class _Task:
 
 
 @dataclass(frozen=True, eq=False)
-class _Chain:
-    """Values that are run one after the other, each from where the one before it ended."""
+class _Chains:
+    """Values (c, length), each row run one after the other from where the one before it ended."""
 
     task: _Task
     values: Array
 
     @property
     def runs(self) -> int:
-        return len(self.values)
+        return self.values.size
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
         size = state_size(in_time("poincare_scan", self.task.system))
         return {"states": (self.runs, self.task.keep, size)}
 
-    def found(self, tell: Callable[[int], None] | None = None) -> Found:
+    def found(self, tell: Callable[[int], None] | None = None, workers: int | None = 1) -> Found:
         task = self.task
-        runs = [task.system_at(float(value)) for value in self.values]
+        runs = [task.system_at(float(value)) for value in self.values.ravel()]
         settings: dict[str, Any] = {
-            "initial": task.initial, "solver": task.solver, "rtol": task.rtol, "workers": 1,
-            "progress": tell, "chain": self.runs}
+            "initial": task.initial, "solver": task.solver, "rtol": task.rtol, "workers": workers,
+            "progress": tell, "chain": self.values.shape[1]}
         if task.passes is not None:
             return {"states": _passages(runs, *task.passes, task.keep, **settings)}
         return {"states": strobe(runs, transient_periods=task.transient_periods, keep=task.keep,

@@ -16,7 +16,6 @@ from fecontact.bifurcation.linalg.lane_lu import (
     forward_lanes_transposed,
     reduce_row_lanes,
 )
-from fecontact.bifurcation.linalg.simd import WIDTH, gather, read, spread, write
 from fecontact.core.compiled import f8, helper, kernel, matrix, vector
 from fecontact.core.dense_lu import (
     backward,
@@ -26,6 +25,7 @@ from fecontact.core.dense_lu import (
     reduce_row,
 )
 from fecontact.core.dense_lu import solve as solve_dense
+from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.references import borrowed
 
 

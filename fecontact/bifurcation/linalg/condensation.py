@@ -22,9 +22,9 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
-from fecontact.bifurcation.linalg.simd import WIDTH, gather, read, spread, write
 from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.dense_lu import factorise
+from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 

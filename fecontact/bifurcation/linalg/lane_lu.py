@@ -6,8 +6,8 @@ instructions to pay; eight of them side by side are not. This takes 1.7 times le
 for 48. What is left in place of a matrix is the same; arrays have a last axis of eight lanes.
 """
 
-from fecontact.bifurcation.linalg.simd import WIDTH, magnitude, read, spread, where_larger, write
 from fecontact.core.compiled import helper
+from fecontact.core.lanes.vectors import WIDTH, magnitude, read, spread, where_larger, write
 
 
 @helper

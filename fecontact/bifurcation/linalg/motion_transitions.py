@@ -15,8 +15,8 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
-from fecontact.bifurcation.linalg.simd import WIDTH, gather, read, spread, write
 from fecontact.core.compiled import block, f8, helper, kernel, matrix, vector
+from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 

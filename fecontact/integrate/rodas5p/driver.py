@@ -35,7 +35,7 @@ from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.
-_SLIP_PART = 0.01
+SLIP_PART = 0.01
 # Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
 _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
@@ -95,35 +95,16 @@ def start(
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)
-    largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
-    largest = np.where(largest > 0.0, largest, 1.0)
-    slip_scale, depth, stick_speed, untouched = np.zeros((4, n))
-    for nodes, _, law in system.law_groups("friction"):
-        slip_scale[nodes] = law.velocity_scale
-        if not law.memory:
-            stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
-    for nodes, _, law in system.law_groups("normal"):
-        depth[nodes] = law.penetration_scale
-        untouched[nodes] = law.untouched(nodes.stop - nodes.start)
-    # What friction remembers fades without force, and derivatives are those of all nodes.
-    untouched[system.arrays.memory > 0 if not vary else slice(None)] = -np.inf
-    longest = longest_step(system, times, max_step)
-    breaks = np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float)
+    control = control_for(system, state, times, rtol=rtol, max_step=max_step, work=work)
     above, below, width, columns = system, system, 0.0, 0
     if vary:
-        breaks = np.union1d(breaks, times[1:-1])
+        # Derivatives are those of all nodes.
+        control.untouched[:] = -np.inf
+        control = control._replace(breaks=np.union1d(control.breaks, times[1:-1]))
         columns = len(state)
         if not isinstance(vary, bool):
             above, below, width = vary
             columns += 1
-    control = Control(
-        displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
-        slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
-        largest=largest, untouched=untouched,
-        breaks=breaks, levels=_levels(system), ground=_ground_bounds(system, times),
-        rtol=float(rtol), slip_part=_SLIP_PART, longest=longest,
-        speed_scale=system.velocity_scale, energy_scale=_energy_scale(system, state),
-        work=int(work), unfelt=first_unfelt.address)
     blocks = blocks_of(basis, system.arrays)
     problem = Problem(system.arrays, blocks, control)
     return Run(
@@ -133,9 +114,8 @@ def start(
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(above.arrays, below.arrays, width, _moved_both_ways(system, above, below),
-             variation_for(
-            columns, m, n, states, basis.dimension, width, float(vary_rtol or _LOOSER * rtol),
-            1.0 if vary_rtol else _FADED),
+             variation_for(columns, m, n, states, basis.dimension, width,
+                           float(vary_rtol or _LOOSER * rtol), 1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate_for(problem) if vary else 0),
         watch_for(system, events, bool(vary)),
@@ -149,7 +129,9 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
     It shares the room to work in, and its tables, with the run before, which must have ended.
     """
     _require_finite(state)
-    control = run.problem.control._replace(energy_scale=_energy_scale(system, state))
+    control = run.problem.control
+    if control.work:
+        control = control._replace(energy_scale=_energy_scale(system, state))
     output = run.output
     return Run(
         run.problem._replace(control=control),
@@ -183,6 +165,35 @@ def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: Contact
     """Whether both systems differ from the system itself."""
     return int(not any(all(map(np.array_equal, system.arrays, one.arrays))
                        for one in (above, below)))
+
+
+def control_for(
+    system: ContactSystem, state: Array, times: Array, *, rtol: float, max_step: float | None,
+    work: bool,
+) -> Control:
+    """What limits the steps of a run; see :func:`start`."""
+    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
+    largest = np.where(largest > 0.0, largest, 1.0)
+    slip_scale, depth, stick_speed, untouched = np.zeros((4, system.basis.contact_nodes))
+    for nodes, _, law in system.law_groups("friction"):
+        slip_scale[nodes] = law.velocity_scale
+        if work and not law.memory:
+            stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
+    for nodes, _, law in system.law_groups("normal"):
+        depth[nodes] = law.penetration_scale
+        untouched[nodes] = law.untouched(nodes.stop - nodes.start)
+    # What friction remembers fades without force.
+    untouched[system.arrays.memory > 0] = -np.inf
+    return Control(
+        displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
+        slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
+        largest=largest, untouched=untouched,
+        breaks=np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        levels=_levels(system), ground=_ground_bounds(system, times),
+        rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
+        speed_scale=system.velocity_scale,
+        energy_scale=_energy_scale(system, state) if work else np.inf,
+        work=int(work), unfelt=first_unfelt.address)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

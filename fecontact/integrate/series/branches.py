@@ -227,6 +227,11 @@ def obstacle(
     return None
 
 
+def series_pay(system: ContactSystem, begin: float, end: float) -> bool:
+    """Whether a run without events is expanded in series where that is left to the package."""
+    return obstacle(system, (), begin, end) is None and worthwhile(system, law_pieces(system))
+
+
 def worthwhile(system: ContactSystem, pieces: Array) -> bool:
     """Whether series are the faster way: few modes, none of them fast and much damped."""
     m, n = system.basis.modes, system.basis.contact_nodes

@@ -1,0 +1,184 @@
+"""Errors of a step, kinks ahead and forces that it may have missed, eight systems at once.
+
+What is checked, and by how much, is as in :mod:`fecontact.integrate.rodas5p.error_control`,
+:func:`fecontact.integrate.rodas5p.dynamics.next_kink` and
+:mod:`fecontact.integrate.course_bounds`.
+"""
+
+import numpy as np
+
+from fecontact.core.compiled import helper, routine
+from fecontact.core.lanes.vectors import (
+    chosen,
+    magnitude,
+    mask_of,
+    read,
+    root,
+    signed,
+    spread,
+    write,
+)
+from fecontact.integrate.lanes.arrays import (
+    BY_PLACE,
+    BY_RATE,
+    FORCE,
+    LEAST_SPEED,
+    QUICKEST,
+    RTOL,
+    SPEED_SCALE,
+)
+from fecontact.integrate.rodas5p.driver import SLIP_PART as _SLIP_PART
+from fecontact.integrate.rodas5p.tableau import STAGES
+
+
+@helper
+def larger(a, b):
+    """The larger of two."""
+    return chosen(a > b, a, b)
+
+
+@helper
+def smaller(a, b):
+    """The smaller of two."""
+    return chosen(a < b, a, b)
+
+
+@helper
+def note_extremes(control, progress):
+    """Take the state at the start of a step into the sizes so far."""
+    m = len(progress.extremes)
+    speed = read(progress.numbers[SPEED_SCALE])
+    for i in range(m):
+        write(progress.extremes[i], larger(read(progress.extremes[i]),
+                                           magnitude(read(progress.state[i]))))
+        speed = larger(speed, magnitude(read(progress.state[m + i])) * read(control.largest[i]))
+    write(progress.numbers[SPEED_SCALE], speed)
+
+
+@helper
+def state_error(control, progress, w):
+    """Error of the state at the end of a step as a multiple of what is allowed."""
+    m = len(progress.extremes)
+    difference = w.stages[STAGES - 1]
+    per_speed = 1.0 / larger(read(progress.numbers[SPEED_SCALE]),
+                             read(control.numbers[LEAST_SPEED]))
+    error, finite = spread(0.0), ~mask_of(0)
+    for i in range(m):
+        after = read(w.after[i])
+        scale = larger(larger(read(progress.extremes[i]), magnitude(after)),
+                       read(control.displacement_scale[i]))
+        error = larger(error, magnitude(read(difference[i])) / scale)
+        error = larger(error, magnitude(read(difference[m + i])) * read(control.largest[i])
+                       * per_speed)
+        finite = (finite & (magnitude(after) < np.inf)
+                  & (magnitude(read(w.after[m + i])) < np.inf))
+    return chosen(finite & (error < np.inf), error / read(control.numbers[RTOL]), np.inf)
+
+
+@helper
+def slip_error(error, speed, s, control, w):
+    """The larger of the error and that of the slip velocities at the end of the step."""
+    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    difference = w.stages[STAGES - 1]
+    for j in range(n):
+        slip = spread(0.0)
+        for i in range(m):
+            slip += read(s.Tx[j, i]) * read(difference[m + i])
+        distance = magnitude(read(w.speeds[j]) - read(s.sliding[j]) * speed)
+        part = magnitude(slip) / (_SLIP_PART * (read(control.slip_scale[j]) + distance))
+        touching = magnitude(read(w.forces[j, FORCE])) > 0.0
+        error = chosen(touching & (part > error), part, error)
+    return error
+
+
+@helper
+def _crossing(u, v, a, within):
+    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
+    q = -(v + signed(root(v * v - 2.0 * a * u), v))
+    one, other = q / a, 2.0 * u / q
+    within = chosen((one > 0.0) & (one < within), one, within)
+    return chosen((other > 0.0) & (other < within), other, within)
+
+
+@routine
+def next_kink(s, control, progress, within):
+    """Time until forces of a node change their character, or ``within`` if later."""
+    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    speed = read(progress.ground)
+    first = within
+    for j in range(n):
+        x, y = spread(0.0), spread(0.0)
+        for i in range(m):
+            x += read(s.Tx[j, i]) * read(progress.rate[m + i])
+            y += read(s.Ty[j, i]) * read(progress.rate[m + i])
+        u, v, a = -read(progress.places[n + j]) - read(s.gap[j]), -read(progress.speeds[n + j]), -y
+        first = _crossing(u, v, a, first)
+        first = _crossing(u - read(control.depth[j]), v, a, first)
+        force = read(progress.forces[j, FORCE])
+        pressed = force > 0.0
+        fall = (read(progress.forces[j, BY_PLACE]) * v + read(progress.forces[j, BY_RATE]) * a)
+        lift = -force / fall
+        first = chosen(pressed & (fall < 0.0) & (lift < first), lift, first)
+        slip = read(progress.speeds[j]) - read(s.sliding[j]) * speed
+        towards = chosen(slip > 0.0, -x, x)
+        slow, size = read(control.slow[j]), magnitude(slip)
+        stop = (size - slow) / towards
+        first = chosen(pressed & (size > 1.5 * slow) & (towards > 0.0) & (stop < first), stop,
+                       first)
+    return first
+
+
+@helper
+def _course(rows, first_row, dense):
+    """The three inner coefficients of a node's interpolant; without its ends."""
+    k1, k2, k3 = spread(0.0), spread(0.0), spread(0.0)
+    for i in range(len(rows)):
+        shape = read(rows[i])
+        k1 += shape * read(dense[0, first_row + i])
+        k2 += shape * read(dense[1, first_row + i])
+        k3 += shape * read(dense[2, first_row + i])
+    return k1, k2, k3
+
+
+@helper
+def _range(first, last, k1, k2, k3):
+    """Smallest and largest coefficient of an interpolant, and whether they are monotonic."""
+    a, c = 0.75 * first + 0.25 * (last + k1), 0.25 * (first + k1 + k2 + k3) + 0.75 * last
+    b = 0.5 * (first + last) + k1 * (1.0 / 3.0) + k2 * (1.0 / 6.0)
+    low = smaller(smaller(smaller(first, a), smaller(b, c)), last)
+    high = larger(larger(larger(first, a), larger(b, c)), last)
+    rising = (first <= a) & (a <= b) & (b <= c) & (c <= last)
+    falling = (first >= a) & (a >= b) & (b >= c) & (c >= last)
+    return low, high, rising | falling
+
+
+@routine
+def restless(h, s, control, progress, w):
+    """Lanes, one bit each, in which a contact may have changed unnoticed within the step."""
+    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    speed = read(progress.ground)
+    some = mask_of(0)
+    for j in range(n):
+        spread_ = magnitude(read(s.sliding[j])) * read(control.numbers[QUICKEST]) * h
+        k1, k2, k3 = _course(s.Ty[j], 0, w.dense)
+        first, last = read(progress.places[n + j]), read(w.places[n + j])
+        low, high, monotone = _range(first, last, k1, k2, k3)
+        nearer = smaller(first, last)
+        touching = magnitude(read(w.forces[j, FORCE])) > 0.0
+        for level in range(len(control.levels)):
+            shift = read(s.gap[j]) + read(control.levels[level, j])
+            felt = 2.0 * smaller(nearer + shift, spread(0.0))
+            bottom = low + shift
+            mixed = (bottom < 0.0) & (high + shift > 0.0)
+            some = some | ((mixed | (bottom < felt)) & ~monotone)
+            touching = touching | (bottom < 0.0) | mask_of(-1 if level > 0 else 0)
+        k1, k2, k3 = _course(s.Tx[j], m, w.dense)
+        passing = read(s.sliding[j]) * speed
+        first, last = read(progress.speeds[j]) - passing, read(w.speeds[j]) - passing
+        low, high, monotone = _range(first, last, k1, k2, k3)
+        largest = larger(-low, high) + spread_
+        width = read(control.slip_scale[j])
+        mixed = (low < spread_) & (high > -spread_) & (largest > width)
+        felt = 2.0 * larger(larger(magnitude(first), magnitude(last)), width) + spread_
+        some = some | (touching & (mixed | (largest > felt)) & ~(monotone & (spread_ == 0.0)))
+    return some

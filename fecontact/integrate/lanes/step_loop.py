@@ -1,0 +1,363 @@
+"""The compiled time integrator for many small runs: eight at once, one in each lane.
+
+Every lane has its own time and step; all try a step together, and each goes on by the outcome of
+its own. A lane whose run has ended takes the next one that waits. No lane has a part in what
+another one computes, so that results do not depend on which runs are side by side.
+"""
+
+import numpy as np
+
+from fecontact.core.compiled import helper, i8, routine
+from fecontact.core.lanes.functions import reciprocal_fifth_root
+from fecontact.core.lanes.vectors import (
+    WIDTH,
+    bits,
+    chosen,
+    magnitude,
+    mask_of,
+    read,
+    spread,
+    write,
+)
+from fecontact.core.references import borrowed
+from fecontact.integrate.course_bounds import doubtful
+from fecontact.integrate.courses import QUICKEST, set_courses
+from fecontact.integrate.lanes import arrays, checks, equations, stages
+from fecontact.integrate.lanes.arrays import (
+    AGAIN,
+    ATTEMPTS,
+    CAUTIOUS,
+    END,
+    EXACTLY,
+    LAST_ROOT,
+    LAST_STEP,
+    LEAST_SPEED,
+    LONGEST,
+    NEXT_OUTPUT,
+    OPEN,
+    REJECTED_LAST,
+    SMALLEST,
+    SPEED_SCALE,
+    STEP,
+    TAKEN,
+    TIME,
+    WAITING,
+)
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p.state import Step
+from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
+from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
+from fecontact.system.nodes import GroundMotion
+
+ADVANCE = i8(arrays.LANES, arrays.LANE_RUNS, run_arrays.PROBLEM, run_arrays.PROGRESS,
+             run_arrays.ROOM, i8)
+# How a call returned: so many attempts were made, lanes are free that more runs may take, or all
+# runs have ended.
+GOES_ON, HUNGRY, DONE = range(3)
+
+# As in the step loop of one run.
+_SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
+# Errors are counted as within these bounds, and as the third at least, for the length of a step.
+_LEAST_ERROR, _LARGEST_ERROR = 1e-6, 1e10
+_LARGEST_ROOT = 0.01**-0.2
+_MOST_AGAIN = 20.0
+
+
+@helper
+def _load(lane, run, b, runs):
+    """Begin a run in a lane; one that follows another from its last state."""
+    for row in range(len(b.parameters)):
+        b.parameters[row, lane] = runs.parameters[run, row]
+    for row in range(len(b.start)):
+        b.start[row, lane] = runs.starts[run, row]
+    progress, last = b.progress, runs.times.shape[1] - 1
+    for row in range(runs.states.shape[2]):
+        if runs.follows[run] != 0:
+            progress.state[row, lane] = runs.states[run - 1, last, row]
+        runs.states[run, 0, row] = progress.state[row, lane]
+    progress.runs[lane], progress.rows[lane] = run, 1
+    progress.counts[0, lane], progress.counts[1, lane] = 0, 0
+    progress.fresh[0] |= 1 << lane
+
+
+@routine
+def _end(lane, status, b, runs):
+    """Note how the run in a lane has ended; begin the one that follows, or free the lane."""
+    progress = b.progress
+    run, going = progress.runs[lane], True
+    while going:
+        runs.ends[run, arrays.STATUS], runs.ends[run, arrays.OUTPUTS] = status, progress.rows[lane]
+        runs.ends[run, arrays.STEPS] = progress.counts[0, lane]
+        runs.ends[run, arrays.REJECTIONS] = progress.counts[1, lane]
+        run += 1
+        going = False
+        if status == FINISHED and run < len(runs.follows) and runs.follows[run] != 0:
+            _load(lane, run, b, runs)
+            going = runs.times.shape[1] == 1
+        else:
+            progress.runs[lane] = -1
+
+
+@routine
+def _fill(b, runs):
+    """Give free lanes runs that wait; the lanes at work, one bit each."""
+    active = 0
+    for lane in range(WIDTH):
+        while b.progress.runs[lane] < 0 and runs.counts[TAKEN] < runs.counts[WAITING]:
+            run = runs.queue[runs.counts[TAKEN]]
+            runs.counts[TAKEN] += 1
+            _load(lane, run, b, runs)
+            if runs.times.shape[1] == 1:
+                _end(lane, FINISHED, b, runs)
+        if b.progress.runs[lane] >= 0:
+            active |= 1 << lane
+    return active
+
+
+@helper
+def _take(where, values, out):
+    """Fill the lanes of a table with values where the mask is true."""
+    for k in range(len(values)):
+        write(out[k], chosen(where, read(values[k]), read(out[k])))
+
+
+@routine
+def _begin(b):
+    """Rates, forces and first steps of lanes that have just been filled."""
+    s, progress, w = b.system, b.progress, b.room
+    t, new = read(progress.numbers[TIME]), mask_of(progress.fresh[0])
+    equations.set_given(t, s, w.load)
+    speed = equations.ground_speed(t, s)
+    equations.set_rate_and_forces(progress.state, speed, s, w.load, w.places, w.speeds, w.forces,
+                                  w.base)
+    write(progress.ground, chosen(new, speed, read(progress.ground)))
+    _take(new, w.base, progress.rate)
+    _go_to_end(new, progress, w)
+    m, quickest = len(w.load), spread(1e-300)
+    for i in range(m):
+        quickest = checks.larger(
+            quickest, magnitude(read(w.base[m + i])) * read(b.control.largest[i]))
+    limits, numbers = b.control.numbers, progress.numbers
+    first = checks.smaller(0.1 * read(limits[LEAST_SPEED]) / quickest,
+                           0.01 * read(limits[LONGEST]))
+    write(numbers[STEP], chosen(new, first, read(numbers[STEP])))
+    progress.fresh[0] = 0
+
+
+@helper
+def _go_to_end(where, progress, w):
+    """Take the nodes and forces in ``w`` for those of the state."""
+    _take(where, w.places, progress.places)
+    _take(where, w.speeds, progress.speeds)
+    for j in range(len(w.forces)):
+        _take(where, w.forces[j], progress.forces[j])
+
+
+@helper
+def _aim(t, b):
+    """End of the step to try, and the length of the step before, which failed, or zero."""
+    progress, numbers = b.progress, b.progress.numbers
+    h, stop = read(numbers[STEP]), read(numbers[END])
+    target = t + h
+    near = chosen(target + 0.01 * h >= stop, stop,
+                  chosen(target + h > stop, t + 0.5 * (stop - t), target))
+    target = chosen(read(numbers[EXACTLY]) > 0.0, checks.smaller(target, stop), near)
+    limit = read(numbers[CAUTIOUS])
+    careful = limit > 0.0
+    caution = spread(0.0)
+    if bits(careful) != 0:
+        reach = checks.larger(target - t, limit)
+        kink = checks.next_kink(b.system, b.control, progress, reach)
+        cut = careful & (kink > 1e-3 * limit) & (kink < 0.9 * reach)
+        target = chosen(cut, checks.smaller(t + 1.0003 * kink, stop), target)
+        caution = chosen(cut, limit, 0.0)
+        write(numbers[CAUTIOUS], spread(0.0))
+    return target, caution
+
+
+@routine
+def _unfelt_part(lane, t, h, target, b, problem, progress, room):
+    """Part of a lane's step to which it has to be shortened; 1 if none.
+
+    By the functions for one run, on ``problem``, ``progress`` and ``room``, which take the lane's
+    numbers; but ``problem.control.speed_scale`` is zero.
+    """
+    mine, w, s, control = b.progress, b.room, problem.system, problem.control
+    again, smallest = mine.numbers[AGAIN, lane], mine.numbers[SMALLEST, lane]
+    if again >= _MOST_AGAIN:
+        return 1.0
+    n, m = s.Tx.shape
+    for j in range(n):
+        s.gap[j], s.sliding[j] = b.system.gap[j, lane], b.system.sliding[j, lane]
+        control.slip_scale[j] = b.control.slip_scale[j, lane]
+        for level in range(len(control.levels)):
+            control.levels[level, j] = b.control.levels[level, j, lane]
+        for k in range(s.normal_parameters.shape[1]):
+            s.normal_parameters[j, k] = b.system.normal_parameters[j, k, lane]
+        for k in range(s.friction_parameters.shape[1]):
+            s.friction_parameters[j, k] = b.system.friction_parameters[j, k, lane]
+        for i in range(m):
+            problem.blocks.shapes[i, j] = b.system.Tx[j, i, lane]
+            problem.blocks.shapes[i, n + j] = b.system.Ty[j, i, lane]
+    for k in range(len(s.ground_motion_parameters)):
+        s.ground_motion_parameters[k] = b.system.ground_motion_parameters[k, lane]
+    for i in range(m):
+        control.displacement_scale[i] = b.control.displacement_scale[i, lane]
+        control.largest[i] = b.control.largest[i, lane]
+        progress.extremes[i] = mine.extremes[i, lane]
+    progress.numbers[run_arrays.SPEED_SCALE] = max(
+        mine.numbers[SPEED_SCALE, lane], b.control.numbers[LEAST_SPEED, lane])
+    control.ground[QUICKEST] = b.control.numbers[arrays.QUICKEST, lane]
+    for k in range(2 * m):
+        progress.state[k], room.after[k] = mine.state[k, lane], w.after[k, lane]
+        for row in range(3):
+            room.dense[row, k] = w.dense[row, k, lane]
+    for j in range(2 * n):
+        room.nodes[0, j], room.nodes[1, j] = w.places[j, lane], w.speeds[j, lane]
+    moved = GroundMotion(0.0, mine.ground[lane], 0.0, 0.0)
+    set_courses(s, problem.blocks, control.ground, progress.state, room.after, room)
+    if doubtful(moved, h, s, control.ground, control.levels, control.slip_scale, room):
+        one = Step(t, h, target, target, moved, 0.0, False)
+        part = first_unfelt_at(control.unfelt)(one, int(again), problem, progress, room)
+        if part * h > 100.0 * smallest and part < 1.0:
+            return part
+    return 1.0
+
+
+@routine
+def _write_outputs(lane, t, h, target, b, runs):
+    """Write the outputs of a lane up to the end of its step; whether they were the last."""
+    progress, w = b.progress, b.room
+    run, row, count = progress.runs[lane], progress.rows[lane], runs.times.shape[1]
+    while row < count and runs.times[run, row] <= target:
+        part = (runs.times[run, row] - t) / h
+        for k in range(len(w.after)):
+            runs.states[run, row, k] = (1.0 - part) * progress.state[k, lane] + part * (
+                w.after[k, lane] + (1.0 - part) * (w.dense[0, k, lane] + part * (
+                    w.dense[1, k, lane] + part * w.dense[2, k, lane])))
+        row += 1
+    progress.rows[lane] = row
+    if row == count:
+        return True
+    progress.numbers[NEXT_OUTPUT, lane] = runs.times[run, row]
+    return False
+
+
+@helper
+def _set_next(h, error, caution, good, missed, part, b):
+    """Lengths of the next steps: of lanes whose step was ``good``, missed something, or failed."""
+    numbers = b.progress.numbers
+    bounded = checks.smaller(checks.larger(error, _LEAST_ERROR), spread(_LARGEST_ERROR))
+    root = reciprocal_fifth_root(bounded)
+    factor = checks.smaller(checks.larger(_SAFETY * root, _SMALLEST_FACTOR),
+                            spread(_LARGEST_FACTOR))
+    last, last_root = read(numbers[LAST_STEP]), read(numbers[LAST_ROOT])
+    # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
+    predicted = checks.smaller(factor, factor * (h / last) * (root / last_root))
+    grown = chosen(last > 0.0, checks.larger(predicted, _SMALLEST_FACTOR), factor)
+    grown = chosen(read(numbers[REJECTED_LAST]) > 0.0, checks.smaller(grown, spread(1.0)), grown)
+    longer = checks.smaller(h * grown, read(b.control.numbers[LONGEST]))
+    failed = ~(good | missed)
+    write(numbers[STEP], chosen(good, longer, h * chosen(missed, part, factor)))
+    write(numbers[LAST_STEP], chosen(good, h, last))
+    write(numbers[LAST_ROOT], chosen(good, checks.smaller(root, spread(_LARGEST_ROOT)),
+                                     last_root))
+    write(numbers[REJECTED_LAST],
+          chosen(failed, 1.0, chosen(good, 0.0, read(numbers[REJECTED_LAST]))))
+    after_failure = chosen(failed & ~(caution > 0.0), h, 0.0)
+    write(numbers[CAUTIOUS], chosen(good, caution, after_failure))
+    write(numbers[EXACTLY], chosen(missed, spread(1.0), 0.0))
+    write(numbers[AGAIN], chosen(good, 0.0, chosen(missed, read(numbers[AGAIN]) + 1.0,
+                                                   read(numbers[AGAIN]))))
+
+
+@helper
+def _attempt(active, b, runs, problem, progress, room):
+    """Try a step in all lanes."""
+    s, control, mine, w = b.system, b.control, b.progress, b.room
+    numbers = mine.numbers
+    t = read(numbers[TIME])
+    checks.note_extremes(control, mine)
+    target, caution = _aim(t, b)
+    h = target - t
+    speed = stages.step(t, h, target, s, mine, w)
+    equations.set_rate_and_forces(w.after, speed, s, w.load, w.places, w.speeds, w.forces, w.base)
+    error = checks.state_error(control, mine, w)
+    error = chosen(error <= 1.0, checks.slip_error(error, speed, s, control, w), error)
+    passed = (error <= 1.0) & mask_of(active)
+    stages.set_dense(w)
+    part, missed = spread(1.0), mask_of(0)
+    doubt = bits(passed & checks.restless(h, s, control, mine, w))
+    if doubt != 0:
+        write(w.work[0, 0], t)
+        write(w.right[0], h)
+        write(w.right[1], target)
+        for lane in range(WIDTH):
+            w.stage[0, lane] = 1.0
+            if (doubt >> lane) & 1:
+                w.stage[0, lane] = _unfelt_part(lane, w.work[0, 0, lane], w.right[0, lane],
+                                                w.right[1, lane], b, problem, progress, room)
+        part = read(w.stage[0])
+        missed = part < 1.0
+    good = passed & ~missed
+    outputs = bits(good & (read(numbers[NEXT_OUTPUT]) <= target))
+    complete = 0
+    if outputs != 0:
+        write(w.work[0, 0], t)
+        write(w.right[0], h)
+        write(w.right[1], target)
+        for lane in range(WIDTH):
+            if (outputs >> lane) & 1 and _write_outputs(
+                    lane, w.work[0, 0, lane], w.right[0, lane], w.right[1, lane], b, runs):
+                complete |= 1 << lane
+    _take(good, w.after, mine.state)
+    _take(good, w.base, mine.rate)
+    _go_to_end(good, mine, w)
+    write(mine.ground, chosen(good, speed, read(mine.ground)))
+    write(numbers[TIME], chosen(good, target, t))
+    _set_next(h, error, caution, good, missed, part, b)
+    stopped = active & bits(~(good | missed) & ~(read(numbers[STEP]) >= read(numbers[SMALLEST])))
+    accepted = bits(good)
+    for lane in range(WIDTH):
+        if (active >> lane) & 1:
+            mine.counts[1 - ((accepted >> lane) & 1), lane] += 1
+    if complete | stopped:
+        write(w.stage[0], error)
+        for lane in range(WIDTH):
+            if (complete >> lane) & 1:
+                _end(lane, FINISHED, b, runs)
+            elif (stopped >> lane) & 1:
+                _end(lane, MINIMUM_STEP if w.stage[0, lane] < np.inf else NOT_FINITE, b, runs)
+
+
+@helper
+def advance_by(b, runs, problem, progress, room, most):
+    """As :func:`advance`, by references."""
+    active = _fill(b, runs)
+    for _ in range(most):
+        if active != (1 << WIDTH) - 1:
+            active = _fill(b, runs)
+            if active == 0:
+                return HUNGRY if runs.counts[OPEN] else DONE
+            if active != (1 << WIDTH) - 1 and runs.counts[OPEN]:
+                return HUNGRY
+        if b.progress.fresh[0] != 0:
+            _begin(b)
+        _attempt(active, b, runs, problem, progress, room)
+        runs.counts[ATTEMPTS] += 1
+        active = 0
+        for lane in range(WIDTH):
+            if b.progress.runs[lane] >= 0:
+                active |= 1 << lane
+    return GOES_ON
+
+
+def advance(b, runs, problem, progress, room, most):
+    """Go on until ``most`` steps have been tried in all lanes; returns how it ended.
+
+    ``problem``, ``progress`` and ``room`` are those of some run of the same kind, as room for
+    checks of single lanes. It is compiled for each size, in
+    :mod:`fecontact.integrate.lanes.small_systems`.
+    """
+    return advance_by(borrowed(b), borrowed(runs), borrowed(problem), borrowed(progress),
+                      borrowed(room), most)

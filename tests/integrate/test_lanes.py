@@ -1,0 +1,277 @@
+"""Eight runs side by side: the numbers of single runs, whatever else is run, and closed forms."""
+
+import numpy as np
+import pytest
+from systems import basis, friction_oscillator
+from test_small_systems import system as block
+
+from fecontact import (
+    ContactSystem,
+    Drive,
+    Ground,
+    InputError,
+    Load,
+    PointLoad,
+    Status,
+    ensemble,
+    simulate,
+)
+from fecontact.integrate import Rodas5P, Scipy
+from fecontact.integrate.lanes import driver as lane_driver
+from fecontact.integrate.lanes.driver import SideBySide, kind_of, side_by_side
+from fecontact.integrate.rodas5p import driver
+from fecontact.laws import (
+    ConstantFriction,
+    DahlFriction,
+    ExponentialFriction,
+    Harmonic,
+    HarmonicSpeed,
+    HyperbolicFriction,
+    LinearContact,
+    ParabolicSurface,
+    PowerContact,
+    PrescribedForce,
+    ProductFriction,
+    RoughSurface,
+    Sine,
+    TwoSidedStop,
+)
+
+UP, ALONG = np.array([[0.0], [1.0]]), np.array([[1.0], [0.0]])
+HERTZ = 0.5 / np.pi
+LANES_ONLY = Rodas5P(series="never")
+
+
+def slider(**parts):
+    """One mode along a belt under a given force."""
+    r = 1.0 / np.sqrt(5.632)
+    return ContactSystem(basis([0.0], [0.0], r * ALONG, r * ALONG), **{
+        "normal": PrescribedForce(14.0),
+        "friction": ExponentialFriction(0.8, 0.55, 1000.0, 1e6), "ground": Ground(speed=1e-3),
+        "drive": Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
+                       angular_frequency=13.8), **parts})
+
+
+def single(system, state, times, rtol):
+    run = driver.start(system, state, times, rtol=rtol, work=False, series="never")
+    run.advance(10**9)
+    assert run.outputs == len(times)
+    return run
+
+
+CASES = {
+    "prescribed": slider(),
+    "uniform": friction_oscillator(2),
+    "three modes": friction_oscillator(3),
+    "two nodes": block(2, 2),
+    "moving ground": slider(ground=Ground(speed=1e-3, motion=HarmonicSpeed(4e-4, 30.0, 0.3))),
+    "tanh": slider(friction=HyperbolicFriction(0.8, 0.55, 2e-3, 1e5, 0.3, smoothing="tanh")),
+    "square root": slider(friction=ConstantFriction(0.5, 1e5, smoothing="square-root")),
+    "product": slider(friction=ProductFriction(0.4, 0.6, 900.0, 1e5)),
+    "Hertz": friction_oscillator(2, normal=PowerContact(3e9, 1.5, 0.4)),
+    "a power": friction_oscillator(2, normal=PowerContact(3e9, 1.4, 0.4)),
+    "parabolic": friction_oscillator(2, normal=ParabolicSurface(1e7, 1e-5, 40.0)),
+    "linear": friction_oscillator(2, normal=LinearContact(1e7, 40.0)),
+    "two stops": friction_oscillator(2, normal=TwoSidedStop(1e7, 1e-5, 1.0, 0.2)),
+    "load in time": friction_oscillator(2, load=Load(14.0, (
+        PointLoad("C", "y", signal=Harmonic(-3.0, 40.0)),))),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_run_is_that_of_a_single_one(name):
+    """Errors against a run of tight tolerance are those of single runs of the same tolerance."""
+    base = CASES[name]
+    systems = [base.with_(**{"drive.angular_frequency": w}) for w in np.linspace(11.0, 16.0, 11)]
+    assert all(kind_of(one, 0.0, 0.4) is not None for one in systems)
+    state, times = np.zeros(base.size), np.linspace(0.0, 0.4, 9)
+    found = ensemble(systems, times, initial=state, rtol=1e-7)
+    assert found.finished.all()
+    assert (found.states[:, 0] == 0.0).all()
+    for system, states, steps in zip(systems, found.states, found.steps, strict=True):
+        exact = single(system, state, times, 1e-11).states
+        own = single(system, state, times, 1e-7)
+        size = np.abs(exact).max(axis=0) + 1e-300
+        off = (np.abs(states - exact) / size).max()
+        assert off < max(2e-5, 3.0 * (np.abs(own.states - exact) / size).max())
+        assert steps == pytest.approx(own.statistics["steps"], rel=0.1)
+
+
+def test_against_an_integrator_of_another_library():
+    systems = [slider().with_(**{"drive.angular_frequency": w}) for w in (11.0, 13.8)]
+    times = np.linspace(0.0, 0.5, 6)
+    found = ensemble(systems, times, initial=np.zeros(2), rtol=1e-8)
+    for system, states in zip(systems, found.states, strict=True):
+        other = simulate(system, 0.5, initial=np.zeros(2), outputs=times, rtol=1e-8,
+                         solver=Scipy("Radau")).states
+        assert states == pytest.approx(other, abs=1e-5 * np.abs(other).max(axis=0).min())
+
+
+def test_results_do_not_depend_on_what_runs_beside():
+    """Bit for bit: alone, in any order, with others of other laws, by one worker or by two."""
+    rng = np.random.default_rng(3)
+    systems, states = [], []
+    for k in range(29):
+        base = friction_oscillator(2) if k % 3 else friction_oscillator(
+            2, normal=PowerContact(3e9, 1.5, 0.4))
+        systems.append(base.with_(**{"drive.angular_frequency": rng.uniform(10.0, 16.0),
+                                     "ground.speed": rng.uniform(5e-4, 2e-3)}))
+        states.append(rng.normal(size=4) * np.array([1e-4, 1e-6, 1e-3, 1e-5]))
+    times = np.sort(rng.uniform(0.0, 0.4, (29, 5)), axis=1)
+    wanted = ensemble(systems, times, initial=np.array(states), workers=1)
+    assert wanted.finished.all()
+    for workers in (1, 2):
+        order = rng.permutation(29)
+        found = ensemble([systems[k] for k in order], times[order],
+                         initial=np.array([states[k] for k in order]), workers=workers)
+        assert (found.states == wanted.states[order]).all()
+        assert (found.steps == wanted.steps[order]).all()
+    for k in (0, 1, 28):
+        alone = ensemble(systems[k], times[k], initial=states[k])
+        assert (alone.states[0] == wanted.states[k]).all()
+
+
+def test_a_chain_hands_on_its_states():
+    """As runs one after the other, each from where the one before has ended."""
+    frequencies = np.linspace(11.0, 16.0, 11)
+    systems = [slider().with_(**{"drive.angular_frequency": w}) for w in frequencies]
+    times = np.linspace(0.0, 0.2, 3)
+    found = ensemble(systems, times, initial=np.array([1e-4, 0.0]), chain=4, workers=2)
+    assert found.finished.all()
+    for first in (0, 4, 8):
+        state = np.array([1e-4, 0.0])
+        for index in range(first, min(first + 4, 11)):
+            assert (found.states[index, 0] == state).all()
+            alone = ensemble(systems[index], times, initial=state)
+            assert (found.states[index] == alone.states[0]).all()
+            assert found.steps[index] == alone.steps[0]
+            state = alone.states[0, -1]
+
+
+def test_a_chain_goes_on_behind_a_run_that_failed():
+    """From the own initial state of the next one."""
+    starts = np.zeros((6, 4))
+    starts[0], starts[1, 2], starts[2, 2] = [1e308, 0.0, 1e308, 0.0], 1e-3, 3e-3
+    found = ensemble(friction_oscillator(2), [0.0, 0.1], initial=starts, chain=3)
+    assert found.finished.tolist() == [False] + [True] * 5
+    assert (found.states[1, 0] == starts[1]).all()
+    assert (found.states[2, 0] == found.states[1, -1]).all()
+    assert (found.states[3, 0] == 0.0).all()
+    alone = ensemble(friction_oscillator(2), [0.0, 0.1], initial=starts[1])
+    assert (found.states[1] == alone.states[0]).all()
+
+
+def test_a_run_that_was_left_goes_on_bit_for_bit(monkeypatch):
+    systems = [slider().with_(**{"drive.angular_frequency": w}) for w in np.linspace(11, 16, 13)]
+    times = np.linspace(0.0, 0.4, 5)
+    wanted = ensemble(systems, times, initial=np.zeros(2))
+    monkeypatch.setattr(lane_driver, "_STEPS", 3)
+    monkeypatch.setattr(lane_driver, "_DEALT", 2)
+    found = ensemble(systems, times, initial=np.zeros(2), workers=1)
+    assert (found.states == wanted.states).all()
+
+
+def test_lanes_are_at_work():
+    """Runs of very different lengths: a lane that is done takes the next run at once."""
+    times = np.linspace(0.0, 1.0, 2) * np.linspace(0.2, 2.0, 240)[::-1, None]
+    one = SideBySide(kind_of(slider(), 0.0, 2.0), list(range(240)), [slider()] * 240,
+                     lambda _: np.zeros(2), [False] * 240, times, 1e-6, None)
+    one.work(1, lambda: True)
+    assert one.done == 240
+    assert set(one.status) == {Status.FINISHED}
+    tried = one.runs.ends[:, 2:].sum()
+    assert tried > 0.95 * 8.0 * one.attempts
+
+
+def test_no_reversal_of_slip_is_missed():
+    """A mass that would run 1e-4 faster than its belt for 0.03 s sticks to it instead.
+
+    Unit mass and spring, pressed with 1 N: from then on the amplitude of its velocity is that of
+    the belt, whatever the start.
+    """
+    system = ContactSystem(
+        basis([HERTZ], [0.0], ALONG, ALONG), normal=PrescribedForce(1.0),
+        friction=ExponentialFriction(0.1, 0.1, 0.0, 1e8), ground=Ground(speed=1.0))
+    phases = np.linspace(0.0, 1.2, 25)
+    starts = np.column_stack([0.1 - 1.0001 * np.cos(phases), 1.0001 * np.sin(phases)])
+    times = np.column_stack([0.0 * phases, 2.5 - phases, 3.5 - phases, 5.0 - phases])
+    found = ensemble(system, times, initial=starts, rtol=1e-5)
+    amplitude = np.hypot(found.states[:, 1:, 0] - 0.1, found.states[:, 1:, 1])
+    assert amplitude == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(("normal", "start"), [
+    (RoughSurface(1e6, 1e-5, 0.0), [1.001, 0.0]), (TwoSidedStop(1e6, 2.0), [0.0, 1.0005])])
+def test_stops_that_are_met_at_turning_points_alone(normal, start):
+    """x'' + x = 0 between stops at one below, and above: they are not passed."""
+    system = ContactSystem(basis([HERTZ], [0.0], UP, UP), normal=normal, gap=1.0)
+    starts = np.array(start) * np.linspace(1.0, 1.0002, 9)[:, None]
+    assert kind_of(system, 0.0, 50.0) is not None
+    found = ensemble(system, np.linspace(0.0, 50.0, 5001), initial=starts, rtol=1e-5,
+                     solver=LANES_ONLY)
+    lowest = found.states[:, :, 0].min(axis=1)
+    assert (lowest > -1.0 - 1e-4).all()
+    assert (lowest < -0.999).all()
+    if isinstance(normal, TwoSidedStop):
+        assert (found.states[:, :, 0].max(axis=1) < 1.0 + 1e-4).all()
+
+
+def test_a_run_that_cannot_go_on_leaves_the_others():
+    system, times = friction_oscillator(2), [0.0, 0.1, 0.2]
+    starts = np.zeros((3, 4))
+    starts[0, 3], starts[1, :] = -1e200, [1e308, 0.0, 1e308, 0.0]
+    found = ensemble(system, times, initial=starts)
+    assert found.status == (Status.MINIMUM_STEP, Status.NOT_FINITE, Status.FINISHED)
+    assert (found.states[:2, 0] == starts[:2]).all()
+    assert np.isnan(found.states[:2, 1:]).all()
+    alone = ensemble(system, times, initial=starts[2])
+    assert (found.states[2] == alone.states[0]).all()
+
+
+def test_one_output_time_gives_the_start():
+    chained = ensemble(slider(), [0.5], initial=np.array([[1e-3, 0.0], [2e-3, 1e-3]]), chain=2)
+    assert chained.states[:, 0].tolist() == [[1e-3, 0.0], [1e-3, 0.0]]
+    found = ensemble(slider(), [0.5], initial=np.array([[1e-3, 0.0], [2e-3, 1e-3]]))
+    assert found.finished.all()
+    assert found.states[:, 0].tolist() == [[1e-3, 0.0], [2e-3, 1e-3]]
+
+
+def test_longest_step_holds():
+    found = ensemble(slider(), [0.0, 0.5], initial=np.zeros((2, 2)), max_step=1e-4)
+    assert (found.steps >= 5000).all()
+
+
+def test_progress_counts_all_runs():
+    seen = []
+    ensemble(slider(), [0.0, 0.5], initial=np.zeros((20, 2)), progress=seen.append)
+    assert seen[-1] == 20
+
+
+def test_initial_states_that_are_not_finite():
+    with pytest.raises(InputError, match="not finite"):
+        ensemble(slider(), [0.0, 0.5], initial=np.full((2, 2), np.nan))
+
+
+@pytest.mark.parametrize("other", [
+    friction_oscillator(2, ground=Ground(speed=1e-3, profile=Sine(1e-4, 2.5e-3))),
+    friction_oscillator(2, friction=DahlFriction(0.5, 1e-6)),
+    block(5, 1),
+])
+def test_other_systems_are_run_one_by_one(other):
+    """Their results are those of single runs bit for bit."""
+    assert kind_of(other, 0.0, 0.1) is None
+    times, start = np.linspace(0.0, 0.1, 3), np.zeros((2, other.size))
+    found = ensemble([other, other], times, initial=start)
+    run = driver.start(other, start[0], times, rtol=1e-6, work=False)
+    run.advance(10**9)
+    assert (found.states == run.states).all()
+
+
+def test_motion_expanded_in_power_series_is_left_to_them():
+    frictionless = ContactSystem(basis([HERTZ], [0.01], UP, UP), normal=LinearContact(1e3, 1.0),
+                                 gap=0.5)
+    members, times = [frictionless] * 2, np.array([[0.0, 1.0]] * 2)
+    starts = np.zeros((2, 2))
+    assert side_by_side(members, starts.__getitem__, times, 1e-6, None, "auto") == []
+    found = side_by_side(members, starts.__getitem__, times, 1e-6, None, "never")
+    assert [one.numbers for one in found] == [[0, 1]]

@@ -1,0 +1,130 @@
+"""Laws for eight nodes at once: the same numbers as the laws themselves."""
+
+import numpy as np
+import pytest
+from numba import types
+
+from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.lanes.vectors import read, write
+from fecontact.laws import (
+    Constant,
+    ConstantFriction,
+    CubicFriction,
+    ExponentialFriction,
+    GalvanettoFriction,
+    GaussianFriction,
+    GaussianSurface,
+    Harmonic,
+    HarmonicSpeed,
+    HyperbolicFriction,
+    LinearContact,
+    ParabolicSurface,
+    PowerContact,
+    PrescribedForce,
+    ProductFriction,
+    RestitutionContact,
+    RoughSurface,
+    TwoSidedStop,
+)
+from fecontact.laws import lanes as lane_laws
+from fecontact.laws.ground.motion import constant_speed
+
+
+@kernel(types.void(i8, vector, vector, matrix, matrix))
+def at_nodes(law, a, b, p, out):
+    one, two, three = lane_laws.node_lanes_at(law)(read(a), read(b), p)
+    write(out[0], one)
+    write(out[1], two)
+    write(out[2], three)
+
+
+@kernel(types.void(i8, vector, matrix, matrix))
+def at_times(law, t, p, out):
+    value, rate = lane_laws.signal_lanes_at(law)(read(t), p)
+    write(out[0], value)
+    write(out[1], rate)
+
+
+RNG = np.random.default_rng(8)
+# Each lane has parameters of its own.
+VARIED = tuple(np.linspace(0.5, 1.5, 8))
+
+
+def varied(factor):
+    return tuple(factor * value for value in VARIED)
+
+
+NORMAL = [
+    RoughSurface(varied(1e6), varied(1e-5), varied(30.0)),
+    ParabolicSurface(varied(1e6), varied(1e-5), varied(30.0)),
+    LinearContact(varied(1e6), varied(30.0)),
+    PowerContact(varied(1e9), 1.5, varied(0.5)), PowerContact(varied(1e6), 1.0, varied(0.5)),
+    PowerContact(varied(1e9), 2.0), PowerContact(varied(1e8), (1.0, 1.5, 2.0, 1.1) * 2, 0.5),
+    RestitutionContact(varied(1e9), 0.8, 1.0),
+    PrescribedForce(varied(14.0)),
+    TwoSidedStop(varied(1e6), varied(1e-5)),
+    TwoSidedStop(varied(1e8), varied(1e-5), (1.0, 1.5, 1.3, 2.0) * 2, varied(0.4)),
+]
+FRICTION = [
+    law for smoothing in ("arctan", "tanh", "square-root") for law in (
+        ExponentialFriction(0.8, varied(0.5), 1000.0, varied(1e4), 0.1, smoothing=smoothing),
+        GaussianFriction(0.8, 0.5, varied(1e-3), 1e4, 0.1, smoothing=smoothing),
+        HyperbolicFriction(varied(0.8), 0.5, 1e-3, 1e4, 0.1, smoothing=smoothing),
+        ConstantFriction(varied(0.5), 1e4, 0.1, smoothing=smoothing),
+        GalvanettoFriction(0.8, 0.5, varied(1000.0), 3.0, 1e4, smoothing=smoothing),
+        CubicFriction(0.8, 0.5, varied(1e-2), 1e4, smoothing=smoothing))
+] + [ProductFriction(varied(0.3), 0.7, varied(900.0), 1e4)]
+
+
+def assert_same(law, a, b):
+    """Values and derivatives in random states, eight at once and one by one."""
+    lane = lane_laws.lane_law(law.kernel)
+    assert lane is not None
+    table = law.table(np.full(8, 0.125))
+    p, seen = np.ascontiguousarray(table.T), []
+    for k in range(len(a)):
+        out = np.zeros((3, 8))
+        at_nodes(lane.address, a[k], b[k], p, out)
+        seen.append((out, np.array([law.kernel.python(a[k, i], b[k, i], table[i])
+                                    for i in range(8)]).T))
+    found, wanted = np.array(seen).swapaxes(0, 1)
+    size = np.abs(wanted).max(axis=(0, 2), keepdims=True)
+    assert (np.abs(found - wanted) <= 3e-15 * size + 2e-14 * np.abs(wanted)).all()
+    return wanted
+
+
+@pytest.mark.parametrize("law", NORMAL, ids=lambda law: type(law).__name__)
+def test_normal_laws(law):
+    u, v = 1.5e-5 * RNG.normal(size=(200, 8)), 0.5 * RNG.normal(size=(200, 8))
+    wanted = assert_same(law, u, v)
+    assert (wanted[:, 0] != 0.0).any()
+
+
+@pytest.mark.parametrize("law", FRICTION, ids=lambda law: type(law).__name__)
+def test_friction_laws(law):
+    v = np.concatenate([1e-4 * RNG.normal(size=(100, 8)), 5e-3 * RNG.normal(size=(100, 8))])
+    v[0] = 0.0
+    F = np.abs(RNG.normal(size=(200, 8)))
+    F[1] = 0.0
+    assert_same(law, v, F)
+
+
+@pytest.mark.parametrize(("kernel_of", "table"), [
+    (Constant.kernel, [[3.0]]), (Harmonic.kernel, [[1e-3], [13.8], [0.4]]),
+    (constant_speed, [[1e-3]]), (HarmonicSpeed.kernel, [[1e-3], [4e-4], [30.0], [0.4]])])
+def test_signals(kernel_of, table):
+    p = np.array(table) * np.linspace(0.5, 1.5, 8)
+    for t in RNG.uniform(0.0, 100.0, (100, 8)):
+        out = np.zeros((2, 8))
+        at_times(lane_laws.lane_law(kernel_of).address, t, p, out)
+        wanted = np.array([kernel_of.python(t[i], np.ascontiguousarray(p[:, i]))
+                           for i in range(8)]).T
+        # Angles of up to 5000 are rounded to 5e-13 in either way.
+        assert out == pytest.approx(wanted, rel=1e-12, abs=1e-12 * np.abs(wanted).max())
+
+
+def test_laws_without_a_function_for_lanes():
+    assert lane_laws.lane_law(GaussianSurface.kernel) is None
+    assert lane_laws.lane_address(GaussianSurface.kernel.address) is None
+    law = RoughSurface.kernel
+    assert lane_laws.lane_address(law.address) == lane_laws.lane_law(law).address
