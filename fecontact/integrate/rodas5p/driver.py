@@ -163,7 +163,8 @@ def _progress(system: ContactSystem, control: Control, time: float, state: Array
 
 def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: ContactSystem) -> int:
     """Whether both systems differ from the system itself."""
-    return int(not any(all(map(np.array_equal, system.arrays, one.arrays))
+    return int(not any(all(np.array_equal(*pair) for pair
+                           in zip(system.arrays, one.arrays, strict=True))
                        for one in (above, below)))
 
 
