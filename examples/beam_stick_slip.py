@@ -186,7 +186,7 @@ def main(path: Path = Path("beam_stick_slip.png"), quick: bool = False) -> None:
     runs = [(speed, stick_slip(speed)) for speed in speeds]
     runs += [(0.05, first), *((0.04, run) for run in side_by_side(branch, 0.04))]
     for name, each in (("Stick-slip", branch), ("Without stick", free)):
-        print(f"{name}: {len(each)} points")
+        print(f"{name}: {len(each)} points. {each.status.value}")
         for point in each.points:
             largest = np.sort(np.abs(point.values["multipliers"]))[::-1][:3]
             print(f"  {1e3 * point.parameter:9.4f} mm/s: {1e3 * point.values['period']:.5f} ms, B "

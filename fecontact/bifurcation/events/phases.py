@@ -323,12 +323,15 @@ class Motion:
         np.fill_diagonal(near, False)
         struck = phase.event - 2 * k
         idle = np.array([j != struck and not near[j, active].any() for j in range(n)])
-        left = [(2 * k + j, float(impulses[j] / most)) for j in strike.nodes if not idle[j]]
+        # Impulses of a touch are rounding.
+        touched = abs(speeds[struck]) <= _ROUNDING * fastest
+        left = [(2 * k + j, float(impulses[j] / most)) for j in strike.nodes
+                if not (idle[j] or touched or j == struck)]
         left += [(2 * k + j, float((moved[j] - speeds[j]) / fastest)) for j in range(n)
                  if phase.closed[j] and j not in strike.nodes and not idle[j]]
         for c, mode in enumerate(strike.modes):
             own = [j for j in strike.nodes if chosen.cluster[j] == c and not idle[j]]
-            if mode == STICK and own:
+            if mode == STICK and own and not touched:
                 limit, given = float(coefficients[own] @ impulses[own]), float(impulses[n + c])
                 left += [(2 * c, (limit - given) / most), (2 * c + 1, (limit + given) / most)]
             elif mode in (1, -1) and own:
