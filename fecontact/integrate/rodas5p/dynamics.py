@@ -243,6 +243,12 @@ def copy_gradients(there, here, blocks):
 
 
 @helper
+def soon(step):
+    """A time in a step so close to its begin that rates of what is given hardly change."""
+    return min(step.t + 1e-4 * step.h, step.latest)
+
+
+@helper
 def ground_acceleration(t, later, moved, s):
     """Accelerations of the ground's two motions, by how fast they are ``later``; 0 at t itself."""
     if not later > t:

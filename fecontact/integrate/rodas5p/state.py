@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, helper, i8, integers, matrix, vector
+from fecontact.core.compiled import f8, i8, integers, matrix, vector
 from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
@@ -122,12 +122,6 @@ class Step(NamedTuple):
     moved: GroundMotion
     caution: float
     at_break: bool
-
-
-@helper
-def soon(step):
-    """A time in a step so close to its begin that rates of what is given hardly change."""
-    return min(step.t + 1e-4 * step.h, step.latest)
 
 
 STEP_TYPE = types.NamedTuple([f8] * 4 + [GROUND_MOTION, f8, types.boolean], Step)

@@ -39,7 +39,6 @@ from fecontact.integrate.rodas5p.state import (
     STEPS,
     TIME,
     Step,
-    soon,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
@@ -124,7 +123,7 @@ def _linearise(step, after_t, problem, progress, room):
     """What a step needs of the derivatives at its start besides the matrices."""
     s, control = problem.system, problem.control
     m = len(control.largest)
-    later = soon(step)
+    later = dynamics.soon(step)
     acceleration = dynamics.ground_acceleration(step.t, later,
                                                 dynamics.motion_given(room.given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, room.pull_rate)

@@ -168,7 +168,7 @@ def variation_for(
 @routine
 def _expand(step, y, s, blocks, given, load, v, g, time_rate):
     """Fill gradients g and the rate at a fixed state of y' of a system at the begin of a step."""
-    after_t, later = np.nextafter(step.t, np.inf), run_arrays.soon(step)
+    after_t, later = np.nextafter(step.t, np.inf), dynamics.soon(step)
     dynamics.set_given(after_t, s, given, load)
     dynamics.set_gradients(y, s, blocks, dynamics.motion_given(given), v.nodes, g)
     acceleration = dynamics.ground_acceleration(step.t, later, dynamics.motion_given(given), s)
@@ -257,7 +257,7 @@ def propagate(step, problem, progress, room, vary):
     G = 1.0 / (step.h * tableau.GAMMA)
     if size == 2 * m:
         columns.set_solver(G, blocks, reduced, v)
-    acceleration = dynamics.ground_acceleration(step.t, run_arrays.soon(step), step.moved, s)
+    acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), step.moved, s)
     columns.learn(gradients, v.usual)
     columns.set_paths(step, acceleration, s, blocks, stages, v)
     columns.set_bends(step, acceleration, problem, progress, room, v)
