@@ -32,6 +32,7 @@ LONG = {
     "test_compiled_steps", "test_compiled_bodies", "test_responses_of_bodies",
     "test_response_bifurcations",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
+    "test_borders_of_stops", "test_corner_of_stick_slip",
     "test_set_valued_beam", "test_sliding_bifurcations", "test_friction_oscillator",
     "test_disc_and_pads",
     "test_friction_damper", "test_lap_joint", "test_tipping_pad", "test_disc_brake",
