@@ -89,8 +89,8 @@ def test_what_derivatives_take_for_granted(modes):
 @pytest.mark.parametrize("modes", [1, 2, 3])
 def test_same_derivatives_as_by_the_code_of_all_systems(modes, monkeypatch):
     block = system(modes, 1)
-    vary = (block.with_(**{"ground.speed": 1.00001e-3}), block.with_(**{"ground.speed": 0.99999e-3}),
-            2e-8)
+    above, below = (block.with_(**{"ground.speed": speed}) for speed in (1.00001e-3, 0.99999e-3))
+    vary = above, below, 2e-8
     # Steps of one length, as above; those of the run alone.
     found = []
     for small in (True, False):

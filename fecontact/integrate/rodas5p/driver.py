@@ -141,8 +141,9 @@ def start(
 
 def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: ContactSystem) -> int:
     """Whether both systems differ from the system itself."""
-    return int(not any(all(map(np.array_equal, system.arrays, one.arrays))
-                       for one in (above, below)))
+    return int(not any(all(np.array_equal(np.asarray(one), np.asarray(other)) for one, other
+                           in zip(system.arrays, moved.arrays, strict=True))
+                       for moved in (above, below)))
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

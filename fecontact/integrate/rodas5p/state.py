@@ -121,7 +121,7 @@ class Step(NamedTuple):
 
 
 @helper
-def soon(step):
+def soon(step: Step) -> float:
     """A time in a step so close to its begin that rates of what is given hardly change."""
     return min(step.t + 1e-4 * step.h, step.latest)
 
