@@ -59,7 +59,7 @@ def map_of_starts(count: int, periods: int, **settings: Any) -> None:
                    **settings)
     print(f"{found.label.size} starts, {time.perf_counter() - begin:.0f} s")
     for one in found.attractors:
-        print(f"  {one.kind}, period {len(one.points)}: {100.0 * one.share:.2f} %")
+        print(f"  {one.kind}, {len(one.points)} states: {100.0 * one.share:.2f} %")
     plot_basins(found, x_label="y at the start [m]", y_label="y' at the start [m/s]",
                 rows=[axis.row(oscillator(42.5)) for axis in (place, speed)],
                 path="million_starts.png")

@@ -61,6 +61,8 @@ def apart_in_python(points, rows, still, scale, tolerance):
                 alike = max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 2.0 * tolerance
             if alike:
                 labels[-1] = number
+                if kind == "periodic" and len(own) < len(known):
+                    motions[number] = kind, own
                 break
         else:
             labels[-1] = len(motions)
@@ -99,6 +101,16 @@ def test_motions_are_told_apart_as_step_by_step():
             assert one.kind == motions[rank][0]
             assert one.points / size == pytest.approx(motions[rank][1], rel=1e-15)
             assert one.share == counts[rank] / runs
+
+
+def test_a_motion_has_its_least_period():
+    """Runs that have not quite settled repeat after two periods; those that have, after one."""
+    x = np.ones((3, 8, 1))
+    x[0, ::2] += 1.5e-3
+    labels, (motion,) = told_apart(
+        [lambda: Settled(x, np.full(3, 8), np.zeros(3, dtype=np.int64))], np.ones(1), 1e-3)
+    assert (labels == 0).all()
+    assert motion.points.tolist() == [[1.0]]
 
 
 def test_a_folder_and_processes_change_nothing(tmp_path):

@@ -102,6 +102,15 @@ def _same_box(one, first, last, other, count, scale, tolerance):
     return True
 
 
+@helper
+def _keep(points, first, last, kind, p, motions):
+    """Make motion p that of these points."""
+    for k in range(first, last):
+        for i in range(points.shape[1]):
+            motions.points[p, k - first, i] = points[k, i]
+    motions.rows[p], motions.kind[p] = last - first, kind
+
+
 @kernel(i8(i8, FOUND, vector, f8, integers, MOTIONS))
 def label_runs(first, found, scale, tolerance, label, motions):
     """Label runs from ``first`` on, and add the motions that are new; the run reached."""
@@ -126,15 +135,15 @@ def label_runs(first, found, scale, tolerance, label, motions):
                     _all_near(other, 0, count, points, begin, last, scale, 2.0 * tolerance))
             if same:
                 label[e] = p
+                # A run that has not quite settled repeats after a multiple of the period only.
+                if last - begin < count and kind == PERIODIC:
+                    _keep(points, begin, last, kind, p, motions)
                 break
         if label[e] < 0:
             p = motions.number[0]
             if p == len(motions.rows):
                 return e
-            for k in range(begin, last):
-                for i in range(len(scale)):
-                    motions.points[p, k - begin, i] = points[k, i]
-            motions.rows[p], motions.kind[p] = last - begin, kind
+            _keep(points, begin, last, kind, p, motions)
             motions.number[0] = p + 1
             label[e] = p
     return len(found.rows)

@@ -72,7 +72,7 @@ class Variation(NamedTuple):
     forces : (d n,) array
         Room for node forces.
     paths : (STAGES, D, n) array
-        What the stages move the nodes; see :func:`columns.set_paths`.
+        What the stages move the nodes along each of their directions.
     inside, ahead, behind, usual, between, bends : Gradients
         Those inside a stage, their change along it, room, their usual sizes, their derivatives to
         the parameter, and their change along each direction of each node.
