@@ -72,6 +72,12 @@ def _propagate(size: tuple[int, int] | None) -> int:
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
 
 
+def compile_usual() -> None:
+    """Compile the derivatives of steps of all systems, and of those of the usual sizes."""
+    for size in (None, (1, 1), (2, 1), (3, 1)):
+        _propagate(size)
+
+
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all small systems of a size, for each type of tuples."""
     m, n = modes, nodes
