@@ -77,9 +77,9 @@ def test_runs_in_the_tables_of_another_are_those_of_fresh_ones():
     """Bit for bit, with nodes that are left out, also behind runs that failed."""
     system, state = beam()
     assert system.basis.contact_nodes > FEW
-    tilted, stuck, wild = state.copy(), state.copy(), state.copy()
-    tilted[2], stuck[9], wild[5:] = 3e-6, 1e200, 1e308
-    starts = np.vstack([state, stuck, tilted, wild, state])
+    tilted, fast, wild = state.copy(), state.copy(), state.copy()
+    tilted[2], fast[9], wild[5:] = 3e-6, 1e200, 1e308
+    starts = np.vstack([state, fast, tilted, wild, state])
     times = np.linspace(0.0, 2e-3, 5)
     found = ensemble(system, times, initial=starts, workers=1)
     assert found.finished.tolist() == [True, False, True, False, True]
