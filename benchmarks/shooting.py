@@ -5,8 +5,9 @@
 A run over 50 ms, from the stuck state, and the same with derivatives to start and belt speed, for
 3, 5 and 20 modes. The problems (b), (b2), (c) and (d) of benchmarks/integrator.py, of 1, 2 and 3
 modes and one node, and 20 modes and 40 nodes: with derivatives to the start, and to the start and
-belt speed, at the steps of the run and at those that the derivatives ask for. Then points of the
-stick-slip branch of 20 modes. CPU time, the least of the repetitions.
+belt speed, at the steps of the run and at those that the derivatives ask for. Runs without
+derivatives are by the same integrator. Then points of the stick-slip branch of 20 modes. CPU time,
+the least of the repetitions.
 """
 
 import sys
@@ -21,7 +22,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import beam_stick_slip as example
 import integrator_problems as problems
 
-from fecontact import ensemble, sensitivity
+from fecontact import ContactSystem, sensitivity
+from fecontact.core.types import Array
+from fecontact.integrate.rodas5p import driver
 
 SPEED, DURATION, RTOL = 0.05, 0.05, 1e-7
 # Parts of the times of the problems.
@@ -39,6 +42,12 @@ def least(task: Callable[[], object], repetitions: int) -> float:
     return min(times)
 
 
+def alone(system: ContactSystem, state: Array, end: float, rtol: float) -> None:
+    """A run without derivatives, by itself."""
+    run = driver.start(system, state, np.array([0.0, end]), rtol=rtol, work=False, series="never")
+    run.advance(10**9)
+
+
 def measure(modes: int, repetitions: int) -> list[float]:
     """Times of a run, with derivatives, and with derivatives to 1e-2 only [s]."""
     system = example.beam(SPEED, modes=modes)
@@ -49,7 +58,7 @@ def measure(modes: int, repetitions: int) -> list[float]:
                            derivative_rtol=rtol)
 
     return [least(task, repetitions) for task in (
-        lambda: ensemble(system, [0.0, DURATION], initial=start[None], rtol=RTOL),
+        lambda: alone(system, start, DURATION, RTOL),
         lambda: derivatives(None), lambda: derivatives(1e-2))]
 
 
@@ -60,8 +69,7 @@ def ratios(name: str, repetitions: int, part: float = 1.0) -> list[float]:
     """
     problem = problems.shortened(problems.PROBLEMS[name](), PARTS[name] * part)
     system, end = problem.system, float(problem.times[-1])
-    run = least(lambda: ensemble(system, [0.0, end], initial=problem.state[None], rtol=1e-8),
-                repetitions)
+    run = least(lambda: alone(system, problem.state, end, 1e-8), repetitions)
 
     def cost(rtol: float | None, parameter: str | None) -> float:
         return least(lambda: sensitivity(system, end, initial=problem.state, rtol=1e-8,

@@ -40,6 +40,9 @@ def choose_near(h, problem, progress, room):
     for i in range(m):
         move += control.largest[i] * h * (abs(progress.state[m + i])
                                           + 0.5 * h * abs(progress.rate[m + i]))
+    if not _AMPLE * move < 1e300:
+        _take(math.inf, blocks, room)
+        return
     # Steps of about the same length have the same nodes.
     _take(2.0 ** math.ceil(math.log2(max(_AMPLE * move, 1e-300))), blocks, room)
 

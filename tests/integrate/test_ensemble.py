@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from systems import impact_oscillator
+from test_near_nodes import beam
 
 from fecontact import InputError, Status, ensemble, forcing_period, simulate
-from fecontact.integrate import strobe
+from fecontact.integrate import ContactEvents, strobe
 from fecontact.integrate.rodas5p import driver
+from fecontact.integrate.rodas5p.blocks import FEW
 
 W = 64.32
 PERIOD = 2.0 * np.pi / W
@@ -69,6 +71,31 @@ def test_a_run_that_cannot_go_on_leaves_the_others():
     assert found.status[0] is not Status.FINISHED
     assert np.isnan(found.states[0, -1]).all()
     assert found.finished.tolist() == [False, True]
+
+
+def test_runs_in_the_tables_of_another_are_those_of_fresh_ones():
+    """Bit for bit, with nodes that are left out, also behind runs that failed."""
+    system, state = beam()
+    assert system.basis.contact_nodes > FEW
+    tilted, fast, wild = state.copy(), state.copy(), state.copy()
+    tilted[2], fast[9], wild[5:] = 3e-6, 1e200, 1e308
+    starts = np.vstack([state, fast, tilted, wild, state])
+    times = np.linspace(0.0, 2e-3, 5)
+    found = ensemble(system, times, initial=starts, workers=1)
+    assert found.finished.tolist() == [True, False, True, False, True]
+    for start, states, steps in zip(starts, found.states, found.steps, strict=True):
+        run = driver.start(system, start, times, rtol=1e-6, work=False)
+        run.advance(10**9)
+        assert np.array_equal(states[: run.outputs], run.states[: run.outputs])
+        assert steps == run.statistics["steps"]
+
+
+@pytest.mark.parametrize("options", [{"vary": True}, {"events": (ContactEvents(),)}])
+def test_runs_with_derivatives_or_events_are_not_begun_again(options):
+    system = impact_oscillator(modes=2)
+    run = driver.start(system, np.zeros(4), np.array([0.0, 0.1]), rtol=1e-6, **options)
+    with pytest.raises(AssertionError):
+        driver.again(run, system, np.zeros(4))
 
 
 @pytest.mark.parametrize(("change", "words"), [

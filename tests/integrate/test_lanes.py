@@ -19,11 +19,13 @@ from fecontact import (
 from fecontact.integrate import Rodas5P, Scipy
 from fecontact.integrate.lanes import driver as lane_driver
 from fecontact.integrate.lanes.driver import SideBySide, kind_of, side_by_side
+from fecontact.integrate.lanes.small_systems import USUAL
 from fecontact.integrate.rodas5p import driver
 from fecontact.laws import (
     ConstantFriction,
     DahlFriction,
     ExponentialFriction,
+    GaussianSurface,
     Harmonic,
     HarmonicSpeed,
     HyperbolicFriction,
@@ -32,6 +34,7 @@ from fecontact.laws import (
     PowerContact,
     PrescribedForce,
     ProductFriction,
+    Pulse,
     RoughSurface,
     Sine,
     TwoSidedStop,
@@ -76,6 +79,10 @@ CASES = {
     "load in time": friction_oscillator(2, load=Load(14.0, (
         PointLoad("C", "y", signal=Harmonic(-3.0, 40.0)),))),
 }
+
+
+def test_cases_are_of_all_sizes():
+    assert {(one.basis.modes, one.basis.contact_nodes) for one in CASES.values()} == set(USUAL)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -183,6 +190,40 @@ def test_lanes_are_at_work():
     assert tried > 0.95 * 8.0 * one.attempts
 
 
+def many(count, state_of, times=(0.0, 0.2)):
+    """Runs of one system in lanes."""
+    return SideBySide(kind_of(slider(), *times), list(range(count)), [slider()] * count, state_of,
+                      [False] * count, np.tile(times, (count, 1)), 1e-6, None)
+
+
+def test_initial_states_are_asked_for_once_and_not_before_their_runs():
+    asked = []
+
+    def state_of(run):
+        asked.append(run)
+        return np.zeros(2)
+
+    one, turns = many(100, state_of), iter([True, False])
+    assert not asked
+    one.work(1, lambda: next(turns))
+    assert asked == list(range(32))
+    one.work(1, lambda: True)
+    assert asked == list(range(100))
+
+
+def test_parameters_of_a_system_are_looked_up_once(monkeypatch):
+    looked_at, own = [], lane_driver._parameters
+    monkeypatch.setattr(lane_driver, "_parameters",
+                        lambda system, control: looked_at.append(system) or own(system, control))
+    ensemble(slider(), [0.0, 0.1], initial=np.zeros((20, 2)))
+    assert len(looked_at) == 1
+
+
+def test_checks_of_single_lanes_know_one_set_of_blocks():
+    problem, _, room = many(1, lambda _: np.zeros(2)).spare()
+    assert room.near is problem.blocks
+
+
 def test_no_reversal_of_slip_is_missed():
     """A mass that would run 1e-4 faster than its belt for 0.03 s sticks to it instead.
 
@@ -255,7 +296,10 @@ def test_initial_states_that_are_not_finite():
 @pytest.mark.parametrize("other", [
     friction_oscillator(2, ground=Ground(speed=1e-3, profile=Sine(1e-4, 2.5e-3))),
     friction_oscillator(2, friction=DahlFriction(0.5, 1e-6)),
-    block(5, 1),
+    block(4, 1), block(1, 2), block(3, 2), block(2, 3),
+    friction_oscillator(2, load=Load(14.0, (
+        PointLoad("C", "y", signal=Pulse("half-sine", -3.0, 0.01, 0.05)),))),
+    friction_oscillator(2, normal=GaussianSurface(1e7, 1e-5, 40.0)),
 ])
 def test_other_systems_are_run_one_by_one(other):
     """Their results are those of single runs bit for bit."""

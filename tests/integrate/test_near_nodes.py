@@ -163,6 +163,16 @@ def test_runs_go_on_bit_for_bit():
     assert np.array_equal(whole.work, parts.work)
 
 
+def test_a_run_too_fast_for_numbers_ends_with_a_status():
+    """Alone, and beside others, which go on."""
+    system, state = beam()
+    wild = np.append(state[:5], np.full(5, 1e308))
+    assert fc.simulate(system, 1e-3, initial=wild).status is fc.Status.NOT_FINITE
+    found = fc.ensemble(system, [0.0, 1e-3], initial=np.vstack([state, wild, state]))
+    ended = fc.Status.FINISHED
+    assert found.status == (ended, fc.Status.NOT_FINITE, ended)
+
+
 def test_nodes_with_memory_and_derivatives_take_all_nodes():
     system, state = beam(friction=LuGreFriction(0.4, 0.3, 0.01, 2.0, 1e6, 300.0))
     for run in (driver.start(system, np.append(state, np.zeros(NODES)), np.array([0.0, 1e-3]),

@@ -66,7 +66,7 @@ def test_what_step_loops_take_for_granted(modes, nodes):
     assert found >= sum(map(len, said.values()))
 
 
-@pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
+@pytest.mark.parametrize(("modes", "nodes"), lane_systems.USUAL)
 def test_what_step_loops_of_lanes_take_for_granted(modes, nodes):
     one, times = system(modes, nodes), np.array([[0.0, 0.1]])
     begun = side_by_side([one], lambda _: np.zeros(2 * modes), times, 1e-6, None, "auto")[0]

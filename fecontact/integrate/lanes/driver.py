@@ -21,7 +21,7 @@ from fecontact.integrate.lanes.arrays import (
     Lanes,
     lanes_for,
 )
-from fecontact.integrate.lanes.small_systems import advance_for
+from fecontact.integrate.lanes.small_systems import USUAL, advance_for
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import ENDS, control_for, start
 from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
@@ -32,8 +32,6 @@ from fecontact.laws.ground.motion import constant_speed
 from fecontact.laws.lanes import lane_address
 from fecontact.system.contact_system import ContactSystem
 
-# The most modes and nodes of small systems.
-MOST_MODES, MOST_NODES = 4, 2
 # Steps of a call, in all lanes; runs that a worker takes at once, at most.
 _STEPS, _DEALT = 20_000, 32
 
@@ -64,14 +62,14 @@ class Kind:
 def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     """The kind of a system; None if it does not go side by side with others.
 
-    It does if it is small and plane, on level ground, without friction with memory, and if there
-    are functions for lanes of all its laws and signals.
+    It does if it is plane and of a usual size, on level ground that moves as one, without
+    friction with memory, without breaks of what is given in time, and if there are functions for
+    lanes of all its laws and signals.
     """
     s = system.arrays
     n, m = s.Tx.shape
-    if (m > MOST_MODES or n > MOST_NODES or len(s.T2) or s.memory.any() or s.second_motion
-            or s.friction_scale or system.ground.wavy
-            or system.breakpoints(begin, end)):
+    if ((m, n) not in USUAL or len(s.T2) or s.memory.any() or s.second_motion
+            or s.friction_scale or system.ground.wavy or system.breakpoints(begin, end)):
         return None
     acts = (s.drive_stiffness != 0.0) | (s.drive_damping != 0.0)
     drive = np.where(acts, s.drive, 0)
@@ -98,14 +96,14 @@ def _parameters(system: ContactSystem, control: Control) -> Array:
         limits])
 
 
-def _begin(state: Array, times: Array) -> Array:
-    """The column of a run in the table of progress, which the first step is not yet in."""
-    numbers = np.zeros(arrays.NUMBERS)
-    begin, end = float(times[0]), float(times[-1])
-    numbers[arrays.TIME], numbers[arrays.END] = begin, end
-    numbers[arrays.SMALLEST] = 1e-14 * max(abs(begin), abs(end))
-    numbers[arrays.NEXT_OUTPUT] = times[min(1, len(times) - 1)]
-    return np.concatenate([numbers, state, np.zeros(len(state) // 2)])
+def _starts(times: Array, modes: int) -> Array:
+    """Columns of runs from rest in the table of progress, which first steps are not yet in."""
+    found = np.zeros((len(times), arrays.NUMBERS + 3 * modes))
+    begin, end = times[:, 0], times[:, -1]
+    found[:, arrays.TIME], found[:, arrays.END] = begin, end
+    found[:, arrays.SMALLEST] = 1e-14 * np.maximum(np.abs(begin), np.abs(end))
+    found[:, arrays.NEXT_OUTPUT] = times[:, min(1, times.shape[1] - 1)]
+    return found
 
 
 class SideBySide:
@@ -118,7 +116,7 @@ class SideBySide:
     members, times : sequences
         System and output times of each run.
     state_of : callable
-        Initial state of a run, by its number here.
+        Initial state of a run, by its number here; it is asked for when a worker takes the run.
     follows : list of bool
         Whether a run begins where the one before it has ended; from its own initial state if that
         one has failed.
@@ -140,16 +138,14 @@ class SideBySide:
     ) -> None:
         self.numbers, self._kind, self._state_of = numbers, kind, state_of
         count, rest = len(members), np.zeros(2 * kind.modes)
-        limits: dict[tuple[int, float, float], Control] = {}
-        for member, row in zip(members, times, strict=True):
-            if _key(member, row) not in limits:
-                limits[_key(member, row)] = control_for(member, rest, row, rtol=rtol,
-                                                        max_step=max_step, work=False)
-        controls = [limits[_key(*pair)] for pair in zip(members, times, strict=True)]
-        starts = [rest if later else self._start(run) for run, later in enumerate(follows)]
+        known: dict[tuple[int, float, float], Array] = {}
+        keys = [_key(*pair) for pair in zip(members, times, strict=True)]
+        for key, member, row in zip(keys, members, times, strict=True):
+            if key not in known:
+                known[key] = _parameters(member, control_for(
+                    member, rest, row, rtol=rtol, max_step=max_step, work=False))
         self.runs = LaneRuns(
-            np.array([_parameters(*pair) for pair in zip(members, controls, strict=True)]),
-            np.array([_begin(*pair) for pair in zip(starts, times, strict=True)]),
+            np.array([known[key] for key in keys]), _starts(times, kind.modes),
             np.ascontiguousarray(times), np.full((count, times.shape[1], len(rest)), np.nan),
             np.array(follows, dtype=np.int64), np.zeros((count, 4), dtype=np.int64),
             np.zeros(0, dtype=np.int64), np.zeros(4, dtype=np.int64))
@@ -158,12 +154,12 @@ class SideBySide:
         self._waiting = np.flatnonzero(self.runs.follows == 0).tolist()
         self._lock, self.attempts = Lock(), 0
 
-    def _start(self, run: int) -> Array:
-        """Initial state of a run."""
+    def _start(self, run: int) -> None:
+        """Let a run begin from its initial state."""
         state = self._state_of(run)
         if not np.isfinite(state).all():
             raise InputError("The initial state holds values that are not finite.")
-        return state
+        self.runs.starts[run, arrays.NUMBERS : arrays.NUMBERS + len(state)] = state
 
     @property
     def done(self) -> int:
@@ -203,10 +199,12 @@ class SideBySide:
     def spare(self) -> tuple[Problem, Progress, Room]:
         """Arrays of a run for checks of single lanes, which take the numbers of a lane."""
         problem = self._spare.problem
-        own = problem._replace(
+        own = _copied(problem._replace(
             blocks=one_block(problem.blocks.shapes, self._kind.nodes),
-            control=problem.control._replace(speed_scale=0.0))
-        return _copied(own), _copied(self._spare.progress), _copied(self._spare.room)
+            control=problem.control._replace(speed_scale=0.0)))
+        # All nodes are near.
+        room = _copied(self._spare.room)._replace(near=own.blocks)
+        return own, _copied(self._spare.progress), room
 
     def _dealt_to(self, runs: LaneRuns, workers: int) -> LaneRuns:
         """The same with more runs that wait; at the end each worker takes few at once."""
@@ -214,8 +212,11 @@ class SideBySide:
         with self._lock:
             left = len(self._waiting)
             more = min(max(_DEALT - len(rest), 0), -(-left // (2 * workers)))
-            queue = np.concatenate([rest, np.array(self._waiting[:more], dtype=np.int64)])
+            dealt = self._waiting[:more]
             del self._waiting[:more]
+        for run in dealt:
+            self._start(run)
+        queue = np.concatenate([rest, np.array(dealt, dtype=np.int64)])
         runs.counts[TAKEN], runs.counts[WAITING] = 0, len(queue)
         runs.counts[OPEN] = left > more
         return runs._replace(queue=queue)
@@ -226,10 +227,8 @@ class SideBySide:
             status = self.runs.ends[:, arrays.STATUS]
             failed = (status != FINISHED) & (status != RUNNING)
             for run in np.flatnonzero(failed[:-1] & (self.runs.follows[1:] != 0)).tolist():
-                later = run + 1
-                self.runs.starts[later] = _begin(self._start(later), self.runs.times[later])
-                self.runs.follows[later] = 0
-                self._waiting.append(later)
+                self.runs.follows[run + 1] = 0
+                self._waiting.append(run + 1)
             return bool(self._waiting)
 
 

@@ -1,4 +1,4 @@
-"""The step loop of lanes for each size of small systems, whose loops are written out."""
+"""The step loop of lanes for each usual size of small systems, whose loops are written out."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -12,7 +12,7 @@ from fecontact.core.references import constants
 from fecontact.integrate.lanes import arrays, step_loop
 from fecontact.integrate.rodas5p import small_systems
 
-# Modes and nodes that installations compile the step loop for.
+# Modes and nodes of systems that go through lanes; installations compile the step loop for each.
 USUAL = ((1, 1), (2, 1), (3, 1), (2, 2))
 
 

@@ -128,6 +128,9 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
 
     It shares the room to work in, and its tables, with the run before, which must have ended.
     """
+    # Columns, and what is watched for, would go on from where that run has left them.
+    assert not len(run.variation.variation.columns)
+    assert not run.watch.note
     _require_finite(state)
     control = run.problem.control
     if control.work:
