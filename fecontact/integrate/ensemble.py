@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.checks import as_count, as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
@@ -135,9 +135,8 @@ def ensemble(
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_max_step(max_step)
-    for name, value in (("chain", chain), ("workers", 1 if workers is None else workers)):
-        if not (isinstance(value, Integral) and value >= 1):
-            raise InputError(f"{name} = {value!r} must be a whole number from 1 on.")
+    chain = as_count(chain, "chain")
+    workers = None if workers is None else as_count(workers, "workers")
     count, kept = instants.shape
     states = np.full((count, kept, state_size(members[0])), np.nan)
     status = [Status.INTERRUPTED] * count
@@ -323,7 +322,7 @@ def _members(
         raise InputError("systems must be a ContactSystem, a VectorField or a list of them, not "
                          "empty.")
     members = [in_time("ensemble", system) for system in given]
-    many = initial if _is_many(initial) else None
+    many = initial if is_many(initial) else None
     count = len(members) if not single else len(many) if many is not None else (
         len(instants) if instants.ndim == 2 else 1)
     members = members * count if single else members
@@ -346,7 +345,7 @@ def _members(
     return members, state, np.ascontiguousarray(instants)
 
 
-def _is_many(initial: Any) -> bool:
+def is_many(initial: Any) -> bool:
     """Whether there is an initial state for each run; a list of numbers is one state."""
     if isinstance(initial, list | tuple):
         return not all(isinstance(value, Real) for value in initial)

@@ -1,5 +1,6 @@
 """Basins and diagrams in blocks: kept in a folder, ended and taken up again, on other processes."""
 
+import concurrent.futures
 import multiprocessing
 import os
 import signal
@@ -14,10 +15,12 @@ import pytest
 from systems import impact_oscillator
 
 from fecontact import AnalysisError, InputError
-from fecontact.bifurcation import Axis, basins, poincare_scan, vector_field
+from fecontact.bifurcation import Axis, basins, poincare_scan
+from fecontact.bifurcation.attractors import blocks as in_blocks
 from fecontact.bifurcation.attractors.attractor import told_apart
+from fecontact.bifurcation.attractors.blocks import Place, work_off
 from fecontact.bifurcation.attractors.labels import Settled
-from fecontact.integrate import Crossing, strobe
+from fecontact.integrate import strobe
 
 W = "drive.angular_frequency"
 # Impacts once in three periods, and a motion of one period, beside each other.
@@ -239,37 +242,75 @@ def test_folders_of_others_are_refused(tmp_path):
         scanned(folder=folder)
 
 
-def test_the_mark_sees_laws_and_functions(tmp_path):
-    """Another stiffness, another law of equal numbers, another function of the same names."""
-    def scan(rates, folder):
-        field = vector_field(rates, {"c": 1.0}, states=("x", "v"), scales=[1.0, 1.0])
-        return poincare_scan(field, "c", [1.0, 2.0], section=Crossing("x"), transient=10.0, keep=2,
-                             initial=[1.0, 0.0], folder=folder)
-
-    scan(swing, tmp_path / "field")
-    scan(swing, tmp_path / "field")
-    with pytest.raises(InputError, match="another system"):
-        scan(stiffer, tmp_path / "field")
-    base = impact_oscillator(1)
-    for other in (base, base.with_(**{"normal.stiffness": 1.01 * base.normal.stiffness})):
-        run = lambda other=other: poincare_scan(  # noqa: E731
-            other, W, [60.0, 61.0], transient_periods=2, keep=1, initial=np.zeros(2),
-            folder=tmp_path / "laws")
-        if other is base:
-            run()
-        else:
-            with pytest.raises(InputError, match="another system"):
-                run()
+def test_a_refused_call_leaves_a_folder_for_the_next(tmp_path):
+    """The folder is marked before the runs check their settings; nothing is kept of the call."""
+    for call in (two_motions, scanned):
+        folder = tmp_path / call.__name__
+        with pytest.raises(InputError, match=r"rtol = 1\.0 must be"):
+            call(folder=folder, rtol=1.0)
+        assert (folder / "blocks.json").exists()
+        call(folder=folder, rtol=1e-4)
+        with pytest.raises(InputError, match="another system, grid or version"):
+            call(folder=folder, rtol=1e-5)
 
 
-def swing(t, x, p, out):
-    out[0] = x[1]
-    out[1] = -p[0] * x[0]
+def test_blocks_serve_any_tolerance_of_labels(tmp_path):
+    """Only on a section are runs themselves judged by the tolerance."""
+    found = two_motions(folder=tmp_path / "a")
+    again = two_motions(folder=tmp_path / "a", tolerance=2e-3)
+    assert (again.label == found.label).all()
 
 
-def stiffer(t, x, p, out):
-    out[0] = x[1]
-    out[1] = -2.0 * p[0] * x[0]
+@pytest.mark.parametrize("kept", [False, True])
+def test_progress_counts_all_runs_of_a_diagram(tmp_path, kept):
+    """Up and down are blocks of their own."""
+    told = []
+    scanned(progress=told.append, folder=tmp_path / "a" if kept else None)
+    assert told == sorted(told)
+    assert told[-1] == 2 * 48
+
+
+class Counted:
+    """A block that finds its number, or fails."""
+
+    runs, shapes = 1, {"number": (1,)}
+
+    def __init__(self, number, fails):
+        self.number, self.fails = number, fails
+
+    def found(self, tell=None, workers=1):
+        if self.fails:
+            raise ArithmeticError(f"block {self.number}")
+        return {"number": np.array([self.number])}
+
+
+def test_what_ends_beside_a_failure_is_kept(monkeypatch, tmp_path):
+    """Eight blocks end at once, four of them with an error: four are kept, the first is told."""
+    monkeypatch.setattr(in_blocks, "wait", lambda futures, **_: concurrent.futures.wait(futures))
+    some = [Counted(number, number % 2 == 0) for number in range(8)]
+    with pytest.raises(ArithmeticError, match="block 0"):
+        work_off(some, Place(tmp_path, None, 2), "mark", None)
+    assert [path.name for path in sorted(tmp_path.glob("*.npz"))] == [
+        f"{number:06d}.npz" for number in (1, 3, 5, 7)]
+
+
+def test_functions_that_processes_cannot_import(tmp_path):
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        for number, change in enumerate((lambda system, w: system.with_(**{W: w}), renamed)):
+            with pytest.raises(InputError, match="at the top of a module; or leave out the exec"):
+                poincare_scan(impact_oscillator(1), change, [60.0, 61.0], transient_periods=2,
+                              keep=1, initial=np.zeros(2), folder=tmp_path / str(number),
+                              executor=pool)
+
+
+def _inner():
+    def change(system, w):
+        return system.with_(**{W: w})
+
+    return change
+
+
+renamed = _inner()
 
 
 @pytest.mark.parametrize(("settings", "words"), [
@@ -277,6 +318,9 @@ def stiffer(t, x, p, out):
     ({"executor": Broken(1)}, "needs a folder"),
     ({"executor": Broken(1), "folder": "a", "workers": 2}, "workers = 2 has no effect"),
     ({"folder": 7}, "must be a text or Path"),
+    *(({"folder": "a", "workers": workers}, "workers = .* must be a whole number, 1 or above")
+      for workers in (-1, 0, "2")),
+    ({"workers": 0}, "workers = 0 must be a whole number, 1 or above"),
 ])
 def test_bad_places(settings, words):
     for call in (two_motions, scanned):

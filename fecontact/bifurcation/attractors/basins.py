@@ -173,10 +173,12 @@ def basins(
         np.clip(len(states) // 64, 16, _LARGEST))
     blocks = [_Starts(settle, part) for part
               in np.split(states, range(size_of_block, len(states), size_of_block))]
+    # Without a section the tolerance counts only in labels, which are not kept.
+    mark = "" if folder is None else mark_of(
+        [moving], solver, rtol, keep, transient_periods, settle.transient, section,
+        None if section is None else tolerance, states)
     with shown(progress, lambda: progress_bar("Running", len(states))) as tell:
-        readers = work_off(blocks, place, mark_of(
-            moving, solver, rtol, keep, transient_periods, transient, section, tolerance, states,
-        ) if folder is not None else "", tell)
+        readers = work_off(blocks, place, mark, tell)
     parts = [partial(_settled, read) for read in readers]
     labels, attractors = told_apart(parts, _scale(moving, states, parts), tolerance)
     return Basins(a, b, labels.reshape(len(a), len(b)), attractors)

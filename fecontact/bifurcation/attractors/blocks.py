@@ -5,8 +5,10 @@ whole or not at all; those that are there are not computed again.
 """
 
 import hashlib
+import inspect
 import json
-from collections.abc import Callable, Iterator, Sequence
+import pickle
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -17,8 +19,9 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache, partial
+from numbers import Integral, Real
 from os import cpu_count
 from pathlib import Path
 from typing import Any, Protocol
@@ -27,13 +30,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact import __version__
-from fecontact.core.checks import as_path
+from fecontact.core.checks import as_count, as_path
+from fecontact.core.compiled import CompiledLaw, source_digest
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.files.atomic_write import clear_leftovers, output_folder, replaced, write_text
 from fecontact.core.files.locks import locked
 from fecontact.core.files.stored import DamagedError, from_json, npz_arrays, reading
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.function_field import FunctionField
 from fecontact.system.fields.in_time import Moving, state_size
+from fecontact.system.fields.vector_field import VectorField
 
 Found = dict[str, NDArray[Any]]
 _ABOUT = "blocks.json"
@@ -80,7 +86,8 @@ class Place:
         Raises
         ------
         InputError
-            For what is no executor, one without a folder, and a number of workers beside it.
+            For what is no executor, one without a folder, a number of workers beside it, and one
+            that is no whole number from 1 on.
         """
         if executor is not None:
             if not callable(getattr(executor, "submit", None)):
@@ -92,35 +99,86 @@ class Place:
             if workers is not None:
                 raise InputError(f"{owner}: workers = {workers!r} has no effect beside an "
                                  f"executor, which has its own; leave it out.")
+        if workers is not None:
+            workers = as_count(workers, "workers")
         return cls(None if folder is None else as_path(folder, f"{owner}: folder"), executor,
                    workers)
 
 
-def mark_of(moving: Moving, *settings: Any) -> str:
-    """A mark that tells computations of other systems or settings apart."""
-    mark = hashlib.sha256(__version__.encode())
-    if isinstance(moving, ContactSystem):
-        for kind in ("normal", "friction"):
-            for nodes, share, law in moving.law_groups(kind):
-                mark.update(f"{kind} {nodes} {type(law).__qualname__}".encode())
-                mark.update(np.ascontiguousarray(law.table(share)).tobytes())
-        for item in moving.arrays:
-            # Addresses of laws are integers, and differ from process to process.
-            if np.asarray(item).dtype.kind == "f":
-                mark.update(np.ascontiguousarray(item).tobytes())
-        settings = (*settings, sorted((name, repr(value)) for name, value
-                                      in moving.parameters().items()))
-    else:
-        # What a function does tells more of it than its name.
-        places = np.random.default_rng(0).normal(size=(3, state_size(moving)))
-        rates = moving.rates(np.array([0.0, 0.1, 0.2]), places * moving.state_scales(moving.values),
-                             moving.values)
-        mark.update(" ".join(f"{rate:.9e}" for rate in rates.ravel()).encode())
-        settings = (*settings, moving.state_names, dict(moving.parameters))
-    for one in settings:
-        mark.update(np.ascontiguousarray(one).tobytes() if isinstance(one, np.ndarray)
-                    else repr(one).encode())
+def mark_of(systems: Iterable[Moving], *settings: Any) -> str:
+    """A mark that tells computations of other systems or settings apart.
+
+    Numbers, arrays and functions of the user are marked in full: none by its name or a summary.
+    """
+    mark = hashlib.sha256()
+    for item in (__version__, settings):
+        for part in _written(item):
+            mark.update(part + b"\0")
+    for moving in systems:
+        facts = _of_system(moving) if isinstance(moving, ContactSystem) else _of_field(moving)
+        for part in _written(facts):
+            mark.update(part + b"\0")
     return mark.hexdigest()
+
+
+def _of_system(system: ContactSystem) -> list[Any]:
+    """All that the motion of a contact system depends on."""
+    facts: list[Any] = sorted(system.parameters().items())
+    for kind in ("normal", "friction"):
+        for nodes, share, law in system.law_groups(kind):
+            facts += [kind, nodes.start, nodes.stop, type(law).__qualname__, law.table(share),
+                      law.kernel, getattr(law, "planar_kernel", None)]
+    facts += [one.kernel for one in (*system.drive.motions, *system.load.signals.values())]
+    ground = system.ground
+    facts += [ground.profile_kernel, ground.surface_kernel, ground.friction_scale_kernel]
+    facts += [one.motion_kernel for one in system.prescribed_motion.motions]
+    # Other integers are addresses of functions, and differ from process to process.
+    return facts + [item for name, item in system.arrays._asdict().items()
+                    if np.asarray(item).dtype.kind == "f"
+                    or name in ("memory", "on_ground", "leans")]
+
+
+def _of_field(field: VectorField) -> list[Any]:
+    """All that the motion of a field depends on, as far as it can be seen."""
+    if isinstance(field, FunctionField):
+        functions = list(field.functions)
+    else:
+        functions = [getattr(type(field), name) for name in ("rates", "derivatives")]
+    # Of objects that a function of Python uses, only what it does tells.
+    places = np.random.default_rng(0).normal(size=(3, state_size(field)))
+    scales = field.state_scales(field.values)
+    rates = field.rates(np.array([0.0, 0.1, 0.2]), places * scales, field.values)
+    return [field.state_names, list(field.parameters.items()), scales,
+            field.forcing_period(field.values), [f"{rate:.9e}" for rate in rates.ravel()],
+            *(one if isinstance(one, CompiledLaw) or inspect.isfunction(one) else None
+              for one in functions)]
+
+
+def _written(value: Any) -> Iterator[bytes]:
+    """A value as bytes that no other value has, the same in every process."""
+    if isinstance(value, CompiledLaw) or inspect.isfunction(value):
+        yield _digest(value.python if isinstance(value, CompiledLaw) else value).encode()
+    elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
+        yield f"{value.dtype.str} {value.shape}".encode()
+        yield value.tobytes()
+    elif isinstance(value, Integral) and not isinstance(value, bool):
+        yield str(int(value)).encode()
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        yield float(value).hex().encode()
+    elif isinstance(value, list | tuple | Mapping | np.ndarray):
+        items = list(value.items() if isinstance(value, Mapping) else value)
+        yield f"list {len(items)}".encode()
+        for item in items:
+            yield from _written(item)
+    elif is_dataclass(value) and not isinstance(value, type):
+        yield type(value).__qualname__.encode()
+        yield from _written([getattr(value, one.name) for one in fields(value)])
+    else:
+        yield repr(value).encode()
+
+
+# It is asked for the same few functions at each of many systems.
+_digest = cache(source_digest)
 
 
 def work_off(
@@ -136,7 +194,10 @@ def work_off(
         If the executor broke; finished blocks are kept.
     """
     if place.folder is None:
-        kept = [block.found(tell, place.workers) for block in blocks]
+        kept, before = [], 0
+        for block in blocks:
+            kept.append(block.found(tell and partial(_tell_after, tell, before), place.workers))
+            before += block.runs
         return [partial(kept.__getitem__, number) for number in range(len(blocks))]
     files = [place.folder / f"{number:06d}.npz" for number in range(len(blocks))]
     with _owned(place.folder, mark, len(blocks)):
@@ -146,20 +207,25 @@ def work_off(
     return [partial(_read, file, block.shapes) for file, block in zip(files, blocks, strict=True)]
 
 
+def _tell_after(tell: Callable[[int], None], before: int, runs: int) -> None:
+    tell(before + runs)
+
+
 @contextmanager
 def _owned(folder: Path, mark: str, count: int) -> Iterator[None]:
     """A folder that holds this computation, or nothing of any, and is not in use."""
     busy = (f"Another process computes blocks in {folder}; wait for it, or choose another folder.")
     with output_folder(folder), locked(folder / ".lock", busy, keep=True):
         about = folder / _ABOUT
-        wanted = {"mark": mark, "blocks": count}
+        stored, wanted = None, {"mark": mark, "blocks": count}
         if about.exists():
             with reading(about, "not of fecontact"):
                 stored = from_json(about.read_text(encoding="utf-8"), dict, "it")
-            if stored != wanted:
+        if stored != wanted:
+            # Without blocks it is of a call that was refused, or ended before its first block.
+            if stored is not None and any(folder.glob("*.npz")):
                 raise InputError(f"{folder} holds the runs of another system, grid or version; "
                                  f"choose another folder, or remove it.")
-        else:
             write_text(about, json.dumps(wanted) + "\n")
         clear_leftovers(folder)
         yield
@@ -184,10 +250,19 @@ def _compute(
     keep: Callable[[int, Found], None], tell: Callable[[int], None] | None,
 ) -> None:
     """Compute some of the blocks, and keep each when it is done."""
-    if place.executor is not None:
-        _on_executor(blocks, numbers, place.executor, keep, tell)
-        return
     done = {number: blocks[number].runs for number in set(range(len(blocks))) - set(numbers)}
+
+    def keep_one(number: int, found: Found) -> None:
+        keep(number, found)
+        done[number] = blocks[number].runs
+
+    def tell_all() -> None:
+        if tell is not None:
+            tell(sum(list(done.values())))
+
+    if place.executor is not None:
+        _on_executor(blocks, numbers, place.executor, keep_one, tell_all)
+        return
     left = [False]
 
     def run(number: int) -> Found:
@@ -200,19 +275,15 @@ def _compute(
 
     with ThreadPoolExecutor(place.workers or cpu_count()) as pool:
         pending = {pool.submit(run, number): number for number in numbers}
-        waiting: set[Future[Found]] = set(pending)
         try:
-            while waiting:
-                ended, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in ended:
-                    number = pending.pop(future)
-                    keep(number, future.result())
-                    done[number] = blocks[number].runs
-                if tell is not None:
-                    tell(sum(list(done.values())))
+            while pending:
+                failed = _keep_ended(pending, keep_one)
+                if failed is not None:
+                    raise failed
+                tell_all()
         except BaseException:
             left[0] = True
-            for future in waiting:
+            for future in pending:
                 future.cancel()
             raise
 
@@ -223,12 +294,11 @@ class _LeftError(Exception):
 
 def _on_executor(
     blocks: Sequence[Block], numbers: Sequence[int], executor: Executor,
-    keep: Callable[[int, Found], None], tell: Callable[[int], None] | None,
+    keep: Callable[[int, Found], None], tell: Callable[[], None],
 ) -> None:
     workers = getattr(executor, "_max_workers", None)
     window = 2 * workers + 2 if isinstance(workers, int) and workers > 0 else _AHEAD
     ahead = list(numbers)[::-1]
-    done = sum(block.runs for block in blocks) - sum(blocks[number].runs for number in numbers)
     flying: dict[Future[Found], int] = {}
     try:
         while ahead or flying:
@@ -238,29 +308,46 @@ def _on_executor(
                 except RuntimeError as error:  # it was shut down
                     raise _broken(error) from error
                 ahead.pop()
-            failed: BaseException | None = None
-            for future in wait(flying, timeout=0.2, return_when=FIRST_COMPLETED).done:
-                number = flying.pop(future)
-                try:
-                    keep(number, future.result())
-                except (Exception, CancelledError) as error:
-                    failed = failed or error
-                else:
-                    done += blocks[number].runs
+            failed = _keep_ended(flying, keep)
             if isinstance(failed, BrokenExecutor | CancelledError) or (
                     type(failed).__name__ == "KilledWorker"):  # of Dask
                 raise _broken(failed) from failed
+            if isinstance(failed, pickle.PicklingError) or (
+                    isinstance(failed, AttributeError | TypeError)
+                    and ("pickle" in str(failed) or "local object" in str(failed))):
+                raise InputError(
+                    f"The executor cannot send the runs to another process ({_reason(failed)}): "
+                    f"a function as parameter, and functions and classes of laws and fields, must "
+                    f"be ones that other processes can import, at the top of a module; or leave "
+                    f"out the executor.") from failed
             if failed is not None:
                 raise failed
-            if tell is not None:
-                tell(done)
+            tell()
     finally:
         for future in flying:
             future.cancel()
 
 
+def _keep_ended(
+    flying: dict[Future[Found], int], keep: Callable[[int, Found], None],
+) -> Exception | None:
+    """Wait a little, and keep all blocks that have ended; the first error among them."""
+    failed = None
+    ended = wait(flying, timeout=0.2, return_when=FIRST_COMPLETED).done
+    for future in sorted(ended, key=flying.__getitem__):
+        try:
+            keep(flying.pop(future), future.result())
+        except Exception as error:
+            failed = failed or error
+    return failed
+
+
+def _reason(error: BaseException | None) -> str:
+    return str(error).partition("\n")[0].rstrip(".")
+
+
 def _broken(error: BaseException | None) -> AnalysisError:
-    reason = str(error).partition("\n")[0].rstrip(".") or "its work was cancelled"
+    reason = _reason(error) or "its work was cancelled"
     return AnalysisError(f"The executor broke ({reason}); finished blocks are kept: go on with a "
                          f"new executor and the same folder.")
 

@@ -3,18 +3,21 @@
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from numbers import Integral, Real
+from itertools import chain
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from fecontact.bifurcation.attractors.blocks import Found, Place, mark_of, work_off
+from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike
-from fecontact.integrate.ensemble import ensemble, strobe
+from fecontact.integrate.ensemble import ensemble, is_many, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
+from fecontact.integrate.field_runs.start import start_state
 from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
@@ -100,7 +103,8 @@ def poincare_scan(
         Excited with one period at every value, unless there is a section.
     parameter : str or function
         Dotted name of a number of the system, ``"drive.angular_frequency"``, the name of one of
-        the field, or a function that makes the system for a value, ``(system, value) -> system``.
+        the field, or a function that makes the system for a value, ``(system, value) -> system``;
+        for an executor of processes one at the top of a module.
     values : (V,) array
         Ascending.
     transient_periods : int, optional
@@ -129,8 +133,7 @@ def poincare_scan(
         If the executor broke; finished chains are kept.
     """
     moving = in_time("poincare_scan", system)
-    if not (isinstance(keep, Integral) and keep >= 1):
-        raise InputError(f"keep = {keep!r} must be a whole number from 1 on.")
+    keep = as_count(keep, "keep")
     if section is None and transient is not None:
         raise InputError("poincare_scan: transient is the time before passages of a section "
                          "count; give a section too, or transient_periods.")
@@ -145,15 +148,15 @@ def poincare_scan(
     if points.ndim != 1 or not len(points) or not np.isfinite(points).all() or (
             (np.diff(points) <= 0.0).any()):
         raise InputError("values must be finite numbers in ascending order.")
-    if chains is not None and not (isinstance(chains, Integral) and chains >= 1):
-        raise InputError(f"chains = {chains!r} must be a whole number from 1 on.")
+    if chains is not None:
+        chains = as_count(chains, "chains")
     if not isinstance(parameter, str) and not callable(parameter):
         raise InputError(f"poincare_scan: parameter must be a text or a function, not "
                          f"{type(parameter).__name__}.")
     place = Place.checked("poincare_scan", folder, executor, workers)
     passes = None if section is None else (section, float(transient or 0.0))
     task = _Task(system, parameter, 200 if transient_periods is None else transient_periods,
-                 passes, int(keep), initial, solver, rtol)
+                 passes, keep, initial, solver, rtol)
     ends = [task.system_at(float(value)) for value in points[[0, -1]]]
     if section is None:
         for made in ends:
@@ -170,8 +173,7 @@ def poincare_scan(
               for way, chains_of_way in enumerate(ways)
               for first in range(0, len(order), together)]
     blocks = [_Chains(task, points[chosen]) for _, chosen in places]
-    mark = "" if folder is None else "".join(
-        mark_of(made, *task.settings, points, length, down) for made in ends)
+    mark = "" if folder is None else task.mark(points, ends, length, down)
     with shown(progress, lambda: progress_bar("Running", sum(one.runs for one in blocks))) as tell:
         readers = work_off(blocks, place, mark, tell)
     states = np.empty((2, count, keep, state_size(moving)))
@@ -196,15 +198,20 @@ class _Task:
 
     def system_at(self, value: float) -> Moving:
         """The system at a value of the parameter."""
-        if isinstance(self.parameter, str):
-            return in_time("poincare_scan", self.system.with_(**{self.parameter: value}))
-        return self.parameter(self.system, value)
+        made = (self.system.with_(**{self.parameter: value}) if isinstance(self.parameter, str)
+                else self.parameter(self.system, value))
+        return in_time("poincare_scan", made)
 
-    @property
-    def settings(self) -> tuple[Any, ...]:
-        """All that results depend on beside the systems."""
-        return (self.transient_periods, self.passes, self.keep, self.initial, self.solver,
-                self.rtol)
+    def mark(self, values: Array, ends: list[Moving], *settings: Any) -> str:
+        """A mark of all that results depend on, from the systems at both ends."""
+        name = self.parameter if isinstance(self.parameter, str) else None
+        each = self.initial if is_many(self.initial) else [self.initial]
+        starts = [start_state(made, one, 0.0) for made in ends for one in each]
+        # A name tells what is between the ends, a function does not.
+        between = values[1:-1] if name is None else values[:0]
+        systems = chain(ends, (self.system_at(value) for value in between.tolist()))
+        return mark_of(systems, name, values, starts, self.transient_periods, self.passes,
+                       self.keep, self.solver, self.rtol, *settings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,6 +53,11 @@ class FunctionField(VectorField):
         base = np.abs(self.values)
         self._sizes = np.where(base > 0.0, base, 1.0)
 
+    @property
+    def functions(self) -> tuple[Any, ...]:
+        """Rates, Jacobian, rates of complex numbers and period; None for those it has not."""
+        return self._rates, self._jacobian, self._complex, self._period
+
     def rates(self, t: Array, x: Array, values: Array) -> Array:
         """Rates (N, d); see :meth:`VectorField.rates`."""
         f = np.empty_like(x)

@@ -1,0 +1,218 @@
+"""Marks of folders of blocks: what belongs to other runs is told apart to the last digit."""
+
+import math
+
+import numpy as np
+import pytest
+from systems import friction_oscillator, impact_oscillator
+
+from fecontact import Drive, Ground, InputError, Load, PointLoad, simulate
+from fecontact.bifurcation import VectorField, poincare_scan, vector_field
+from fecontact.bifurcation.attractors.blocks import mark_of
+from fecontact.integrate import Crossing, Rodas5P
+from fecontact.laws import (
+    ConstantFriction,
+    Harmonic,
+    HarmonicSpeed,
+    ParabolicSurface,
+    RoughSurface,
+    Sine,
+    friction_law,
+    ground_profile,
+    normal_law,
+    signal,
+)
+
+W = "drive.angular_frequency"
+
+
+def test_the_mark_sees_laws_and_functions(tmp_path):
+    """Another stiffness, another law of equal numbers, another function of the same names."""
+    def scan(rates, folder):
+        field = vector_field(rates, {"c": 1.0}, states=("x", "v"), scales=[1.0, 1.0])
+        return poincare_scan(field, "c", [1.0, 2.0], section=Crossing("x"), transient=10.0, keep=2,
+                             initial=[1.0, 0.0], folder=folder)
+
+    scan(swing, tmp_path / "field")
+    scan(swing, tmp_path / "field")
+    with pytest.raises(InputError, match="another system"):
+        scan(stiffer, tmp_path / "field")
+    base = impact_oscillator(1)
+    numbers = (base.normal.stiffness, base.normal.roughness_height, base.normal.damping)
+    short_scan(base, W, tmp_path / "laws")
+    short_scan(base.with_(normal=RoughSurface(*numbers)), W, tmp_path / "laws")
+    for other in (base.with_(**{"normal.stiffness": 1.01 * base.normal.stiffness}),
+                  base.with_(normal=ParabolicSurface(*numbers))):
+        with pytest.raises(InputError, match="another system"):
+            short_scan(other, W, tmp_path / "laws")
+
+
+def short_scan(system, parameter, folder, initial=(0.0, 0.0), **settings):
+    return poincare_scan(system, parameter, [60.0, 61.0, 62.0], transient_periods=2, keep=1,
+                         initial=initial, folder=folder, **settings)
+
+
+def straight(system, w):
+    return system.with_(**{W: w})
+
+
+def bent(system, w):
+    return system.with_(**{W: w + 0.1 * (w - 60.0) * (62.0 - w)})
+
+
+def test_the_mark_sees_functions_of_the_parameter_between_the_ends(tmp_path):
+    base = impact_oscillator(1)
+    first = short_scan(base, straight, tmp_path / "a")
+    assert (short_scan(base, straight, tmp_path / "a").up == first.up).all()
+    with pytest.raises(InputError, match="another system"):
+        short_scan(base, bent, tmp_path / "a")
+    other = short_scan(base, bent, tmp_path / "b")
+    assert (other.up[0] == first.up[0]).all()
+    assert (other.up[1] != first.up[1]).all()
+
+
+def test_the_mark_sees_starts_to_the_last_digit(tmp_path):
+    """Two runs whose summaries read alike; a state in whatever form is the same."""
+    base = impact_oscillator(1)
+    one, other = (simulate(base, 0.1, initial=np.array([start, 0.0]))
+                  for start in (1e-4, 1e-4 * (1.0 + 1e-10)))
+    assert repr(one) == repr(other)
+    assert (one.states[-1] != other.states[-1]).any()
+    short_scan(base, W, tmp_path / "a", initial=one)
+    for same_start in (one, one.states[-1], one.states[-1].tolist(), tuple(one.states[-1])):
+        short_scan(base, W, tmp_path / "a", initial=same_start, rtol=np.float64(1e-5))
+    with pytest.raises(InputError, match="another system"):
+        short_scan(base, W, tmp_path / "a", initial=other)
+
+
+LONG = np.linspace(0.0, 1.0, 5000)
+
+
+@pytest.mark.parametrize(("one", "other", "alike"), [
+    ([1.0], [np.float64(1.0)], True),
+    ([3], [np.int64(3)], True),
+    ([0.1], [0.1 + 2e-17], False),
+    ([1], [1.0], False),
+    (["a", "bc"], ["ab", "c"], False),
+    ([["a"], "b"], [["a", "b"]], False),
+    ([LONG.reshape(2, -1)], [LONG.reshape(-1, 2)], False),
+    ([[LONG]], [[np.where(LONG[2500] == LONG, 0.0, LONG)]], False),
+    ([[LONG]], [[LONG.copy()]], True),
+    ([None], [0], False),
+    ([Rodas5P()], [Rodas5P()], True),
+    ([Rodas5P()], [Rodas5P(series="never")], False),
+    ([Crossing("x", value=np.float64(2.0))], [Crossing("x", value=2.0)], True),
+    ([Crossing("x")], [Crossing("x", value=1e-12)], False),
+])
+def test_marks_of_settings(one, other, alike):
+    assert (mark_of([], *one) == mark_of([], *other)) is alike
+
+
+def own(base, kernel):
+    """A class of one name and the same fields for every kernel."""
+    return type("Own", (base,), {"kernel": kernel, "__doc__": base.__doc__})
+
+
+def pressed(c):
+    @normal_law
+    def law(u, v, p):
+        return (c * p[0] * u, c * p[0], 0.0) if u > 0.0 else (0.0, 0.0, 0.0)
+
+    return friction_oscillator().with_(normal=own(RoughSurface, law)(10e6, 10e-6))
+
+
+def rubbed(c):
+    @friction_law
+    def law(v, F, p):
+        s = math.tanh(1e3 * v)
+        return c * p[0] * F * s, c * p[0] * F * 1e3 * (1.0 - s * s), c * p[0] * s
+
+    return friction_oscillator().with_(friction=own(ConstantFriction, law)(0.5))
+
+
+def wave(c):
+    @signal
+    def law(t, p):
+        return c * p[0] * math.sin(p[1] * t), c * p[0] * p[1] * math.cos(p[1] * t)
+
+    return own(Harmonic, law)(1e-4, 60.0)
+
+
+def driven(c):
+    return friction_oscillator().with_(drive=Drive(stiffness_x=5610.0, motion_x=wave(c)))
+
+
+def loaded(c):
+    return friction_oscillator().with_(
+        load=Load(14.0, forces=[PointLoad("B", "x", signal=wave(c))]))
+
+
+def uneven(c):
+    @ground_profile
+    def law(xi, p):
+        y, k = c * p[1], 2.0 * math.pi / p[2]
+        return p[0] + y * math.sin(k * xi), y * k * math.cos(k * xi), -y * k**2 * math.sin(k * xi)
+
+    return own(Sine, law)(1e-6, 0.1)
+
+
+def over_waves(c):
+    return friction_oscillator().with_(ground=Ground(speed=1e-3, profile=uneven(c)))
+
+
+def over_patches(c):
+    return friction_oscillator().with_(ground=Ground(speed=1e-3, friction_variation=uneven(c)))
+
+
+def on_a_shaker(c):
+    @signal
+    def law(t, p):
+        return c * p[1] / p[2] * (1.0 - math.cos(p[2] * t)), c * p[1] * math.sin(p[2] * t)
+
+    return friction_oscillator().with_(ground=Ground(motion=own(HarmonicSpeed, law)(1e-3, 60.0)))
+
+
+def far_away(limit):
+    """A field whose rates differ only where no sample is."""
+    def rates(t, x, p, out):
+        out[0] = x[1]
+        out[1] = -p[0] * x[0] if abs(x[0]) < limit else 0.0
+
+    return vector_field(rates, {"c": 1.0}, ["x", "v"])
+
+
+def far_away_in_python(limit):
+    class Own(VectorField):
+        parameters, state_names = {"c": 1.0}, ("x", "v")
+
+        def rates(self, t, x, values):
+            return np.where(np.abs(x) < limit, -values[0] * x, 0.0)
+
+        def derivatives(self, t, x, values, active=()):
+            raise NotImplementedError
+
+    return Own()
+
+
+def of_period(period):
+    return vector_field(swing, {"c": 1.0}, ["x", "v"], period=period)
+
+
+@pytest.mark.parametrize("made", [pressed, rubbed, driven, loaded, over_waves, over_patches,
+                                  on_a_shaker, far_away, far_away_in_python, of_period],
+                         ids=lambda made: made.__name__)
+def test_the_mark_sees_what_functions_hold(made):
+    """Kernels of one name in classes of one name and equal fields, with another number inside."""
+    one, other, again = made(50.0), made(60.0), made(50.0)
+    assert mark_of([one]) == mark_of([again])
+    assert mark_of([one]) != mark_of([other])
+
+
+def swing(t, x, p, out):
+    out[0] = x[1]
+    out[1] = -p[0] * x[0]
+
+
+def stiffer(t, x, p, out):
+    out[0] = x[1]
+    out[1] = -2.0 * p[0] * x[0]
