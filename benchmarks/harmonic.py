@@ -5,8 +5,10 @@ frequency and time method with matrices, derivatives in closed form, Newton's me
 pseudo-arclength, for any M, C and K, and no stability, extremes or errors; fecontact makes the
 latter two when they are asked for, which is not in these times. Then a body of 20 modes on 40
 contact nodes beside collocation, with errors of the states at the first point relative to 25
-harmonics. Processor time per point, all that is made before the first point included; the least of
-five runs, of which the first makes the field of the system that the others take.
+harmonics. Processor time per point, the least of five runs, of the body of one. Each run makes its
+system anew, with all that follows from it, and NumPy its matrices: nothing is left from a run
+before but compiled code. The modes of the body and the motion from which collocation starts are
+made before.
 
 Usage: python benchmarks/harmonic.py [--quick]
 """
@@ -152,11 +154,15 @@ def jenkins_system() -> fc.ContactSystem:
         drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=1.1))
 
 
-def body() -> fc.ContactSystem:
-    """A steel block of 20 modes on 40 nodes of rough ground, pressed and driven to and fro."""
+def modes_of_body() -> fc.ModalBasis:
+    """20 modes of a steel block with 40 contact nodes."""
     shape = fc.ElasticBody(fc.generate(fc.Beam(0.2, 0.02, element_size=0.005)), fc.Material(), 0.01)
-    basis = fc.modal_basis(shape, 20, contact_nodes=40, reduction="vibration", B=(0.0, 0.01),
-                           C=(0.1, 0.02), damping=0.02)
+    return fc.modal_basis(shape, 20, contact_nodes=40, reduction="vibration", B=(0.0, 0.01),
+                          C=(0.1, 0.02), damping=0.02)
+
+
+def body(basis: fc.ModalBasis) -> fc.ContactSystem:
+    """The block on rough ground, pressed and driven to and fro."""
     return fc.ContactSystem(
         basis, normal=RoughSurface(1e6, 1e-4, 300.0),
         friction=ConstantFriction(0.3, smoothing_slope=50.0), load=fc.Load(100.0),
@@ -176,16 +182,16 @@ def least_time(task: Callable[[], object], rounds: int) -> tuple[float, object]:
 def oscillator(name: str, rounds: int, points: int) -> None:
     """One row of the first table."""
     if name == "Duffing":
-        system, observe, samples, element = duffing_system(), ("B", "y"), 72, cubic
+        system, observe, samples, element = duffing_system, ("B", "y"), 72, cubic
         bounds, damping, force, largest = (0.6, 1.8), 0.05, 0.18, 8.6 / points
     else:
-        system, observe, samples, element = jenkins_system(), ("B", "x"), 256, jenkins
+        system, observe, samples, element = jenkins_system, ("B", "x"), 256, jenkins
         bounds, damping, force, largest = (1.0, 1.5), 0.02, 1.0, 16.0 / points
     load = np.zeros(2 * HARMONICS + 1)
     load[2] = force
-    plain = Numpy(samples, np.eye(1), damping * np.eye(1), np.eye(1), load,
-                  [(np.ones(1), element)])
-    spent, found = least_time(lambda: plain.follow(*bounds, 0.01, largest), rounds)
+    spent, found = least_time(lambda: Numpy(
+        samples, np.eye(1), damping * np.eye(1), np.eye(1), load,
+        [(np.ones(1), element)]).follow(*bounds, 0.01, largest), rounds)
     numpy_each = 1e6 * spent / len(found)
     peak = np.hypot(found[:, 1], found[:, 2]).max()
     print(f"{name:8s} NumPy                    {len(found):5d} points {numpy_each:8.1f} us a point")
@@ -195,7 +201,7 @@ def oscillator(name: str, rounds: int, points: int) -> None:
             options = ContinuationOptions(points=10_000, largest_step=4.6 / count
                                           if name == "Duffing" else 4.0 / count, step=1e-3)
             spent, response = least_time(lambda method=method, options=options: frequency_response(
-                system, bounds, observe=observe, method=method, options=options), rounds)
+                system(), bounds, observe=observe, method=method, options=options), rounds)
             branch = response.branches[0]
             each = 1e6 * spent / len(branch)
             off = np.abs(response.harmonic(1)).max() / peak - 1.0
@@ -212,26 +218,29 @@ def largest_error(mine: Branch, exact: Branch, modes: int) -> float:
 
 def table_of_body(points: int, intervals: tuple[int, ...]) -> None:
     """The second table."""
-    system = body()
-    field = contact_field(system, ["drive.angular_frequency"])
+    basis = modes_of_body()
     options = ContinuationOptions(points=points, largest_step=0.03)
 
     def response(harmonics: int, stability: str | None, count: int = points) -> Branch:
-        return frequency_response(system, (500.0, 2000.0), method=HarmonicBalance(
+        return frequency_response(body(basis), (500.0, 2000.0), method=HarmonicBalance(
             harmonics, stability=stability), options=ContinuationOptions(
                 points=count, largest_step=0.03)).branches[0]
 
+    def collocated(count: int) -> Branch:
+        return orbit_branch(
+            contact_field(body(basis), ["drive.angular_frequency"]), start,
+            method=Collocation(count, state_tolerance=None), bounds=(500.0, 2000.0),
+            options=options)
+
     exact = response(25, None, 2)
-    start = exact.points[0].orbit(field)
+    start = exact.points[0].orbit(contact_field(body(basis), ["drive.angular_frequency"]))
     for stability in (None, "transitions"):
         spent, branch = least_time(lambda stability=stability: response(HARMONICS, stability), 1)
         print(f"harmonic balance {stability or 'no stability':14s} {len(branch):4d} points "
               f"{1e3 * spent / len(branch):7.2f} ms a point, {spent:5.2f} s in all, error "
               f"{largest_error(branch, exact, 20):.1e}", flush=True)
     for count in intervals:
-        spent, branch = least_time(lambda count=count: orbit_branch(
-            field, start, method=Collocation(count, state_tolerance=None), bounds=(500.0, 2000.0),
-            options=options), 1)
+        spent, branch = least_time(lambda count=count: collocated(count), 1)
         print(f"collocation      {count:3d} intervals  {len(branch):4d} points "
               f"{1e3 * spent / len(branch):7.2f} ms a point, {spent:5.2f} s in all, error "
               f"{largest_error(branch, exact, 20):.1e}", flush=True)

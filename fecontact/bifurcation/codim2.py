@@ -7,7 +7,6 @@ from typing import Any, Literal
 import numpy as np
 
 from fecontact.bifurcation.codim2_beside import begun
-from fecontact.bifurcation.codim2_error import with_errors
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
@@ -30,6 +29,7 @@ from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.events.curves import border_curve
 from fecontact.bifurcation.homoclinic.starts import homoclinic_curve
 from fecontact.bifurcation.orbits.codim2 import OrbitCurve, orbit_curve
+from fecontact.bifurcation.orbits.curves.errors import with_errors
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_finite
 from fecontact.core.types import Array, ArrayLike

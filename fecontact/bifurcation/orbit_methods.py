@@ -19,7 +19,7 @@ class Collocation:
     Parameters
     ----------
     intervals : int
-        Least number of mesh intervals, at least 2.
+        Least number of mesh intervals, at least 2. A smaller ``most_intervals`` is raised to it.
     degree : int
         Degree of the polynomial on each interval, 2 to 7.
     tolerance : float
@@ -52,6 +52,7 @@ class Collocation:
         if not (isinstance(self.most_intervals, int | np.integer) and self.most_intervals >= 2):
             raise InputError(f"Collocation: most_intervals = {self.most_intervals!r} must be a "
                              f"whole number of at least 2.")
+        object.__setattr__(self, "most_intervals", max(self.intervals, self.most_intervals))
         if self.state_tolerance is not None:
             require_positive("Collocation", state_tolerance=self.state_tolerance)
 

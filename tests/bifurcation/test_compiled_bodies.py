@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from meshes_for_tests import rectangle
+from test_plain_contact_forces import duffing_in_y
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -14,7 +15,9 @@ from fecontact.bifurcation import (
     frequency_response,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import start_of
+from fecontact.bifurcation.fields.contact_field import field_between
 from fecontact.bifurcation.harmonic.compiled import balance as compiled
+from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.problem import CompiledLinearisation, HarmonicProblem
@@ -197,6 +200,23 @@ def test_problems_with_equations_of_their_own_are_evaluated_by_these():
     u = np.append(np.zeros(plain.size), 0.9)
     assert other.evaluate(u) == "its own"
     assert isinstance(plain.evaluate(u), CompiledLinearisation)
+
+
+@pytest.mark.parametrize(("name", "bounds", "rests"), [
+    ("drive.amplitude_y", (0.1, 1.8), True), ("drive.angular_frequency", (0.6, 1.8), True),
+    # The value in the midst of the range at which forces are taken is zero.
+    ("load.normal", (-0.31, 0.69), False), ("normal.preload", (-0.31, 0.69), False),
+    ("load.normal", (-0.3024, 0.6976), False), ("normal.preload", (-0.3024, 0.6976), False)])
+def test_bodies_rest_at_zero_only_if_no_value_of_the_parameter_moves_them(name, bounds, rests):
+    """A load or preload of 0.6 N moves the mass though one of 0 N does not."""
+    system = duffing_in_y()
+    field = field_between(system, ((name, bounds),))
+    problem = problem_for(field, np.array([0.6]), 0, HarmonicBalance(3), np.ones(4))
+    assert bool(problem.equations(0.6).numbers[RESTS]) == rests
+    first = frequency_response(system, bounds, name, start=0.6, observe=("B", "y"),
+                               options=ContinuationOptions(points=1)).branches[0].points[0]
+    mean = float(first.u[0])
+    assert (abs(mean) < 1e-9) == rests
 
 
 @pytest.mark.parametrize(("name", "product", "period"), [

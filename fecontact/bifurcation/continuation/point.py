@@ -248,7 +248,7 @@ class BranchPoint:
         """Error of a special point's parameter; NaN where it is not estimated.
 
         On branches and curves of orbits by collocation it is the change of the parameter on a finer
-        mesh.
+        mesh or, where the point is not found there, over the stretch that was searched.
         """
         return float(self._details.get("parameter_error", np.nan))
 

@@ -1,6 +1,6 @@
 """Interface of continuation problems, options of a branch, and the status at its end."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, ClassVar, Protocol
@@ -201,11 +201,12 @@ class Problem(Protocol):
         return None
 
     def refined(
-        self, u: Array, tangent: Array, ahead: Any
+        self, u: Array, tangent: Array, ahead: Sequence[Any]
     ) -> "tuple[Problem, Array, Array] | None":
-        """Problem, u and tangent on a finer mesh, to make the step to a solution once more.
+        """Problem, u and tangent on a finer mesh, to make a step once more.
 
-        ``ahead`` is the solution that the step led to; None where it is accurate enough.
+        ``ahead`` are the solutions and special points that it led to; None where all of them are
+        accurate enough.
         """
         return None
 

@@ -128,7 +128,8 @@ def continuation(
             if step < options.smallest_step:
                 return End(BranchStatus.STALLED, message)
             continue
-        finer = problem.refined(here.u, here.tangent, reached[-1][0])
+        finer = problem.refined(here.u, here.tangent, [
+            at for there, special in reached for at in (*special, there)])
         if finer is not None:
             problem, here = _moved(here, *finer)
             before = None
@@ -182,7 +183,7 @@ def _resolved(
     direction: float,
 ) -> tuple[Problem, Solution]:
     """The start on a mesh that is fine enough for it, as far as Newton's method leads there."""
-    while (finer := problem.refined(start.u, start.tangent, start)) is not None:
+    while (finer := problem.refined(start.u, start.tangent, [start])) is not None:
         try:
             start = start_of(finer[0], finer[1], options,
                              None if tangent is None else finer[2], direction)

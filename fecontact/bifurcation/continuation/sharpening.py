@@ -119,7 +119,7 @@ def sharpened(
     if not np.isnan(error):
         return with_details(result, parameter_error=error)
     if np.isnan(result.parameter_error) and not result.located:
-        return with_details(result, parameter_error=_reach(place))
+        return with_details(result, parameter_error=reach(place))
     return result
 
 
@@ -226,9 +226,9 @@ def _searched(
     return min(points, key=lambda point: float(weights @ (point.u - u) ** 2), default=None)
 
 
-def _reach(place: Place) -> float:
-    """Change of the parameter over the longest search."""
-    return max(_DISTANCES) * abs(float(place[2][-1]))
+def reach(place: tuple[Problem, Array, Array], unknown: int = -1) -> float:
+    """Change of the parameter, or of another unknown, over the longest search."""
+    return max(_DISTANCES) * abs(float(place[2][unknown]))
 
 
 def _judged(located: _Located, found: BranchPoint | None) -> dict[str, Any] | None:

@@ -382,7 +382,9 @@ def _followed(
                 points[index] = _sharpened(field, branch, index, accuracy)
     except KeyboardInterrupt:
         branch = replace(branch, status=BranchStatus.INTERRUPTED)
-    return replace(branch, points=tuple(points))
+    said = "" if problem.sizes is None else problem.sizes.note(points)
+    return replace(branch, points=tuple(points),
+                   message=" ".join(filter(None, (branch.message, said))))
 
 
 def _sharpened(

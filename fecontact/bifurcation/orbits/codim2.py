@@ -13,7 +13,11 @@ import numpy as np
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.linalg.bordered import Bordered
-from fecontact.bifurcation.orbits.collocation import CollocationProblem
+from fecontact.bifurcation.orbits.collocation import (
+    CollocationProblem,
+    less_accurate,
+    told_of,
+)
 from fecontact.bifurcation.orbits.curves.singularity import (
     Bend,
     ContinuedSign,
@@ -70,12 +74,15 @@ class OrbitCurve(Problem):
         The period [s] of all orbits, for the kind 'period'.
     sign : ContinuedSign
         Sign of the test function, continued along the curve.
+    state_tolerance : float, optional
+        Error of the states above which the curve tells of them; its orbits keep their intervals.
     """
 
     orbit: CollocationProblem
     kind: str
     period: float = 1.0
     sign: ContinuedSign = field(default_factory=ContinuedSign)
+    state_tolerance: float | None = None
 
     keeps_matrix: ClassVar[bool] = True
     polishes: ClassVar[bool] = True
@@ -117,6 +124,13 @@ class OrbitCurve(Problem):
         assert self.orbit.second is not None
         return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
+
+    def note(self, points: Sequence[BranchPoint]) -> str:
+        """Where the intervals of the start leave too large an error of the states."""
+        if self.state_tolerance is None:
+            return ""
+        return told_of(less_accurate(points, self.state_tolerance), points, self.state_tolerance,
+                       "start from a point on more intervals")
 
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
@@ -272,7 +286,9 @@ def orbit_curve(
     if kind == "period" and not orbit.autonomous:
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
                          f"cannot keep; vary the frequency of the excitation instead.")
-    curve = (PeriodCurve if kind == "period" else OrbitCurve)(orbit, kind, problem.period(u))
+    curve = (PeriodCurve if kind == "period" else OrbitCurve)(
+        orbit, kind, problem.period(u),
+        state_tolerance=point.branch.attributes.get("state_tolerance"))
     return curve, start, {**point.branch.attributes, "scales": orbit.scales,
                           "intervals": problem.intervals}
 

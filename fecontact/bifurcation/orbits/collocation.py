@@ -85,8 +85,40 @@ class Intervals:
             return self.least
         return min(_whole(self._wanted(given, error, degree)), given)
 
+    def note(self, points: Sequence[BranchPoint]) -> str:
+        """Where orbits of a branch are less accurate than the tolerance, and why."""
+        poor = less_accurate(points, self.tolerance)
+        if any(len(point.values["mesh"]) - 1 >= self.most for point in poor):
+            reason = f"allow more than most_intervals = {self.most}"
+        elif any(point.kind is None for point in poor):
+            reason = "Newton's method failed on finer meshes there; start with more intervals"
+        else:
+            reason = f"take more than intervals = {self.least}"
+        return told_of(poor, points, self.tolerance, reason)
+
     def _wanted(self, given: int, error: float, degree: int) -> float:
         return float(given * (error / (_AIM * self.tolerance)) ** (1.0 / (degree + 1)))
+
+
+def less_accurate(points: Sequence[BranchPoint], tolerance: float) -> list[BranchPoint]:
+    """The points of which some state has an error above a tolerance."""
+    return [point for point in points if _error_of(point) > tolerance]
+
+
+def told_of(
+    poor: Sequence[BranchPoint], points: Sequence[BranchPoint], tolerance: float, reason: str
+) -> str:
+    """A sentence on the less accurate ones among points, with a reason or remedy; "" for none."""
+    if not poor:
+        return ""
+    worst = max(poor, key=_error_of)
+    return (f"The states of {len(poor)} of {len(points)} orbits are less accurate than "
+            f"state_tolerance = {tolerance:g}, off by up to {_error_of(worst):.1e} at the "
+            f"parameter {worst.parameter:.6g}: {reason}.")
+
+
+def _error_of(point: Solution | BranchPoint) -> float:
+    return float(point.values["state_error"])
 
 
 def _whole(wanted: float) -> int:
@@ -216,7 +248,8 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         if self.sizes is not None:
             fewer = min(count, self.sizes.after(count, self._error(u), self.degree))
             calm = self.calm + 1 if fewer < count else 0
-            count = fewer if calm >= _CALM else count
+            if calm >= _CALM:
+                count, calm = fewer, 0
         if (self.renewal and age >= self.renewal) or count < self.intervals:
             mesh, age = equidistributed(mesh, self.nodes(u), self.degree, count), 0
             vectors = self._on_other_mesh(mesh, vectors)
@@ -225,34 +258,20 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return problem, vectors[0], vectors[1]
 
     def refined(
-        self, u: Array, tangent: Array, ahead: Solution
+        self, u: Array, tangent: Array, ahead: Sequence[Solution | BranchPoint]
     ) -> tuple["CollocationProblem", Array, Array] | None:
-        """See :meth:`Problem.refined`: more intervals, distributed for the orbit ahead."""
+        """See :meth:`Problem.refined`: more intervals, distributed for the least accurate orbit."""
         if self.sizes is None:
             return None
-        count = self.sizes.after(self.intervals, ahead.values["state_error"], self.degree)
+        worst = max(ahead, key=_error_of)
+        count = self.sizes.after(self.intervals, _error_of(worst), self.degree)
         if count <= self.intervals:
             return None
-        mesh = equidistributed(self.mesh, self.nodes(ahead.u), self.degree, count)
+        mesh = equidistributed(self.mesh, self.nodes(worst.u), self.degree, count)
         vectors = self._on_other_mesh(mesh, [u, tangent, *self.before[2:]])
         problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, vectors[0]),
                           before=tuple(vectors) if self.before else (), calm=0)
         return problem, vectors[0], vectors[1]
-
-    def note(self, points: Sequence[BranchPoint]) -> str:
-        """Where multipliers are lost, and where the most intervals leave too large an error."""
-        said = super().note(points)
-        if self.sizes is None:
-            return said
-        poor = [point for point in points if point.values["state_error"] > self.sizes.tolerance]
-        if not poor:
-            return said
-        worst = max(poor, key=lambda point: float(point.values["state_error"]))
-        return " ".join(filter(None, (said, (
-            f"The states of {len(poor)} of {len(points)} orbits are less accurate than "
-            f"state_tolerance = {self.sizes.tolerance:g}, off by up to "
-            f"{worst.values['state_error']:.1e} at the parameter {worst.parameter:.6g}: allow more "
-            f"than most_intervals = {self.sizes.most}."))))
 
     def _bend(self, u: Array, tangent: Array) -> Array | None:
         """Derivative of the tangent along the branch, from the last step."""

@@ -105,8 +105,8 @@ class CompiledBalance:
         if found is not None:
             contact = _contact_alone(contact)
             body, given, rests = found
-            numbers[arrays.RESTS] = rests
             numbers[arrays.STEADY] = self._steady(near)
+            numbers[arrays.RESTS] = rests and numbers[arrays.STEADY]
             numbers[arrays.PLAIN] = (numbers[arrays.STEADY] and problem.size <= MOST_UNKNOWNS
                                      and not layout.memory and self._plain(near))
         return arrays.Equations(
@@ -120,7 +120,8 @@ class CompiledBalance:
     ) -> tuple[Array, Array, bool] | None:
         """``body`` and ``given`` of the equations, and whether contact and loads leave rest alone.
 
-        None where loads are not affine.
+        The latter holds for all values of the parameter if contact forces do not depend on it. None
+        where loads are not affine.
         """
         system, m, N = near.arrays, problem.layout.displacements, problem.samples
         places = near.low + (near.high - near.low) * np.array([0.02, 0.98, 0.31])
@@ -134,7 +135,10 @@ class CompiledBalance:
                > _AFFINE * np.abs(given).max() * max(1.0, abs(value))
                for value, load in zip(places, loads, strict=True)):
             return None
-        rests = np.abs(forces.mean(axis=0)).max() <= _NOTHING * np.abs(forces).max()
+        # The forces are those at the last place; the means of the loads are to be its everywhere.
+        means = loads.mean(axis=1)
+        rests = (np.abs(forces.mean(axis=0)).max() <= _NOTHING * np.abs(forces).max()
+                 and np.abs(means - means[-1]).max() <= _NOTHING * np.abs(loads).max())
         return np.concatenate(_affine(places, matrices)), given, bool(rests)
 
     def _steady(self, near: AffineArrays) -> bool:

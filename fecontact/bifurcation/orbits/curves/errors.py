@@ -10,7 +10,7 @@ from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.newton import norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import with_details
-from fecontact.bifurcation.continuation.sharpening import found_near
+from fecontact.bifurcation.continuation.sharpening import found_near, reach
 from fecontact.bifurcation.orbits.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.curves.singularity import ContinuedSign
 from fecontact.bifurcation.orbits.mesh import equidistributed
@@ -29,19 +29,21 @@ class Finer(NamedTuple):
 def with_errors(curve: OrbitCurve, branch: Branch, events: Sequence[str]) -> Branch:
     """The special points with the change of both parameters on twice the intervals as their errors.
 
-    Points that are not found there are not ``located``, and the branch's message tells of them.
+    Of points that are not found there the errors are the changes over the stretch that was
+    searched, and the branch's message tells of them.
     """
     points, missing = list(branch.points), []
     try:
         for index, point in enumerate(points):
             if point.kind is None or point.kind == HALVING or point.kind in events:
                 continue
-            finer = found_near(_on_twice(curve, point), point.kind)
+            place = _on_twice(curve, point)
+            finer = found_near(place, point.kind)
             if finer is None:
-                points[index] = with_details(point, located=False)
+                first, second = reach(place), reach(place, -2)
                 missing.append(f"{point.kind} at {point.parameter:.6g}")
-                continue
-            first, second = (abs(float(finer.u[place] - point.u[place])) for place in (-1, -2))
+            else:
+                first, second = (abs(float(finer.u[k] - point.u[k])) for k in (-1, -2))
             points[index] = with_details(point, parameter_error=first,
                                          second_parameter_error=second)
     except KeyboardInterrupt:
