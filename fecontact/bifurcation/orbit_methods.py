@@ -27,7 +27,8 @@ class Collocation:
         again on twice the intervals until its ``parameter_error`` is smaller, up to
         ``most_intervals``. It then keeps the mesh that suffices.
     most_intervals : int
-        Limit for that, and for the intervals of all other points.
+        Limit for that, and for the intervals of all other points. The checks of a special point may
+        use more: twice its intervals, for a coefficient up to 16 times ``intervals``.
     state_tolerance : float, optional
         Largest error of the states of an orbit between the ends of intervals, in their ranges over
         it: where the estimate 'state_error' exceeds it, a point is found again on more intervals,

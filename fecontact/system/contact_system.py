@@ -189,6 +189,7 @@ class ContactSystem(Summarised):
         """A copy with another drive or load; all else has been checked, and keeps its arrays."""
         made = object.__new__(type(self))
         made.__dict__.update(self.__dict__, **parts)
+        made.__dict__.pop("_fields", None)  # Fields of parameters that it keeps.
         made._require_parts(parts)
         require_motion(made.basis, made.drive, made.load)
         made.__dict__["arrays"] = excited(self.arrays, self.basis, self.drive, parts)

@@ -3,6 +3,8 @@
 References are closed forms, and differences of runs that know nothing of phases.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -20,7 +22,12 @@ from fecontact.bifurcation import (
     orbit_branch,
     periodic_motion,
 )
+from fecontact.bifurcation.events.borders import border_of, nodes_of
+from fecontact.bifurcation.events.branches import orbit_from
+from fecontact.bifurcation.events.conditions import CROSSING, Condition
+from fecontact.bifurcation.events.phases import Strike
 from fecontact.integrate import SetValued
+from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.laws import ConstantFriction, LinearContact
 
 INELASTIC, HALF = SetValued(restitution=0.0), SetValued(restitution=0.5)
@@ -93,6 +100,29 @@ def test_impacts_that_begin_to_stop_the_slip():
     speeds = curve.column("ground.speed")
     assert np.ptp(speeds) > 1.0
     assert curve.parameter == pytest.approx([last_coefficient(v) for v in speeds], rel=1e-7)
+
+
+def test_slip_that_restarts_behind_an_impact_that_stops_it():
+    """What turns its sense there is an event of the slip alone, no meeting with the impact."""
+    field = contact_field(skew(8.0), [AMPLITUDE])
+    motion = periodic_motion(field.in_time(), solver=INELASTIC, initial=[0.0, 0.5, 0.0, 0.0],
+                             rtol=1e-9)
+    problem, u = orbit_from(field, field.values, 0, float(motion.times[-1]), motion.states[-1],
+                            np.pi, 1, np.ones(5), 1e-9, INELASTIC)
+    struck = next(i for i, phase in enumerate(problem.phases) if phase.strike is not None)
+    assert problem.phases[struck].strike.modes == (STICK,)
+    assert problem.phases[struck].cluster() is None
+    # Friction holds there; an orbit on which it is just too weak slips in the contact.
+    phases = list(problem.phases)
+    phases[struck + 1] = replace(phases[struck + 1], status=(1,), event=0)
+    slips = replace(problem, phases=tuple(phases))
+    condition = Condition(0.0, CROSSING, struck + 1, 0, 0.0)
+    kind = border_of(slips, u, condition)
+    assert kind == "crossing-sliding"
+    assert nodes_of(slips, slips.motion(u), condition, kind) == (0,)
+    # Where the impact leaves the slip going, both events meet there by chance.
+    phases[struck] = replace(phases[struck], strike=Strike((0,), (1,)))
+    assert border_of(replace(slips, phases=tuple(phases)), u, condition) == "corner"
 
 
 def test_friction_at_a_stop_that_is_only_touched():

@@ -1,5 +1,9 @@
 """Contact forces law by law for all samples; folds and bounds within compiled steps; values."""
 
+import gc
+import pickle
+import weakref
+
 import numpy as np
 import pytest
 from oscillators import unilateral
@@ -115,6 +119,41 @@ def test_folds_and_bound_are_met_in_one_call(largest, monkeypatch):
         assert np.abs(here.condensed @ tangent).max() < (1e-8 if exact else 2e-3) * scaled.max()
 
 
+@pytest.mark.parametrize("stability", [None, "transitions"])
+def test_compiled_steps_that_end_just_behind_a_fold(stability, monkeypatch):
+    """The point before the last is then the regular one at which the last step began."""
+    made, own = [], Strides.stride
+
+    def stride(self, problem, here, *given):
+        found = own(self, problem, here, *given)
+        made.append((problem, found))
+        return found
+
+    monkeypatch.setattr(Strides, "stride", stride)
+    seen = 0
+    method = HarmonicBalance(9, stability=stability)
+    whole = frequency_response(duffing_in_y(), (0.6, 1.8), observe=("B", "y"), method=method,
+                               options=ContinuationOptions(points=500, largest_step=0.03))
+    fold = next(k for k, point in enumerate(whole.branches[0]) if point.kind == "fold")
+    for points in (fold + 2, fold + 3):
+        made.clear()
+        frequency_response(
+            duffing_in_y(), (0.6, 1.8), observe=("B", "y"), method=method,
+            options=ContinuationOptions(points=points, largest_step=0.03))
+        for problem, found in made:
+            if found is None or len(found.points) < 3 or found.points[-2].kind != "fold":
+                continue
+            seen += 1
+            before, _, last = found.points[-3:]
+            assert np.array_equal(found.before.u, before.u)
+            assert found.before.tests["fold"] == before.tangent[-1] > 0.0 > last.tangent[-1]
+            if found.problem.bend is not None:
+                length = np.sqrt(problem.weights() @ (last.u - before.u) ** 2)
+                assert found.problem.bend == pytest.approx(
+                    (last.tangent - before.tangent) / length, rel=1e-9)
+    assert seen > 0
+
+
 def test_a_branch_stops_at_a_fold():
     options = ContinuationOptions(points=500, largest_step=0.03, stop_at="fold")
     for stability in (None, "transitions"):
@@ -138,22 +177,26 @@ def test_stability_changes_at_the_folds_alone():
         assert np.abs(fold.values["multipliers"] - 1.0).min() < 1e-5
 
 
-def test_steps_with_kinks_are_as_accurate_as_the_tolerance():
-    """A mass on a one-sided spring: every point solves the equations to the tolerance."""
+@pytest.mark.parametrize(("harmonics", "samples"), [(5, 64), (9, 256)])
+def test_steps_with_kinks_are_as_accurate_as_the_tolerance(harmonics, samples):
+    """A mass on a one-sided spring: every point solves the equations to the tolerance.
+
+    Where a sample comes to lie on the other side of the kink, a Newton step may be no shorter than
+    the one before.
+    """
+    options = ContinuationOptions(points=400, largest_step=0.02, tolerance=1e-8)
     branch = frequency_response(
-        unilateral().system(), (0.6, 1.2), observe=("B", "y"),
-        method=HarmonicBalance(9, samples=256, stability=None),
-        options=ContinuationOptions(points=400, largest_step=0.02)).branches[0]
+        unilateral().system(), (0.6, 1.2), observe=("B", "y"), options=options,
+        method=HarmonicBalance(harmonics, samples=samples, stability=None)).branches[0]
+    assert len(branch) > 100
     field = contact_field(unilateral().system(), ["drive.angular_frequency"])
-    for point in branch.points[1::5]:
+    for point in branch:
         problem, u, _ = restored(field, point)
-        here = problem.linearise(u)
-        row = np.zeros(len(u))
-        row[-1] = 1.0
-        if abs(point.tangent[-1]) < 0.05:
-            continue
-        step = here.solve(row, np.append(-here.residual, 0.0))
-        assert np.sqrt(problem.weights() @ step**2) < 1e-6
+        assert problem.kinked
+        row = problem.weights() * point.tangent
+        step = problem.linearise(u).solve(row, np.append(-problem.linearise(u).residual, 0.0))
+        size = np.sqrt(problem.weights() @ u**2)
+        assert np.sqrt(problem.weights() @ step**2) < options.tolerance * (1.0 + size)
 
 
 def test_values_are_a_mapping_made_when_asked_for():
@@ -168,11 +211,42 @@ def test_values_are_a_mapping_made_when_asked_for():
     assert "period" in repr(point.values)
     with pytest.raises(KeyError):
         point.values["multipliers"]
+    joined = {"period": 1.0, "more": 2.0} | point.values
+    assert list(joined) == ["period", "more", *names[1:]]
+    assert joined["period"] == point.values["period"] != 1.0
+    joined = point.values | {"period": 1.0, "more": 2.0}
+    assert list(joined) == [*names, "more"]
+    assert joined["period"] == 1.0
+    assert isinstance(joined, dict)
     with pytest.raises(InputError, match="it has: 'maximum', 'minimum'"):
         response.branches[0].column("stable")
     # The observed displacement is the first state.
     assert point.values["observed_maximum"] == pytest.approx(point.values["maximum"][0], rel=1e-6)
     assert point.values["period"] == pytest.approx(2.0 * np.pi / point.parameter, rel=1e-14)
+
+
+@pytest.mark.parametrize("stability", [None, "transitions"])
+def test_a_point_is_stored_without_its_neighbours(stability):
+    """Copies hold a dict; what values were made from is given up when all are made."""
+    branch = frequency_response(duffing_in_y(), (0.6, 0.8), observe=("B", "y"),
+                                method=HarmonicBalance(9, stability=stability)).branches[0]
+    point = branch.points[5]
+    orbits = point.values._orbits
+    reached = len(orbits.periods)
+    assert reached < len(branch) + 1
+    for name in ("X", "z", "forces", "mean", "sizes"):
+        kept = getattr(orbits, name)
+        assert len(kept) == reached
+        assert (kept if kept.base is None else kept.base).size <= reached * (kept[0].size + 1)
+    text = pickle.dumps(point)
+    assert len(text) < 5000
+    again = pickle.loads(text)
+    assert type(again.values) is dict
+    assert list(again.values) == list(point.values)
+    for name, value in point.values.items():
+        assert np.array_equal(again.values[name], value)
+    assert [len(getattr(orbits, name)) for name in ("X", "forces", "mean")] == [0, 0, 0]
+    assert branch.column("maximum").shape == (len(branch), 2)
 
 
 def test_responses_of_a_system_share_its_field():
@@ -181,3 +255,23 @@ def test_responses_of_a_system_share_its_field():
     assert field_between(duffing_in_y(), ranges) is not field_between(system, ranges)
     one, other = (frequency_response(system, (0.6, 1.8), observe=("B", "y")) for _ in range(2))
     assert one.amplitude() == pytest.approx(other.amplitude(), rel=1e-14)
+
+
+def test_a_system_keeps_its_last_fields_as_long_as_it_lives():
+    system = duffing_in_y()
+    every = [(("drive.angular_frequency", (0.6, high)),) for high in (1.4, 1.5, 1.6, 1.7, 1.8)]
+    made = [field_between(system, ranges) for ranges in every]
+    assert field_between(system, every[1]) is made[1]
+    assert field_between(system, every[0]) is not made[0]
+    # The third was used least recently when the first was made again.
+    assert field_between(system, every[1]) is made[1]
+    assert field_between(system, every[2]) is not made[2]
+    # A copy with another drive has fields of its own, over its own values.
+    other = system.with_(**{"drive.amplitude_y": 0.3})
+    field = field_between(other, every[1])
+    assert field is not made[1]
+    assert field.system().parameter("drive.amplitude_y") == 0.3
+    gone = weakref.ref(system)
+    del system, other, field, made
+    gc.collect()
+    assert gone() is None

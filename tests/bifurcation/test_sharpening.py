@@ -27,14 +27,14 @@ from fecontact.cli.branch_results import branches_csv, special_table
 from fecontact.io import read_branch, write_branch
 
 
-def circle_branch(function, c, intervals, **accuracy):
+def circle_branch(function, c, intervals, state_tolerance=None, **accuracy):
     field = vector_field(function, {"lam": -0.2, "c": c}, 3)
     t = np.linspace(0.0, np.pi, 400)
     circle = np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
     return orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
-                        method=Collocation(intervals=intervals, state_tolerance=None, **accuracy),
-                        bounds=(-0.3, 0.3),
-                        scales=np.ones(3))
+                        method=Collocation(intervals=intervals, state_tolerance=state_tolerance,
+                                           **accuracy),
+                        bounds=(-0.3, 0.3), scales=np.ones(3))
 
 
 @pytest.mark.parametrize("intervals", [2, 3, 5])
@@ -216,6 +216,27 @@ def test_special_points_get_as_many_intervals_as_their_tolerance_needs():
     point, = circle_branch(moebius, 0.4, 4, tolerance=1e-12, most_intervals=16).special
     assert len(point.values["mesh"]) - 1 == 8
     assert point.parameter_error > 0.6e-12
+
+
+def test_checks_of_a_coefficient_end_at_16_times_the_least_intervals(monkeypatch):
+    """Where orbits needed more intervals than the least ones, at least one doubling is made."""
+    made = []
+    twice = sharpening._with_twice_the_intervals
+
+    def counted(problem, u, tangent):
+        made.append(2 * problem.intervals)
+        return twice(problem, u, tangent)
+
+    monkeypatch.setattr(sharpening, "_with_twice_the_intervals", counted)
+    monkeypatch.setattr(sharpening, "verdict", lambda coefficient, error: {
+        "coefficient": coefficient, "coefficient_error": error, "criticality": "undecided"})
+    for least, doublings in ((2, 1), (6, 2)):
+        made.clear()
+        point, = circle_branch(moebius, 0.4, least, tolerance=1.0, state_tolerance=1e-6).special
+        assert point.criticality == "undecided"
+        first = made[0] // 2
+        assert first > 2 * least
+        assert made == [2**k * first for k in range(1, doublings + 1)]
 
 
 def test_errors_of_folds_in_closed_form():

@@ -148,7 +148,10 @@ def _iterated(
             return u, problem.linearise(u) if exact else linearisation, count
         # With a matrix that is kept the error falls by about the same factor each time.
         falls = size / before if count > 1 else _SERVES
-        if kept is not None and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
+        # Behind a kink the next step may be no shorter.
+        known_next = size <= tolerance * scale or not problem.kinked
+        if (kept is not None and known_next
+                and size * falls <= max(0.1 * tolerance, 1e-13) * scale):
             return *_polished(problem, u, guess, row, exact), max(1, count - 2 - more)
         if problem.keeps_matrix:
             keeps = kept is None or falls <= _SERVES

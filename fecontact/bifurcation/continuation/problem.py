@@ -115,6 +115,11 @@ class Problem(Protocol):
     confirms: ClassVar[frozenset[str]] = frozenset()
     ends: ClassVar[Mapping[str, BranchStatus]] = {}
 
+    @property
+    def kinked(self) -> bool:
+        """Whether the equations may have kinks, where Newton's method suddenly converges slowly."""
+        return False
+
     def linearise(self, u: Array) -> Linearisation:
         """Linearise the equations at u.
 
@@ -256,7 +261,8 @@ class ContinuationOptions:
         The same for the second parameter of a curve over two.
     tolerance : float
         Newton's method ends with a step of this size relative to 1 + |u|; the remaining error is of
-        the order of its square. Special points and events are located to 1e-10.
+        the order of its square, where laws have kinks of the order of the tolerance. Special points
+        and events are located to 1e-10.
     iterations : int
         Newton steps before a step counts as failed.
     largest_turn : float

@@ -46,7 +46,7 @@ ROUGHLY, _REFINED = 1e-3, 1e-9
 _DISTANCES = (1e-3, 1e-2, 1e-4, 3e-2)
 # Largest number of points in one search.
 _MOST_POINTS = 30
-# Finest mesh for a coefficient, in intervals of the branch.
+# Finest mesh for a coefficient, in least intervals of the branch; one doubling is always made.
 _FINEST_MESH = 16
 # Relative change between two meshes at which a coefficient counts as converged.
 _CONVERGED = 1e-3
@@ -65,10 +65,11 @@ _SHORTER_DISTANCES = np.array([1.0, 1e-1, 1e-2, 1e-3, 1e-4])
 @dataclass(frozen=True)
 class Accuracy:
     """Error of the parameter up to which intervals are doubled, in widths of the diagram, and the
-    largest number of intervals.
+    least and the largest number of intervals of the branch.
     """
 
     tolerance: float
+    intervals: int
     most_intervals: int
 
 
@@ -135,7 +136,8 @@ class _Located:
         accuracy: Accuracy,
     ) -> None:
         self.kind, self.points, self.place = kind, points, place
-        self._tolerance, self._most = accuracy.tolerance * width, accuracy.most_intervals
+        self.least, self._most = accuracy.intervals, accuracy.most_intervals
+        self._tolerance = accuracy.tolerance * width
         self._rounding = _ROUNDING * width
         # Whether the last mesh has the point.
         self.found = True
@@ -237,7 +239,7 @@ def _judged(located: _Located, found: BranchPoint | None) -> dict[str, Any] | No
     The error of the coefficient is its last change from mesh to mesh, and at least half the change
     before: two meshes may agree by accident.
     """
-    most = _FINEST_MESH * located.intervals
+    most = max(_FINEST_MESH * located.least, 2 * located.intervals)
     coefficients = [] if found is None else [_normal_form(found)[0]]
     error, before, confirmed = float("nan"), float("inf"), False
     while 2 * located.intervals <= most:

@@ -46,7 +46,10 @@ def border_of(problem: EventOrbit, u: Array, condition: Condition) -> str:
         if phase.status[cluster] == STICK:
             return "adding-sliding"
         return "grazing-sliding" if condition.event % 2 == 0 else "lift-off"
-    if before.cluster() != cluster:
+    # An impact that stops the slip is an event of the cluster too.
+    stopped = (condition.what == CROSSING and before.strike is not None
+               and before.strike.modes[cluster] == STICK)
+    if before.cluster() != cluster and not stopped:
         return "corner"
     if condition.what == BEGIN and before.status[cluster] == released_sense(condition.event):
         return "grazing-sliding"

@@ -1,7 +1,8 @@
 """A contact system as a vector field of some of its parameters."""
 
+from collections import OrderedDict
 from collections.abc import Iterable, Mapping
-from functools import cached_property, lru_cache
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -20,7 +21,7 @@ from fecontact.system.nodes import SystemArrays
 _STEP = 2e-4
 # Smallest value for that step, relative to the base value.
 _LEAST_VALUE = 1e-3
-# Fields over ranges that are kept.
+# Fields over ranges that a system keeps.
 _KEPT = 4
 # Arrays that prescribe functions of time.
 _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "load_shapes",
@@ -139,15 +140,22 @@ class ContactField(VectorField):
         return row
 
 
-@lru_cache(maxsize=_KEPT)
 def field_between(
     system: ContactSystem, ranges: tuple[tuple[str, tuple[float, float]], ...]
 ) -> ContactField:
     """A system as a vector field of parameters, by their names, with ranges of their values.
 
-    Those that were made last are kept: responses of one system by several methods share one.
+    The system keeps those that were used last: its responses by several methods share one.
     """
-    return ContactField(ParametrisedSystem(system, [name for name, _ in ranges], dict(ranges)))
+    kept = vars(system).setdefault("_fields", OrderedDict())
+    found: ContactField | None = kept.pop(ranges, None)
+    if found is None:
+        found = ContactField(ParametrisedSystem(system, [name for name, _ in ranges],
+                                                dict(ranges)))
+    kept[ranges] = found
+    while len(kept) > _KEPT:
+        kept.popitem(last=False)
+    return found
 
 
 def affine_arrays(field: ContactField, values: Array, index: int) -> AffineArrays | None:

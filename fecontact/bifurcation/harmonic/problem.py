@@ -182,6 +182,11 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     keeps_matrix: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
+    @property
+    def kinked(self) -> bool:
+        """See :attr:`Problem.kinked`; vector fields that are no contact systems count as smooth."""
+        return self.compiled is not None and self.compiled.kinked
+
     def linearise(self, u: Array) -> HarmonicLinearisation:
         """Residual and linearisation at u, each computed on demand."""
         return self._about(u, True)

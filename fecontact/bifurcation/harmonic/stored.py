@@ -58,7 +58,15 @@ class StoredOrbits:
         """The values (K, ...) of a name."""
         if name not in self.known:
             self.known.update(self._made(name))
+            self._release()
         return self.known[name]
+
+    def _release(self) -> None:
+        """Drop what no value is left to be made from."""
+        if all(name in self.known for name in _ERRORS):
+            self.forces = self.mean = self.sizes = np.empty(0)
+        if all(name in self.known for name in self.names()):
+            self.X = self.z = np.empty(0)
 
     def _made(self, name: str) -> dict[str, Any]:
         layout, X = self.layout, self.X
@@ -83,7 +91,7 @@ class StoredOrbits:
 
 
 class StoredValues(Mapping[str, Any]):
-    """The values of one of several orbits."""
+    """The values of one of several orbits, to be read like a dict; copies and files hold a dict."""
 
     __slots__ = ("_index", "_orbits")
 
@@ -101,6 +109,16 @@ class StoredValues(Mapping[str, Any]):
 
     def __contains__(self, name: object) -> bool:
         return name in self._orbits.names()
+
+    def __or__(self, other: Mapping[str, Any]) -> dict[str, Any]:
+        return {**self, **other} if isinstance(other, Mapping) else NotImplemented
+
+    def __ror__(self, other: Mapping[str, Any]) -> dict[str, Any]:
+        return {**other, **self} if isinstance(other, Mapping) else NotImplemented
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Without what the values of the other orbits are made from.
+        return dict, (dict(self),)
 
     def __repr__(self) -> str:
         return repr(dict(self))

@@ -375,7 +375,7 @@ def _followed(
     if branch.points[-1].kind == HALVING and HALVING not in stops:
         branch = replace(branch, status=BranchStatus.CLOSED)
     points = list(branch.points)
-    accuracy = Accuracy(method.tolerance, int(method.most_intervals))
+    accuracy = Accuracy(method.tolerance, int(method.intervals), int(method.most_intervals))
     try:
         for index, point in enumerate(branch.points):
             if point.kind in SHARPENED:

@@ -70,8 +70,9 @@ class Equations(NamedTuple):
     are plain, of displacements and velocities in the plane alone, bounds of the branch, tolerance,
     largest step, largest turn, Newton's rounding, whether folds are located, whether all
     forces at rest have no mean; and of Newton's method the size of a second step over the square
-    of the first, negative if unknown, with the number of times it was relied on. ``limits`` (m,)
-    bound the scales of the displacements; ``nodes`` have internal variables.
+    of the first, negative if unknown, with the number of times it was relied on; and whether
+    contact forces may have kinks. ``limits`` (m,) bound the scales of the displacements; ``nodes``
+    have internal variables.
     """
 
     contact: SystemArrays
@@ -95,7 +96,7 @@ class Equations(NamedTuple):
 
 
 (TURN, PERIOD, LOW, HIGH, STEADY, PLAIN, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP,
- LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED) = range(16)
+ LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED, KINKS) = range(17)
 
 _blocks = types.Array(f8, 4, "C")
 ROOM = types.NamedTuple(

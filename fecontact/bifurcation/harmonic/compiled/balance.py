@@ -1,6 +1,7 @@
 """Equations of harmonic balance of contact systems in compiled code."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from fecontact.bifurcation.fields.parametrised_system import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
 from fecontact.core.types import Array
+from fecontact.laws.normal.bilateral import BilateralCubic
+from fecontact.system.contact_system import needs_friction
 from fecontact.system.nodes import SystemArrays
 
 # Most unknowns that compiled code without LAPACK solves for together.
@@ -90,7 +93,8 @@ class CompiledBalance:
     ) -> arrays.Equations:
         layout, series = problem.layout, problem.series
         m, L = layout.displacements, 2 * problem.harmonics + 1
-        numbers = np.zeros(arrays.TRUSTED + 1)
+        numbers = np.zeros(arrays.KINKS + 1)
+        numbers[arrays.KINKS] = self.kinked
         if problem.turn is not None:
             numbers[arrays.TURN] = problem.periods * problem.turn
         else:
@@ -149,10 +153,19 @@ class CompiledBalance:
             and np.may_share_memory(array, near.flat)
             for name, array in zip(near.arrays._fields, near.arrays, strict=True))
 
-
     def _plain(self, near: AffineArrays) -> bool:
         """Whether contact forces are those of plane bodies on ground of constant speed."""
         return not len(near.arrays.T2) and self.contact_field.system().prescribed_motion.constant
+
+    @cached_property
+    def kinked(self) -> bool:
+        """Whether contact forces may have kinks: all but those of cubic springs without friction.
+
+        Newton's method then need not converge as quickly as its last steps did.
+        """
+        system = self.contact_field.system()
+        return needs_friction(system.basis) or not all(
+            isinstance(law, BilateralCubic) for _, _, law in system.law_groups("normal"))
 
 
 def _affine(places: Array, found: Array) -> tuple[Array, Array]:

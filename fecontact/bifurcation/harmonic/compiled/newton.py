@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.arrays import (
+    KINKS,
     PLAIN,
     ROUNDING,
     SQUARE,
@@ -67,10 +68,11 @@ def _take_along(row, weights, T, tolerance, e):
 def _relies(size, scale, e):
     """Whether a first Newton step ends the iteration: the next one is known to be short enough.
 
-    It is proportional to the square of this one, where laws have no memory; the factor is that of
+    It is proportional to the square of this one, where forces have no kinks; the factor is that of
     steps before, measured again after some.
     """
-    if e.numbers[PLAIN] == 0.0 or not e.numbers[SQUARE] >= 0.0 or size > _SHORT * scale:
+    smooth = e.numbers[PLAIN] != 0.0 and e.numbers[KINKS] == 0.0
+    if not smooth or not e.numbers[SQUARE] >= 0.0 or size > _SHORT * scale:
         return False
     e.numbers[TRUSTED] += 1.0
     following = _MARGIN * e.numbers[SQUARE] * size * size
@@ -116,7 +118,9 @@ def corrected(u, guess, row, weights, e):
         if count == 2 and made == 1:
             e.numbers[SQUARE], e.numbers[TRUSTED] = size / (before * before), 0.0
         falls = size / before
-        if count > 1 and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
+        # Behind a kink the next step may be no shorter.
+        known = e.numbers[KINKS] == 0.0 or size <= tolerance * scale
+        if count > 1 and known and size * falls <= max(0.1 * tolerance, 1e-13) * scale:
             return made
         fresh = not fresh and falls > _SERVES
         before = size

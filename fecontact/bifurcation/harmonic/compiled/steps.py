@@ -240,6 +240,7 @@ def steps(u, tangent, bend, scales, e, out, why):
     out.step[0] = step
     if why[0] != BOUND and count > 0:
         _set_weights(out.scales[max(count - 2, 0)], H, weights)
-        while count > 0 and _exact(count - 1, row, weights, e, out) == 0:
+        while count > 0 and (out.folds[count - 1] == 1
+                             or _exact(count - 1, row, weights, e, out) == 0):
             count -= 1
     return count

@@ -139,10 +139,12 @@ class Strides:
             whole -= 1
         if whole == 0:
             return None
-        values = problem.stored(u, out.z[:made], out.forces[:made], out.mean[:made],
-                                out.scales[:made, :m], known)
-        points = branch_points(u[:whole], tangents[:whole], values[:whole], folds[:whole],
-                               header)
+        # What points keep is cut to the points that there are.
+        u, tangents = u[:whole].copy(), tangents[:whole].copy()
+        values = problem.stored(
+            u, *(each[:whole].copy() for each in (out.z, out.forces, out.mean, out.scales[:, :m])),
+            {name: column[:whole] for name, column in known.items()})
+        points = branch_points(u, tangents, values, folds[:whole], header)
         count = whole - sum(folds[:whole])
         if bound and whole == made:
             return Stride(points, count, problem, here, here, float(out.step[0]),
@@ -151,7 +153,11 @@ class Strides:
         scales = problem.scales.copy()
         scales[:m], scales[-1] = out.scales[last, :m], out.scales[last, m]
         grown = not np.array_equal(scales, problem.scales)
-        before = tangents[last - 1] if last else here.tangent
+        # The last step began at a regular point: folds lie within steps.
+        first = last - 1
+        while first >= 0 and folds[first]:
+            first -= 1
+        before = tangents[first] if first >= 0 else here.tangent
         bend = None if grown else (tangents[last] - before) / out.lengths[last]
         tangent = tangents[last]
         if grown:
@@ -161,14 +167,13 @@ class Strides:
             problem, reference=problem.coefficients(u[last]).copy(),
             values=problem.parameters(u[last]), scales=scales, before=(u[last], tangent),
             bend=bend)
-        tests = (_tests(problem, found[last] if found else None, tangent)
-                 if self.options.locate else {})
-        ends = [Solution(u[k], reached.linearise(u[k]), tangents[k], 0, values[k], tests)
-                for k in (last - 1, last) if k >= 0]
+        ends = [Solution(u[k], reached.linearise(u[k]), way, 0, values[k],
+                         _tests(problem, found[k] if found else None, way)
+                         if self.options.locate else {})
+                for k, way in ((first, before), (last, tangent)) if k >= 0]
         step = float(out.step[0]) if whole == made else float(min(
             1.5 * out.lengths[last], self.options.largest_step))
-        return Stride(points, count, reached, replace(ends[-1], tangent=tangent),
-                      ends[0] if last else here, step)
+        return Stride(points, count, reached, ends[-1], ends[0] if first >= 0 else here, step)
 
     def _before_start(
         self, problem: Any, here: Solution, start: Solution, u: Array, scales: Array,
