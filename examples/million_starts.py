@@ -10,7 +10,7 @@ Finished blocks of runs are kept in FOLDER: a computation that is ended, or kill
 there when it is started again. With --dask two workers of a Dask cluster do the work; here they are
 processes on this machine.
 
-Usage: python examples/million_starts.py [FOLDER] [--dask] [--quick]   (ten to fifteen minutes of two cores)
+Usage: python examples/million_starts.py [FOLDER] [--dask] [--quick]   (a quarter of an hour)
 """
 
 import contextlib
