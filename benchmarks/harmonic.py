@@ -5,10 +5,10 @@ frequency and time method with matrices, derivatives in closed form, Newton's me
 pseudo-arclength, for any M, C and K, and no stability, extremes or errors; fecontact makes the
 latter two when they are asked for, which is not in these times. Then a body of 20 modes on 40
 contact nodes beside collocation, with errors of the states at the first point relative to 25
-harmonics. Processor time per point, the least of five runs, of the body of one. Each run makes its
-system anew, with all that follows from it, and NumPy its matrices: nothing is left from a run
-before but compiled code. The modes of the body and the motion from which collocation starts are
-made before.
+harmonics. Processor time per point, the least of five runs, of the body of one. Each run has a
+system of its own, made before, as M, C and K are for NumPy: all that follows from them is made
+anew, and nothing is left from a run before but compiled code. The modes of the body and the motion
+from which collocation starts are made before, too.
 
 Usage: python benchmarks/harmonic.py [--quick]
 """
@@ -17,6 +17,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -169,12 +170,15 @@ def body(basis: fc.ModalBasis) -> fc.ContactSystem:
         drive=fc.Drive(stiffness_x=1e5, damping_x=30.0, amplitude_x=2e-4, angular_frequency=500.0))
 
 
-def least_time(task: Callable[[], object], rounds: int) -> tuple[float, object]:
-    """Least processor time of a task [s], and what it returns."""
+def least_time(
+    task: Callable[[Any], object], rounds: int, made: Callable[[], object] = object,
+) -> tuple[float, Any]:
+    """Least processor time of a task [s] with what is made before each round; what it returns."""
     best, result = np.inf, None
     for _ in range(rounds):
+        given = made()
         start = time.process_time()
-        result = task()
+        result = task(given)
         best = min(best, time.process_time() - start)
     return best, result
 
@@ -189,7 +193,7 @@ def oscillator(name: str, rounds: int, points: int) -> None:
         bounds, damping, force, largest = (1.0, 1.5), 0.02, 1.0, 16.0 / points
     load = np.zeros(2 * HARMONICS + 1)
     load[2] = force
-    spent, found = least_time(lambda: Numpy(
+    spent, found = least_time(lambda _: Numpy(
         samples, np.eye(1), damping * np.eye(1), np.eye(1), load,
         [(np.ones(1), element)]).follow(*bounds, 0.01, largest), rounds)
     numpy_each = 1e6 * spent / len(found)
@@ -200,8 +204,9 @@ def oscillator(name: str, rounds: int, points: int) -> None:
         for count in (points, 5 * points):
             options = ContinuationOptions(points=10_000, largest_step=4.6 / count
                                           if name == "Duffing" else 4.0 / count, step=1e-3)
-            spent, response = least_time(lambda method=method, options=options: frequency_response(
-                system(), bounds, observe=observe, method=method, options=options), rounds)
+            spent, response = least_time(
+                lambda made, method=method, options=options: frequency_response(
+                    made, bounds, observe=observe, method=method, options=options), rounds, system)
             branch = response.branches[0]
             each = 1e6 * spent / len(branch)
             off = np.abs(response.harmonic(1)).max() / peak - 1.0
@@ -235,12 +240,12 @@ def table_of_body(points: int, intervals: tuple[int, ...]) -> None:
     exact = response(25, None, 2)
     start = exact.points[0].orbit(contact_field(body(basis), ["drive.angular_frequency"]))
     for stability in (None, "transitions"):
-        spent, branch = least_time(lambda stability=stability: response(HARMONICS, stability), 1)
+        spent, branch = least_time(lambda _, stability=stability: response(HARMONICS, stability), 1)
         print(f"harmonic balance {stability or 'no stability':14s} {len(branch):4d} points "
               f"{1e3 * spent / len(branch):7.2f} ms a point, {spent:5.2f} s in all, error "
               f"{largest_error(branch, exact, 20):.1e}", flush=True)
     for count in intervals:
-        spent, branch = least_time(lambda count=count: collocated(count), 1)
+        spent, branch = least_time(lambda _, count=count: collocated(count), 1)
         print(f"collocation      {count:3d} intervals  {len(branch):4d} points "
               f"{1e3 * spent / len(branch):7.2f} ms a point, {spent:5.2f} s in all, error "
               f"{largest_error(branch, exact, 20):.1e}", flush=True)

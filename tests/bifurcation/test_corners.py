@@ -157,11 +157,13 @@ def test_few_samples_pass_the_onset_of_slip():
     """Coarse samples give a branch with corners, some of which lead back: none may stall it."""
     amplitudes = []
     for samples in (64, 128, 1024):
-        response = frequency_response(stiff_jenkins(), (0.5, 10.0),
-                                      method=HarmonicBalance(5, samples, stability=None))
-        branch = response.branches[0]
+        method = HarmonicBalance(5, samples, stability=None)
+        branch = frequency_response(stiff_jenkins(), (0.5, 10.0), method=method).branches[0]
         assert branch.status is BranchStatus.BOUND
         assert len(branch) < 500
-        amplitudes.append(response.amplitude().max())
+        # The largest amplitude by steps that do not depend on how the corners are passed.
+        short = ContinuationOptions(largest_step=0.02, points=2000)
+        amplitudes.append(frequency_response(
+            stiff_jenkins(), (0.5, 10.0), method=method, options=short).amplitude().max())
     assert amplitudes[0] == pytest.approx(amplitudes[2], rel=1.2e-2)
     assert amplitudes[1] == pytest.approx(amplitudes[2], rel=5e-3)
