@@ -34,6 +34,10 @@ EXAMPLES = {
                                    (r"largest difference (\S+)$", 0.0, 1e-7),
                                    (r"^grazing-sliding at V = (\S+)", 1.191452, 1e-5)],
                         {"out/sliding_borders.png"}),
+    # Shares of the two orbits beside each other.
+    "million_starts": ((), [(r"^  periodic, 2 states: (\S+) %", 81.64, 0.5),
+                            (r"^  periodic, 1 states: (\S+) %", 18.36, 0.5)],
+                       {"million_starts.png", "hundred_thousand_frequencies.png"}),
     "stacked_blocks": ((), [(r"^matching meshes: stress to (\S+) of", 0.0, 1e-11),
                             (r"5 segments: stress to (\S+) of", 0.0, 1e-11)], set()),
     "colliding_bars": ((), [(r"^1 m on 1 m: restitution (\S+) ", 0.99793, 2e-3),

@@ -157,6 +157,13 @@ def blades(folder: Path) -> dict[str, Path]:
     return {"blade_pair": folder / "blade_pair.png"}
 
 
+def many_runs(folder: Path) -> dict[str, Path]:
+    """A million starts and a hundred thousand frequencies of an impact oscillator."""
+    example(folder, "million_starts")
+    return {name: folder / f"{name}.png"
+            for name in ("million_starts", "hundred_thousand_frequencies")}
+
+
 def modes(folder: Path) -> dict[str, Path]:
     """Nonlinear modes of a beam with a damper, and of two masses."""
     example(folder, "nonlinear_modes", ".")
@@ -170,7 +177,7 @@ MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
     responses: ("friction_damper_response", "hardening_response"),
-    blades: ("blade_pair",),
+    blades: ("blade_pair",), many_runs: ("million_starts", "hundred_thousand_frequencies"),
     modes: ("damped_beam_mode", "damped_beam_responses", "internal_resonance")}
 
 
