@@ -106,6 +106,16 @@ def test_motions_are_told_apart_as_step_by_step():
             assert one.share == counts[rank] / runs
 
 
+@pytest.mark.parametrize(("apart", "motions"), [(1.98e-3, 1), (2.02e-3, 2)])
+def test_motions_are_the_same_within_twice_the_tolerance(apart, motions):
+    x = np.ones((2, 8, 1))
+    x[1] += apart
+    labels, found = told_apart(
+        [lambda: Settled(x, np.full(2, 8), np.zeros(2, dtype=np.int64))], np.ones(1), 1e-3)
+    assert len(found) == motions
+    assert labels.max() == motions - 1
+
+
 def test_a_motion_has_its_least_period():
     """Runs that have not quite settled repeat after two periods; those that have, after one."""
     x = np.ones((3, 8, 1))

@@ -90,8 +90,9 @@ def test_runs_in_the_tables_of_another_are_those_of_fresh_ones():
         assert steps == run.statistics["steps"]
 
 
-@pytest.mark.parametrize("options", [{"vary": True}, {"events": (ContactEvents(),)}])
-def test_runs_with_derivatives_or_events_are_not_begun_again(options):
+@pytest.mark.parametrize("options", [
+    {"vary": True, "work": False}, {"events": (ContactEvents(),), "work": False}, {"work": True}])
+def test_runs_with_powers_derivatives_or_events_are_not_begun_again(options):
     system = impact_oscillator(modes=2)
     run = driver.start(system, np.zeros(4), np.array([0.0, 0.1]), rtol=1e-6, **options)
     with pytest.raises(AssertionError):

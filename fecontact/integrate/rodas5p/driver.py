@@ -124,21 +124,20 @@ def start(
 
 
 def again(run: Run, system: ContactSystem, state: Array) -> Run:
-    """The run anew from another state of its system, without derivatives and watched events.
+    """The run anew from another state of its system, without powers, derivatives and events.
 
     It shares the room to work in, and its tables, with the run before, which must have ended.
     """
-    # Columns, and what is watched for, would go on from where that run has left them.
+    # Columns, and what is watched for, would go on from where that run has left them; the scale of
+    # energies is that of its start.
+    control = run.problem.control
     assert not len(run.variation.variation.columns)
     assert not run.watch.note
+    assert not control.work
     _require_finite(state)
-    control = run.problem.control
-    if control.work:
-        control = control._replace(energy_scale=_energy_scale(system, state))
     output = run.output
     return Run(
-        run.problem._replace(control=control),
-        _progress(system, control, float(run.times[0]), state), run.room,
+        run.problem, _progress(system, control, float(run.times[0]), state), run.room,
         Output(output.times, np.zeros_like(output.states), np.zeros_like(output.work)),
         run.variation, run.watch,
         None if run.series is None else from_state(run.series, system, state))
@@ -147,11 +146,6 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
 def _require_finite(state: Array) -> None:
     if not np.isfinite(state).all():
         raise InputError("The initial state holds values that are not finite.")
-
-
-def _energy_scale(system: ContactSystem, state: Array) -> float:
-    with np.errstate(over="ignore", invalid="ignore"):
-        return energy_scale(system, state)
 
 
 def _progress(system: ContactSystem, control: Control, time: float, state: Array) -> Progress:
@@ -188,6 +182,8 @@ def control_for(
         untouched[nodes] = law.untouched(nodes.stop - nodes.start)
     # What friction remembers fades without force.
     untouched[system.arrays.memory > 0] = -np.inf
+    with np.errstate(over="ignore", invalid="ignore"):
+        energy = energy_scale(system, state) if work else np.inf
     return Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
@@ -195,8 +191,7 @@ def control_for(
         breaks=np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
         levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
-        speed_scale=system.velocity_scale,
-        energy_scale=_energy_scale(system, state) if work else np.inf,
+        speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), unfelt=first_unfelt.address)
 
 
