@@ -71,7 +71,8 @@ class Basins:
     first, second : (a,), (b,) arrays
         Values along the two axes of the plane.
     label : (a, b) array
-        Index into ``attractors``; -1 where a run could not go on or had not settled.
+        Index into ``attractors``; -1 where a run could not go on, or had not settled: its last
+        states come ever closer to a periodic motion, but do not repeat within the tolerance.
     attractors : tuple of Attractor
         In the order of their shares, the largest first.
     """

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import numpy as np
 from numba import types
 
 from fecontact.core.compiled import block, f8, helper, i8, integers, kernel, vector
@@ -9,6 +10,10 @@ from fecontact.core.types import Array, Integers
 
 EQUILIBRIUM, PERIODIC, APERIODIC = range(3)
 _BOX = 0.2  # part of their size by which boxes of the same aperiodic motion may differ
+# Of a motion that still settles, what is left between repeats: the most in each third of its
+# points in parts of that in the third before, and in the last in parts of their box.
+# Of fewer repeats than twelve, chaos might look so by chance.
+_DECAY, _LEFT, _FEWEST = 0.7, 0.05, 12
 
 
 class Settled(NamedTuple):
@@ -69,6 +74,30 @@ def _period(points, count, scale, tolerance):
 
 
 @helper
+def _settles(points, count, scale):
+    """Whether the points come ever closer to a repetition, after some number of them."""
+    largest = 0.0
+    for i in range(len(scale)):
+        low, high = points[0, i], points[0, i]
+        for k in range(count):
+            low, high = min(low, points[k, i]), max(high, points[k, i])
+        largest = max(largest, (high - low) / scale[i])
+    for period in range(1, min(count // 4, count - _FEWEST) + 1):
+        pairs = count - period
+        decays, before, apart = True, np.inf, 0.0
+        for third in range(3):
+            apart = 0.0
+            for k in range(third * pairs // 3, (third + 1) * pairs // 3):
+                for i in range(len(scale)):
+                    apart = max(apart, abs(points[k + period, i] - points[k, i]) / scale[i])
+            decays = decays and apart < _DECAY * before
+            before = apart
+        if decays and apart < _LEFT * largest:
+            return True
+    return False
+
+
+@helper
 def _all_near(one, first, last, other, begin, end, scale, most):
     """Whether every point of one is near a point of the other."""
     for k in range(first, last):
@@ -113,7 +142,10 @@ def _keep(points, first, last, kind, p, motions):
 
 @kernel(i8(i8, FOUND, vector, f8, integers, MOTIONS))
 def label_runs(first, found, scale, tolerance, label, motions):
-    """Label runs from ``first`` on, and add the motions that are new; the run reached."""
+    """Label runs from ``first`` on, and add the motions that are new; the run reached.
+
+    Runs that could not go on, or still settle, have label -1.
+    """
     for e in range(first, len(found.rows)):
         last = found.rows[e]
         label[e] = -1
@@ -123,6 +155,8 @@ def label_runs(first, found, scale, tolerance, label, motions):
         if not found.still[e]:
             period = _period(points, last, scale, tolerance)
             kind = PERIODIC if period > 0 else APERIODIC
+            if period == 0 and _settles(points, last, scale):
+                continue
         begin = last - period if period > 0 else 0
         for p in range(motions.number[0]):
             other, count = motions.points[p], motions.rows[p]
