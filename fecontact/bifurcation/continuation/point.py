@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 # Coefficients of points of codimension two, in the order in which they are stored.
 _NORMAL_FORMS: Mapping[str, tuple[str, ...]] = {
     "cusp": ("c",), "Bautin": ("l2",), "Bogdanov-Takens": ("a", "b"),
-    "zero-Hopf": ("b", "c", "d", "e"), "double Hopf": ("p11", "p12", "p21", "p22")}
+    "zero-Hopf": ("b", "c", "d", "e"), "double Hopf": ("p11", "p12", "p21", "p22"),
+    "generalised period doubling": ("e",), "Chenciner": ("d",), "resonance 1:1": ("a", "b"),
+    "resonance 1:2": ("c", "d"), "resonance 1:3": ("b", "c"), "resonance 1:4": ("a", "b", "d"),
+    "fold-flip": ("b", "c", "d", "e"), "fold-Neimark-Sacker": ("b", "c", "d", "e"),
+    **dict.fromkeys(("flip-Neimark-Sacker", "double Neimark-Sacker"),
+                    ("p11", "p12", "p21", "p22"))}
 
 
 @dataclass(frozen=True, eq=False)
