@@ -68,7 +68,7 @@ def orbit_form(
     multipliers = form.multipliers(_on_circle(pair), _on_circle(beside))
     try:
         manifold = CentreManifold(problem, u, linearised, multipliers, form.chain)
-        value, error = agreed(manifold, form.order, form.formula)
+        value, error, _ = agreed(manifold, form.order, form.formula)
     except (FecontactError, np.linalg.LinAlgError):
         return {}
     return {"normal_form": value, "normal_form_error": error} if np.isfinite(value).any() else {}
@@ -76,23 +76,23 @@ def orbit_form(
 
 def agreed(
     manifold: CentreManifold, order: int, formula: Callable[[Series], list[float]]
-) -> tuple[Array, Array]:
-    """Coefficients of a series, from the two radii that agree best, and their difference."""
-    values: list[Array] = []
-    pairs: list[tuple[float, Array, Array]] = []
+) -> tuple[Array, Array, Series]:
+    """Coefficients of a series from the two radii that agree best, their difference, the series."""
+    before: Array | None = None
+    pairs: list[tuple[float, Array, Array, Series]] = []
     with np.errstate(all="ignore"):
         for radius in _RADII:
-            values.append(np.array(formula(manifold.series(order, radius))))
-            if len(values) < 2:
-                continue
-            error = np.abs(values[-1] - values[-2])
-            size = np.nanmax(np.abs(values[-1]))
-            relative = float(np.nanmax(error) / size) if size > 0.0 else 0.0
-            pairs.append((relative if np.isfinite(relative) else np.inf, values[-1], error))
-            if relative < _AGREEMENT:
-                break
-    _, value, error = min(pairs, key=lambda one: one[0])
-    return value, error
+            series = manifold.series(order, radius)
+            value = np.array(formula(series))
+            if before is not None:
+                error = np.abs(value - before)
+                size = np.nanmax(np.abs(value))
+                relative = float(np.nanmax(error) / size) if size > 0.0 else 0.0
+                pairs.append((relative if np.isfinite(relative) else np.inf, value, error, series))
+                if relative < _AGREEMENT:
+                    break
+            before = value
+    return min(pairs, key=lambda one: one[0])[1:]
 
 
 def _on_circle(multiplier: complex) -> complex:
