@@ -23,8 +23,9 @@ from fecontact.system.fields.vector_field import VectorField
 # Width about such an orbit, and steps, for folds.
 _ABOUT = 0.3
 _SEARCH = ContinuationOptions(step=1e-3, largest_step=0.02, points=200, stop_at=("fold",))
-# Angles of e at which orbits of three periods are followed to folds, from that opposite to c.
-_ANGLES = np.pi * np.array([1.0, 0.75, -0.75, 0.5, -0.5])
+# Angles from c to e at which orbits of three periods are followed to folds; opposite to c the folds
+# are far.
+_ANGLES = np.pi * np.array([0.0, 0.5, -0.5, 0.75, -0.75])
 
 
 def folds_at_quarter(
@@ -50,12 +51,12 @@ def folds_at_quarter(
         raise AnalysisError(f"{point.place}: no folds of orbits of four periods begin there; its "
                             f"normal form has |C / D| = {abs(C / D):.4g}, and must exceed 1.")
     towards = at.towards(-C)
+    place = int(abs(towards[0]) > abs(towards[1]))
     turn = np.exp(0.25j * np.angle(D / C))
     last: FecontactError | None = None
     for away in AWAY:
         shift = away * towards
         size = float(np.sqrt(abs(at.exponent(shift)) / (abs(C) + abs(D))))
-        place = int(abs(towards[1]) > abs(towards[0]))
         try:
             branch = _followed(at, at.motion(shift, size * turn), place)
         except FecontactError as error:
@@ -84,7 +85,7 @@ def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> Fol
     at = StrongResonance(field, point, parameter, 3)
     last: FecontactError | None = None
     for angle in _ANGLES:
-        towards = at.towards(at.c * np.exp(1j * (angle - np.pi)))
+        towards = at.towards(at.c * np.exp(1j * angle))
         place = int(abs(towards[1]) > abs(towards[0]))
         for away in AWAY:
             try:
@@ -97,6 +98,7 @@ def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> Fol
             found: list[FoldPoint] = branch.of_kind("fold")
             if found:
                 return min(found, key=lambda end: abs(end.parameter - float(at.u[place - 2])))
+            break
     raise AnalysisError(f"{point.place}: no fold of orbits of three periods was found beside it; "
                         f"follow these with orbit_branch(field, point), which surround it as "
                         f"saddles, and start from a fold of theirs.") from last

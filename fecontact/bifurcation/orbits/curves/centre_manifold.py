@@ -31,6 +31,8 @@ _MORE, _OVER = 3, 3
 _AT_ONCE = 2_000_000
 # Least range of a state, in the largest one in the scales of the orbit.
 _LEAST_RANGE = 0.1
+# Range of an orbit at rest, in the scales of the states.
+_AT_REST = 1e-6
 
 Powers = tuple[int, ...]
 
@@ -66,8 +68,10 @@ class CentreManifold:
         self._h = np.repeat(problem.widths, problem.degree)[:, None]
         nodes = problem.nodes(u)
         scales = problem.scales[: nodes.shape[1]]
-        range_ = np.ptp(nodes, axis=0) / scales
-        self._span = np.maximum(range_, _LEAST_RANGE * range_.max()) * scales
+        size = np.ptp(nodes, axis=0) / scales
+        # A forced orbit may be at rest.
+        most = size.max() if size.max() > _AT_REST else 1.0
+        self._span = np.maximum(size, _LEAST_RANGE * most) * scales
         self._known: dict[int, _Closing] = {}
         self._drive = _reduced(linearised, self._h * self._velocity)
         self.vectors: list[ComplexArray] = []
@@ -82,8 +86,15 @@ class CentreManifold:
             else:
                 self._linear.append(self._closing(multiplier).critical(self))
         weights = np.tile(problem.rule.weights, problem.intervals)[:, None] * self._h
-        first = [self._linear[0 if chain else place][0] for place in range(len(self.multipliers))]
-        self.sizes = np.array([np.sqrt(np.sum(weights * np.abs(h / scales) ** 2)) for h in first])
+        sizes = []
+        for place, multiplier in enumerate(self.multipliers):
+            h = self._linear[0 if chain else place][0]
+            if self._closing(multiplier).drifts:
+                # It is free along the orbit: at right angles to it, as in the phase condition.
+                along = np.sum(weights * h * self._velocity) / np.sum(weights * self._velocity**2)
+                h = h - along * self._velocity
+            sizes.append(np.sqrt(np.sum(weights * np.abs(h / scales) ** 2)))
+        self.sizes = np.array(sizes)
 
     def series(self, order: int, radius: float) -> "Series":
         """The series up to an order, residuals being fitted over amplitudes up to a radius."""
