@@ -286,6 +286,8 @@ def _both_halves(
     for side in (1.0, -1.0):
         try:
             halves.append(go(side, replace(options, points=max(options.points // 2, 2))))
+            if point is None and halves[-1].status is BranchStatus.CLOSED:
+                return halves[-1]
         except FecontactError as error:
             halves.append(None)
             failed = error
