@@ -95,7 +95,7 @@ def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> Fol
                 continue
             if is_single(branch.points[0], 3):
                 continue
-            found: list[FoldPoint] = branch.of_kind("fold")
+            found = branch.of_kind("fold")
             if found:
                 return min(found, key=lambda end: abs(end.parameter - float(at.u[place - 2])))
             break

@@ -155,7 +155,7 @@ def half(t, x, p, out):
 
 
 def test_resonance_1_2():
-    curve, (point,) = found(half, 3, "k", "Neimark-Sacker", "lam", "resonance 1:2", lam=-0.25)
+    _, (point,) = found(half, 3, "k", "Neimark-Sacker", "lam", "resonance 1:2", lam=-0.25)
     close(point, c=-1.2 * HALF * np.pi, d=0.7 * HALF)
     field = vector_field(half, {"lam": -0.25, "k": -0.4}, 3)
     doublings = codim2_curve(field, point, "lam", bounds=BOX)

@@ -45,19 +45,20 @@ def expand_open(factors: CondensedFactors, start: Array, end: Array) -> Array:
     return out
 
 
-def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> Array:
+def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> ComplexArray:
     """All nodes (N m d,) with x(1) = closing x(0), the common unknowns zero.
 
     ``rhs`` (N m d,) are the right-hand sides of the collocation rows; both are complex.
     """
     d = len(factors.end)
     reduced, side = open_side(factors, rhs)
-    start = np.linalg.solve(factors.end[:, :d] + closing * factors.end[:, d : 2 * d], side)
+    start = np.asarray(np.linalg.solve(
+        factors.end[:, :d] + closing * factors.end[:, d : 2 * d], side), dtype=complex)
     return open_solution(factors, reduced, start, closing * start)
 
 
 def open_side(factors: CondensedFactors, rhs: Array) -> tuple[ComplexArray, ComplexArray]:
-    """Right-hand sides (N m d,), complex, over the pivot rows and for the rows of both ends (d,)."""
+    """Complex right-hand sides (N m d,) over the pivot rows, and for the rows of both ends (d,)."""
     parts = [np.array(part, dtype=float) for part in (np.real(rhs), np.imag(rhs))]
     reduced, side = np.empty((2, pivot_rows(factors))), np.empty((2, len(factors.end)))
     for place, part in enumerate(parts):

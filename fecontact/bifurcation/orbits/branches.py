@@ -285,9 +285,10 @@ def _both_halves(
     failed: FecontactError = InputError("There is nothing to start from.")
     for side in (1.0, -1.0):
         try:
-            halves.append(go(side, replace(options, points=max(options.points // 2, 2))))
-            if point is None and halves[-1].status is BranchStatus.CLOSED:
-                return halves[-1]
+            half = go(side, replace(options, points=max(options.points // 2, 2)))
+            if point is None and half.status is BranchStatus.CLOSED:
+                return half
+            halves.append(half)
         except FecontactError as error:
             halves.append(None)
             failed = error

@@ -15,13 +15,17 @@ fitted to its values at amplitudes up to a radius.
 
 from collections.abc import Sequence
 from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.bordered import open_side, open_solution
 from fecontact.bifurcation.orbits.curves.singularity import at_points
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
-from fecontact.core.types import Array, ComplexArray
+
+Array = NDArray[Any]
+Powers = tuple[int, ...]
 
 # Distance of products of multipliers from a multiplier up to which they are the same.
 _SAME = 1e-6
@@ -34,11 +38,17 @@ _LEAST_RANGE = 0.1
 # Range of an orbit at rest, in the scales of the states.
 _AT_REST = 1e-6
 
-Powers = tuple[int, ...]
+
+class Linear(NamedTuple):
+    """Solution h (N m, d) of linear equations at the Gauss points, its slope h', and a."""
+
+    h: Array
+    slope: Array
+    drift: complex
 
 
 class CentreManifold:
-    """Critical vectors of an orbit, and the series in their amplitudes.
+    """Critical vectors of an orbit; see :class:`Series` for what follows from them.
 
     Parameters
     ----------
@@ -51,156 +61,144 @@ class CentreManifold:
 
     Attributes
     ----------
+    linear : list of Linear
+        The critical vectors, as long as the range of the states allows, so that amplitudes up to
+        one are those of the orbit's surroundings.
     sizes : (k,) array
-        Root of the mean square of each vector in scaled states. Vectors are as long as the range
-        of the states allows, so that amplitudes up to one are those of the orbit's surroundings.
+        Root of the mean square of each in scaled states, of the first one along a chain.
     """
 
     def __init__(
         self, problem: Discretisation, u: Array, linearised: CollocationLinearisation,
         multipliers: Sequence[complex], chain: bool = False,
     ) -> None:
-        self._problem, self._at, self._values = problem, linearised, problem.parameters(u)
-        self.multipliers, self._chain = tuple(complex(one) for one in multipliers), chain
-        self._x, self._T = problem.at_gauss_points(problem.nodes(u))[0], linearised.period
-        rates, self._J, _ = linearised.derivatives
-        self._velocity = self._T * rates
-        self._h = np.repeat(problem.widths, problem.degree)[:, None]
+        self.problem, self.at, self.values = problem, linearised, problem.parameters(u)
+        self.multipliers, self.chain = tuple(complex(one) for one in multipliers), chain
         nodes = problem.nodes(u)
+        self.x, self.period = problem.at_gauss_points(nodes)[0], linearised.period
+        rates, self.jacobian, _ = linearised.derivatives
+        self.velocity = self.period * rates
+        self.widths = np.repeat(problem.widths, problem.degree)[:, None]
         scales = problem.scales[: nodes.shape[1]]
         size = np.ptp(nodes, axis=0) / scales
         # A forced orbit may be at rest.
         most = size.max() if size.max() > _AT_REST else 1.0
-        self._span = np.maximum(size, _LEAST_RANGE * most) * scales
-        self._known: dict[int, _Closing] = {}
-        self._drive = _reduced(linearised, self._h * self._velocity)
-        self.vectors: list[ComplexArray] = []
-        self._linear: list[tuple[ComplexArray, ComplexArray, complex]] = []
+        self.span = np.maximum(size, _LEAST_RANGE * most) * scales
+        self._known: dict[tuple[int, int], _Closing] = {}
+        self.linear: list[Linear] = []
         for place, multiplier in enumerate(self.multipliers):
-            if place and self._is_conjugate(place):
-                h, dh, a = self._linear[-1]
-                self._linear.append((h.conj(), dh.conj(), a.conjugate()))
+            if self.is_conjugate(place):
+                h, slope, drift = self.linear[-1]
+                self.linear.append(Linear(h.conj(), slope.conj(), drift.conjugate()))
             elif chain and place:
-                before = self._linear[0][0]
-                self._linear.append(self._closing(multiplier).next_in_chain(self, -before))
+                self.linear.append(self.closing(multiplier).next_in_chain(-self.linear[0].h))
             else:
-                self._linear.append(self._closing(multiplier).critical(self))
-        weights = np.tile(problem.rule.weights, problem.intervals)[:, None] * self._h
-        sizes = []
-        for place, multiplier in enumerate(self.multipliers):
-            h = self._linear[0 if chain else place][0]
-            if self._closing(multiplier).drifts:
-                # It is free along the orbit: at right angles to it, as in the phase condition.
-                along = np.sum(weights * h * self._velocity) / np.sum(weights * self._velocity**2)
-                h = h - along * self._velocity
-            sizes.append(np.sqrt(np.sum(weights * np.abs(h / scales) ** 2)))
-        self.sizes = np.array(sizes)
+                self.linear.append(self.closing(multiplier).critical())
+        self.sizes = np.array([self._size(self.linear[0 if chain else place].h, multiplier)
+                               for place, multiplier in enumerate(self.multipliers)])
 
-    def series(self, order: int, radius: float) -> "Series":
-        """The series up to an order, residuals being fitted over amplitudes up to a radius."""
-        return Series(self, order, radius)
-
-    def _is_conjugate(self, place: int) -> bool:
+    def is_conjugate(self, place: int) -> bool:
         """Whether an amplitude is the conjugate of the one before."""
         one = self.multipliers[place]
-        return abs(one.imag) > _SAME and one.imag == -self.multipliers[place - 1].imag
+        return (place > 0 and abs(one.imag) > _SAME
+                and one.imag == -self.multipliers[place - 1].imag)
 
-    def _closing(self, closing: complex) -> "_Closing":
-        """Equations for h(1) = closing h(0), made once."""
-        key = hash(complex(round(closing.real / _SAME), round(closing.imag / _SAME)))
+    def closing(self, multiplier: complex) -> "_Closing":
+        """Equations for h(1) = multiplier h(0), made once."""
+        key = round(multiplier.real / _SAME), round(multiplier.imag / _SAME)
         if key not in self._known:
-            near = [one for one in self.multipliers if abs(one - closing) < _SAME]
-            self._known[key] = _Closing(self, near[0] if near else closing, bool(near))
+            near = [one for one in self.multipliers if abs(one - multiplier) < _SAME]
+            self._known[key] = _Closing(self, near[0] if near else multiplier, bool(near))
         return self._known[key]
+
+    def _size(self, h: Array, multiplier: complex) -> float:
+        weights = np.tile(self.problem.rule.weights, self.problem.intervals)[:, None] * self.widths
+        if self.closing(multiplier).drifts:
+            # It is free along the orbit: at right angles to it, as in the phase condition.
+            along = np.sum(weights * h * self.velocity) / np.sum(weights * self.velocity**2)
+            h = h - along * self.velocity
+        scales = self.problem.scales[: h.shape[1]]
+        return float(np.sqrt(np.sum(weights * np.abs(h / scales) ** 2)))
 
 
 class _Closing:
-    """Linear equations h' - A h = r - a x' - g v with h(1) = c h(0) at one closing c."""
+    """Linear equations h' - A h = r - a x' - g v with h(1) = c h(0) at one closing c.
 
-    def __init__(self, of: CentreManifold, closing: complex, critical: bool) -> None:
-        factors, d = of._at.factors, len(of._at.factors.end)
-        self.closing, self._of, self.critical_ = closing, of, critical
-        self.drifts = of._problem.autonomous and abs(closing - 1.0) < _SAME
+    ``resonant`` says whether c is the multiplier of an amplitude, where they are singular.
+    """
+
+    def __init__(self, of: CentreManifold, closing: complex, resonant: bool) -> None:
+        factors, d = of.at.factors, len(of.at.factors.end)
+        self._of, self._closing, self.resonant = of, closing, resonant
+        self.drifts = of.problem.autonomous and abs(closing - 1.0) < _SAME
         self._balance = 1.0 / np.abs(factors.end[:, : 2 * d]).max(axis=1)
+        base = np.zeros((d + self.drifts, d + self.drifts), dtype=complex)
         matrix = factors.end[:, :d] + closing * factors.end[:, d : 2 * d]
-        size = d + self.drifts
-        base = np.zeros((size, size), dtype=complex)
         base[:d, :d] = matrix * self._balance[:, None]
         if self.drifts:
-            base[:d, d] = of._drive[1] * self._balance
-            row = of._velocity[0] / of._span**2
-            base[d, :d] = row / np.linalg.norm(row)
+            drive = _reduced(of.at, of.widths * of.velocity)[1] * self._balance
             # As large as other columns.
-            self._drift_unit = 1.0 / np.linalg.norm(base[:d, d])
-            base[:d, d] *= self._drift_unit
+            self._drift_unit = 1.0 / np.linalg.norm(drive)
+            base[:d, d] = drive * self._drift_unit
+            row = of.velocity[0] / of.span**2
+            base[d, :d] = row / np.linalg.norm(row)
         self._base = base
-        self._null: Array | None = None
-        self._left: Array | None = None
-        if critical:
+        if resonant:
             lefts, _, rights = np.linalg.svd(base)
             self._null, self._left = rights[-1].conj(), lefts[:, -1]
 
-    def critical(self, of: CentreManifold) -> tuple[ComplexArray, ComplexArray, complex]:
-        """The critical vector, its slope and the change of the phase's speed with it."""
-        assert self._null is not None
-        if abs(self.closing.imag) < _SAME:
+    def critical(self) -> Linear:
+        """The critical vector."""
+        if abs(self._closing.imag) < _SAME:
             place = int(np.argmax(np.abs(self._null)))
             self._null = self._null * np.exp(-1j * np.angle(self._null[place]))
-        zero = np.zeros_like(of._x, dtype=complex)
-        h, _, _ = self._expanded(of, zero, self._null, 0.0, None)
-        self._null = self._null / np.abs(h / of._span).max()
-        return self._expanded(of, zero, self._null, 0.0, None)
+        nothing = np.zeros_like(self._of.x, dtype=complex)
+        h, _, _ = self._expanded(nothing, self._null)
+        self._null = self._null / np.abs(h / self._of.span).max()
+        return self._expanded(nothing, self._null)
 
-    def next_in_chain(
-        self, of: CentreManifold, rhs: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray, complex]:
+    def next_in_chain(self, rhs: Array) -> Linear:
         """The solution at right angles to the critical vector, where there is one."""
-        assert self._left is not None
-        found = self._solved(of, rhs, self._left)
-        return self._expanded(of, rhs, found[:-1], 0.0, None)
+        return self._expanded(rhs, self._bordered(rhs, self._left)[:-1])
 
-    def solve(
-        self, of: CentreManifold, rhs: ComplexArray, vector: ComplexArray | None
-    ) -> tuple[ComplexArray, ComplexArray, complex, complex]:
-        """h and h' at the Gauss points, a and g, the multiple of the vector."""
+    def solve(self, rhs: Array, vector: Array | None) -> tuple[Linear, complex]:
+        """The solution, and the multiple g of the vector, if one is given."""
         if vector is None:
-            found = np.linalg.solve(self._base, self._side(of, rhs))
-            return *self._expanded(of, rhs, found, 0.0, None), 0.0
-        column = self._side(of, vector)
+            return self._expanded(rhs, np.linalg.solve(self._base, self._side(rhs))), 0.0j
+        column = self._side(vector)
         size = np.linalg.norm(column)
-        found = self._solved(of, rhs, column / size)
+        found = self._bordered(rhs, column / size)
         g = complex(found[-1] / size)
-        return *self._expanded(of, rhs, found[:-1], g, vector), g
+        return self._expanded(rhs - g * vector, found[:-1]), g
 
-    def _solved(self, of: CentreManifold, rhs: ComplexArray, column: Array) -> ComplexArray:
-        assert self._null is not None
+    def _bordered(self, rhs: Array, column: Array) -> Array:
+        """Solution with a multiple of a column, at right angles to the critical vector."""
         n = len(self._base)
         whole = np.zeros((n + 1, n + 1), dtype=complex)
         whole[:n, :n], whole[:n, n] = self._base, column
         whole[n, :n] = self._null.conj() / np.linalg.norm(self._null)
-        return np.linalg.solve(whole, np.append(self._side(of, rhs), 0.0))
+        return np.linalg.solve(whole, np.append(self._side(rhs), 0.0))
 
-    def _side(self, of: CentreManifold, rhs: ComplexArray) -> ComplexArray:
-        side = _reduced(of._at, of._h * rhs)[1] * self._balance
+    def _side(self, rhs: Array) -> Array:
+        side = _reduced(self._of.at, self._of.widths * rhs)[1] * self._balance
         return np.append(side, 0.0) if self.drifts else side
 
-    def _expanded(
-        self, of: CentreManifold, rhs: ComplexArray, found: ComplexArray, g: complex,
-        vector: ComplexArray | None,
-    ) -> tuple[ComplexArray, ComplexArray, complex]:
-        """h, h' and a from the start of h, and a in its unit behind it."""
-        d = len(self._balance)
+    def _expanded(self, rhs: Array, found: Array) -> Linear:
+        """The solution from h at the start, and a in its unit behind that."""
+        of, d = self._of, len(self._balance)
         a = complex(found[d] * self._drift_unit) if self.drifts else 0.0j
-        whole = rhs - a * of._velocity - (0.0 if vector is None else g * vector)
-        reduced = _reduced(of._at, of._h * whole)[0]
-        start = found[:d]
-        nodes = open_solution(of._at.factors, reduced, start, self.closing * start)
-        h = at_points(of._problem, nodes.reshape(of._x.shape), self.closing * start)
-        return h, of._T * (of._J @ h[:, :, None])[:, :, 0] + whole, a
+        whole, start = rhs - a * of.velocity, found[:d]
+        reduced = _reduced(of.at, of.widths * whole)[0]
+        end: Array = self._closing * start
+        nodes: Array = open_solution(of.at.factors, reduced, start, end)
+        h: Array = at_points(of.problem, nodes.reshape(of.x.shape), end)
+        return Linear(h, of.period * (of.jacobian @ h[:, :, None])[:, :, 0] + whole, a)
 
 
 class Series:
     """Coefficients of X, of the phase's speed and of the normal form up to an order.
+
+    Residuals are fitted over amplitudes up to a radius.
 
     Attributes
     ----------
@@ -209,18 +207,17 @@ class Series:
     """
 
     def __init__(self, of: CentreManifold, order: int, radius: float) -> None:
-        self._of, self._order, k = of, order, len(of.multipliers)
+        self._of, k = of, len(of.multipliers)
         self.powers = _powers(k, order)
         self._place = {powers: place for place, powers in enumerate(self.powers)}
-        shape = (len(self.powers), *of._x.shape)
+        shape = (len(self.powers), *of.x.shape)
         self._H, self._dH = np.zeros(shape, dtype=complex), np.zeros(shape, dtype=complex)
         self._a = np.zeros(len(self.powers), dtype=complex)
         self._g = np.zeros((k, len(self.powers)), dtype=complex)
-        self._H[0], self._dH[0], self._a[0] = of._x, of._velocity, 1.0
-        for place, (h, dh, a) in enumerate(of._linear):
-            at = self._place[_unit(k, place)]
-            self._H[at], self._dH[at], self._a[at] = h, dh, a
-        if of._chain:
+        self._H[0], self._dH[0], self._a[0] = of.x, of.velocity, 1.0
+        for place, vector in enumerate(of.linear):
+            self._keep(self._place[_unit(k, place)], vector)
+        if of.chain:
             self._g[0, self._place[_unit(k, 1)]] = 1.0
         self._fit(order, radius)
 
@@ -245,53 +242,55 @@ class Series:
             if degree < 2:
                 continue
             # Terms of the same degree depend on each other along a chain alone.
-            if of._chain or degree != sum(self.powers[place - 1]):
+            if of.chain or degree != sum(self.powers[place - 1]):
                 same = [at for at, one in enumerate(self.powers) if sum(one) == degree]
                 rows = fit[[every.index(self.powers[at]) for at in same]] / radius**degree
                 found = dict(zip(same, self._residual(radius * unit, rows), strict=True))
             self._solve_for(place, found[place])
 
-    def _solve_for(self, place: int, rhs: ComplexArray) -> None:
+    def _solve_for(self, place: int, rhs: Array) -> None:
         """Add the terms of some powers, for the coefficient of the residual."""
         of = self._of
         closing = complex(np.prod([one**power for one, power in
                                    zip(of.multipliers, self.powers[place], strict=True)]))
-        equations = of._closing(closing)
+        equations = of.closing(closing)
         amplitude = None
-        if equations.critical_:
+        if equations.resonant:
             amplitude = max(at for at, one in enumerate(of.multipliers)
                             if abs(one - closing) < _SAME)
-        vector = None if amplitude is None else of._linear[amplitude][0]
-        h, dh, a, g = equations.solve(of, rhs, vector)
-        self._H[place], self._dH[place], self._a[place] = h, dh, a
+        found, g = equations.solve(rhs, None if amplitude is None else of.linear[amplitude].h)
+        self._keep(place, found)
         if amplitude is not None:
             self._g[amplitude, place] = g
 
-    def _residual(self, z: ComplexArray, rows: ComplexArray) -> ComplexArray:
+    def _keep(self, place: int, found: Linear) -> None:
+        self._H[place], self._dH[place], self._a[place] = found
+
+    def _residual(self, z: Array, rows: Array) -> Array:
         """Sums (n, N m, d) over amplitudes z (S, k), with weights (n, S), of T f(X) - dX/dt."""
-        of, shape = self._of, self._of._x.shape
+        of, shape = self._of, self._of.x.shape
         out = np.zeros((len(rows), *shape), dtype=complex)
-        step = max(1, _AT_ONCE // of._x.size)
+        step = max(1, _AT_ONCE // of.x.size)
         for first in range(0, len(z), step):
             some = slice(first, first + step)
             out += np.tensordot(rows[:, some], self._residual_at(z[some]), 1)
         return out
 
-    def _residual_at(self, z: ComplexArray) -> Array:
+    def _residual_at(self, z: Array) -> Array:
         of, count = self._of, len(z)
         powers = _products(z, self.powers)
         x = np.ascontiguousarray(np.tensordot(powers, self._H, 1).real)
-        times = np.tile(of._at.times, count)
-        f = of._problem.field.rates(times, x.reshape(-1, x.shape[2]), of._values).reshape(x.shape)
+        times = np.tile(of.at.times, count)
+        f = of.problem.field.rates(times, x.reshape(-1, x.shape[2]), of.values).reshape(x.shape)
         change = np.tensordot(powers, self._dH, 1) * (powers @ self._a)[:, None, None]
         for amplitude in range(z.shape[1]):
             slopes = _slopes(z, self.powers, amplitude)
             change = change + (np.tensordot(slopes, self._H, 1)
                                * (powers @ self._g[amplitude])[:, None, None])
-        return np.asarray(of._T * f - change.real)
+        return np.asarray(of.period * f - change.real)
 
 
-def _reduced(at: CollocationLinearisation, rows: Array) -> tuple[ComplexArray, ComplexArray]:
+def _reduced(at: CollocationLinearisation, rows: Array) -> tuple[Array, Array]:
     return open_side(at.factors, rows.reshape(-1))
 
 
@@ -305,12 +304,12 @@ def _powers(count: int, order: int) -> list[Powers]:
     return sorted(found, key=lambda one: (sum(one), tuple(-power for power in one)))
 
 
-def _products(z: ComplexArray, powers: list[Powers]) -> ComplexArray:
+def _products(z: Array, powers: list[Powers]) -> Array:
     """Products (S, n) of amplitudes (S, k) to their powers."""
     return np.prod(z[:, None, :] ** np.array(powers)[None], axis=2)
 
 
-def _slopes(z: ComplexArray, powers: list[Powers], amplitude: int) -> ComplexArray:
+def _slopes(z: Array, powers: list[Powers], amplitude: int) -> Array:
     """Derivatives (S, n) of the products to one amplitude."""
     given = np.array(powers)
     lower = given.copy()
@@ -318,7 +317,7 @@ def _slopes(z: ComplexArray, powers: list[Powers], amplitude: int) -> ComplexArr
     return np.asarray(given[:, amplitude] * np.prod(z[:, None, :] ** lower[None], axis=2))
 
 
-def _samples(of: CentreManifold, terms: int) -> ComplexArray:
+def _samples(of: CentreManifold, terms: int) -> Array:
     """Amplitudes (S, k) over the unit ball, conjugate where their vectors are."""
     k, rng = len(of.multipliers), np.random.default_rng(0)
     count = _OVER * terms
@@ -329,7 +328,7 @@ def _samples(of: CentreManifold, terms: int) -> ComplexArray:
         real = np.cos(np.pi * (np.arange(count) + 0.5) / count)[:, None]
     z = real.astype(complex)
     for place in range(1, k):
-        if of._is_conjugate(place):
+        if of.is_conjugate(place):
             z[:, place - 1] = real[:, place - 1] + 1j * real[:, place]
             z[:, place] = z[:, place - 1].conj()
     return z

@@ -82,7 +82,7 @@ def agreed(
     pairs: list[tuple[float, Array, Array, Series]] = []
     with np.errstate(all="ignore"):
         for radius in _RADII:
-            series = manifold.series(order, radius)
+            series = Series(manifold, order, radius)
             value = np.array(formula(series))
             if before is not None:
                 error = np.abs(value - before)

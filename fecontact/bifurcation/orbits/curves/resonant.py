@@ -27,7 +27,7 @@ _SINGLE = 1e-6
 
 
 class StrongResonance:
-    """The orbit at a point 'resonance 1:3' or 'resonance 1:4' of a curve of tori, and those near it.
+    """The orbit at a point 'resonance 1:3' or 'resonance 1:4' of a curve, and those near it.
 
     With the amplitude z of the vector v of unit mean square of the multiplier exp(2 pi i / q) they
     go along z' = e z + c z |z|^2 + b conj(z)^(q - 1), time in periods, e being zero at the point.
@@ -95,7 +95,7 @@ class StrongResonance:
         return np.array([np.real(rows), np.imag(rows)])
 
     def exponent(self, shift: Array) -> complex:
-        """e with both parameters moved by a shift (2,) in widths, to first order."""
+        """The e of a shift (2,) of both parameters in widths, to first order."""
         return complex(*(self.slopes @ shift))
 
     def towards(self, e: complex) -> Array:
@@ -104,7 +104,7 @@ class StrongResonance:
         return shift / np.linalg.norm(shift)
 
     def motion(self, shift: Array, z: complex) -> PeriodicMotion:
-        """q periods at an amplitude, with both parameters moved by a shift (2,) in widths."""
+        """So many periods at an amplitude, both parameters moved by a shift (2,) in widths."""
         orbit, u, q = self.orbit, self._at(shift), self.order
         x = orbit.at_gauss_points(orbit.nodes(u))[0]
         series = self._form[2]
