@@ -35,8 +35,6 @@ _MORE, _OVER = 3, 3
 _AT_ONCE = 2_000_000
 # Least range of a state, in the largest one in the scales of the orbit.
 _LEAST_RANGE = 0.1
-# Range of an orbit at rest, in the scales of the states.
-_AT_REST = 1e-6
 
 
 class Linear(NamedTuple):
@@ -81,9 +79,7 @@ class CentreManifold:
         self.widths = np.repeat(problem.widths, problem.degree)[:, None]
         scales = problem.scales[: nodes.shape[1]]
         size = np.ptp(nodes, axis=0) / scales
-        # A forced orbit may be at rest.
-        most = size.max() if size.max() > _AT_REST else 1.0
-        self.span = np.maximum(size, _LEAST_RANGE * most) * scales
+        self.span = np.maximum(size, _LEAST_RANGE * size.max()) * scales
         self._known: dict[tuple[int, int], _Closing] = {}
         self.linear: list[Linear] = []
         for place, multiplier in enumerate(self.multipliers):
