@@ -81,8 +81,7 @@ def codim2_curve(
     keep : 'kind' or 'period'
         What the points have in common; 'period' takes any orbit of a system without excitation.
     to : str, optional
-        Which curve, where several begin: 'fold', 'other fold', 'period doubling', 'Neimark-Sacker',
-        'neutral saddle' or 'homoclinic', which also starts from orbits of long period.
+        Which curve, where several begin, such as 'homoclinic', also from orbits of long period.
 
     Returns
     -------
