@@ -14,7 +14,7 @@ from fecontact.bifurcation.orbits.curves.resonant import (
     AWAY,
     StrongResonance,
     is_single,
-    tripled,
+    of_several,
 )
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import AnalysisError, FecontactError
@@ -89,7 +89,7 @@ def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> Fol
         place = int(abs(towards[1]) > abs(towards[0]))
         for away in AWAY:
             try:
-                branch = _followed(at, tripled(at, away * towards), place)
+                branch = _followed(at, of_several(at, away * towards), place)
             except FecontactError as error:
                 last = error
                 continue
@@ -122,7 +122,7 @@ def neutral_saddle_at_third(
     last: FecontactError | None = None
     for shift in (side * away * towards for away in AWAY for side in (1.0, -1.0)):
         try:
-            branch = _followed(at, tripled(at, shift), 1, replace(_SEARCH, points=1))
+            branch = _followed(at, of_several(at, shift), 1, replace(_SEARCH, points=1))
         except FecontactError as error:
             last = error
             continue

@@ -28,7 +28,7 @@ from fecontact.bifurcation.orbits.curves.resonant import (
     AWAY,
     StrongResonance,
     is_single,
-    tripled,
+    of_several,
 )
 from fecontact.bifurcation.orbits.mesh import state_error
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
@@ -47,6 +47,8 @@ _FIRST_STEPS = (1.0, 0.2, 0.04)
 _NEWTON = 1e-2
 # Special points of orbits at which other orbits branch off.
 _BRANCHING = ("period doubling", "branch point")
+# Points of curves of tori around which orbits of several periods lie.
+_STRONG = {"resonance 1:3": 3, "resonance 1:4": 4}
 
 T = TypeVar("T")
 
@@ -71,9 +73,8 @@ def orbit_branch(
     field : VectorField
         The system; that of the branch if ``start`` is a point of one.
     start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
-        A Hopf point of equilibria, a period doubling or branch point of orbits, a resonance 1:3 of
-        a curve of tori; another point of a branch of orbits, to continue it; or a settled motion
-        over at least one period.
+        A Hopf point of equilibria, a period doubling or branch point of orbits, a resonance 1:3 or
+        1:4 of a curve; another point of a branch of orbits, to continue it; or a settled motion.
     parameter : str, optional
         The parameter to vary; by default that of the point, or the only one of the field.
     method : Collocation, Shooting or HarmonicBalance, optional
@@ -88,11 +89,9 @@ def orbit_branch(
         Parameter range that counts as one; by default that of the point's branch, or of the bounds.
     direction : float
         Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
-        its branch and -1 back, or along either half of the other branch at a branch point; the side
-        of a resonance.
+        its branch and -1 back, or to either side of a branch point or resonance.
     both : bool
-        Follow the branch in both directions, from a motion, a regular or a branch point, a
-        resonance.
+        Follow the branch in both directions, not from Hopf points and period doublings.
 
     Raises
     ------
@@ -120,8 +119,8 @@ def orbit_branch(
     require_no_family(start)
     known = start.branch.parameter_name
     name = known if parameter is None else field.parameter_or_only(parameter)
-    if start.kind == "resonance 1:3":
-        return _tripled(field, start, name, method, chosen, scales, width, direction, both)
+    if start.kind in _STRONG:
+        return _around(field, start, name, method, chosen, scales, width, direction, both)
     if name == known and start.kind in _BRANCHING:
         if both and start.kind == "branch point":
             return _both_halves(
@@ -245,26 +244,26 @@ def _from_motion(
     return _followed((problem, u, None), method, options, limits, direction=direction, both=both)
 
 
-def _tripled(
+def _around(
     field: VectorField, point: BranchPoint, name: str, method: Method | None,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
     both: bool,
 ) -> Branch:
-    """Orbits of three periods that surround a resonance 1:3 of a curve of tori."""
+    """Orbits of three or four periods around a strong resonance of a curve of tori."""
     first, second = map(str, point.branch.attributes["parameters"])
     if name not in (first, second):
         raise InputError(f"{point.place} is one over {first!r} and {second!r}: parameter = "
                          f"{name!r} must be one of them.")
-    at = StrongResonance(field, point, second, 3)
+    at = StrongResonance(field, point, second, _STRONG[str(point.kind)])
     place = at.names.index(name)
-    chosen = method or Collocation(3 * at.orbit.intervals, at.orbit.degree)
+    chosen = method or Collocation(at.order * at.orbit.intervals, at.orbit.degree)
 
     def beside(side: float, options: ContinuationOptions, away: float) -> Branch:
         branch = _from_motion(
-            field, tripled(at, side * away * np.eye(2)[place]), name, chosen, options, scales,
+            field, of_several(at, side * away * np.eye(2)[place]), name, chosen, options, scales,
             width or float(at.widths[place]), side, False)
-        if is_single(branch.points[0], 3):
-            raise AnalysisError(f"{point.place}: no orbit of three periods was found beside it.")
+        if is_single(branch.points[0], at.order):
+            raise AnalysisError(f"{point.place}: no orbit of {at.order} periods was found there.")
         return branch
 
     def go(side: float, options: ContinuationOptions) -> Branch:

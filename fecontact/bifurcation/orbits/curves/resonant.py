@@ -138,31 +138,35 @@ class StrongResonance:
         raise AnalysisError("The orbit beside the resonance was not found.")
 
 
-def tripled(at: StrongResonance, shift: Array) -> PeriodicMotion:
-    """The orbit of three periods beside a resonance 1:3, with both parameters moved in widths.
+def of_several(at: StrongResonance, shift: Array) -> PeriodicMotion:
+    """The orbit of q periods beside the point, with both parameters moved in widths.
 
-    Its |z|^2 is the smaller root R of |e + c R|^2 = |b|^2 R.
+    Its |z|^2 is the smallest root R of |e + c R|^2 = |b|^2 R^(q - 2).
 
     Raises
     ------
     AnalysisError
         If there is none.
     """
-    e = at.exponent(shift)
-    R = least_square(e, at.b, at.c)
+    e, q = at.exponent(shift), at.order
+    R = least_square(e, at.b, at.c, q)
     if R is None:
-        raise AnalysisError(f"{at.point.place}: no orbit of three periods was found beside it.")
-    z = np.sqrt(R) * np.exp(1j * np.angle(-at.b / (e + at.c * R)) / 3.0)
-    return at.motion(shift, complex(z))
+        raise AnalysisError(f"{at.point.place}: there is no orbit of {q} periods to this side of "
+                            f"it.")
+    rest = e + at.c * R
+    return at.motion(shift, complex(np.sqrt(R) * np.exp(1j * np.angle(-at.b / rest) / q)))
 
 
-def least_square(e: complex, b: complex, c: complex) -> float | None:
-    """Smaller root R of |e + c R|^2 = |b|^2 R, None if there is none."""
-    half = 0.5 * abs(b) ** 2 - (e * c.conjugate()).real
-    square = half * half - abs(e * c) ** 2
-    if not (half > 0.0 and square >= 0.0):
+def least_square(e: complex, b: complex, c: complex, q: int) -> float | None:
+    """Smallest R > 0 with |e + c R|^2 = |b|^2 R^(q - 2), q = 3 or 4; None if there is none."""
+    square = abs(c) ** 2 - (abs(b) ** 2 if q == 4 else 0.0)
+    half = (e * c.conjugate()).real - (0.5 * abs(b) ** 2 if q == 3 else 0.0)
+    inside = half * half - square * abs(e) ** 2
+    if not inside >= 0.0:
         return None
-    return abs(e) ** 2 / (half + float(np.sqrt(square)))
+    sum_ = -half - float(np.copysign(np.sqrt(inside), half))
+    roots = [abs(e) ** 2 / sum_ if sum_ else 0.0, sum_ / square if square else 0.0]
+    return min((root for root in roots if root > 0.0), default=None)
 
 
 def is_single(point: BranchPoint, order: int) -> bool:
