@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from test_orbit_curves import circle_field
 
 from fecontact import AnalysisError, InputError
@@ -163,6 +164,46 @@ def test_driven_orbits_of_three_periods():
     assert saddles.points[0].values["unstable"] == 1
     curve = codim2_curve(field, point, "f", to="neutral saddle", bounds=BOX)
     assert np.abs(neutral(plane(curve))).max() < 1e-9
+
+
+def van_der_pol(t, x, p, out):
+    out[0] = x[1]
+    out[1] = (1.0 - x[0] * x[0]) * x[1] - x[0] + p[0] * np.cos(p[1] * t)
+
+
+def run(F, w, start, end):
+    """States at the end of a run by another integrator."""
+    return solve_ivp(lambda t, x: [x[1], (1.0 - x[0] ** 2) * x[1] - x[0] + F * np.cos(w * t)],
+                     (0.0, end), start, method="DOP853", rtol=1e-11, atol=1e-12, dense_output=True)
+
+
+def test_forced_van_der_pol():
+    """Orbits of three periods close in runs; after half a period the motion is that with -x.
+
+    The multiplier of that half is a third root of one at one point, and a sixth one, for which
+    conj(z)^2 does not resonate, at the other.
+    """
+    field = vector_field(van_der_pol, {"F": 6.0, "w": 2.2}, 2,
+                         period=lambda values: 2.0 * np.pi / values["w"])
+    T = 2.0 * np.pi / 2.2
+    t = np.linspace(59.0 * T, 60.0 * T, 400)
+    motion = run(6.0, 2.2, [1.0, 0.0], t[-1]).sol(t).T
+    branch = orbit_branch(field, PeriodicMotion(t - t[0], motion), "F",
+                          method=Collocation(intervals=30), bounds=(0.5, 14.0), direction=-1.0)
+    box = {"F": (0.5, 14.0), "w": (1.2, 6.0)}
+    tori = codim2_curve(field, branch.of_kind("Neimark-Sacker")[0], "w", bounds=box)
+    symmetric, point = sorted(tori.of_kind("resonance 1:3"), key=lambda at: at.parameter)
+    assert symmetric.normal_form["b"] < 1e-9
+    with pytest.raises(AnalysisError, match="no orbit of 3 periods to this side"):
+        orbit_branch(field, symmetric, bounds=box["F"])
+    saddles = orbit_branch(field, point, bounds=box["F"])
+    for at in saddles.points[:20:5]:
+        F, start = at.parameter, at.orbit(field).states[0]
+        end = run(F, point.values["w"], start, 6.0 * np.pi / point.values["w"]).y[:, -1]
+        assert end == pytest.approx(start, abs=1e-8)
+        third_of = run(F, point.values["w"], start, 2.0 * np.pi / point.values["w"]).y[:, -1]
+        assert np.abs(third_of - start).max() > 1e-3
+    assert saddles.points[0].values["unstable"] == 1
 
 
 def test_what_is_not_there(strong):
