@@ -49,7 +49,8 @@ def folds_at_quarter(
     C, D = at.c, at.b
     if not abs(C) > abs(D):
         raise AnalysisError(f"{point.place}: no folds of orbits of four periods begin there; its "
-                            f"normal form has |C / D| = {abs(C / D):.4g}, and must exceed 1.")
+                            f"normal form has |C / D| = {abs(C / D):.4g}, and must exceed 1; "
+                            f"follow the orbits around it with orbit_branch(field, point).")
     towards = at.towards(-C)
     place = int(abs(towards[0]) > abs(towards[1]))
     turn = np.exp(0.25j * np.angle(D / C))

@@ -154,7 +154,7 @@ def as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -
 def _require_one_side(point: BranchPoint, both: bool) -> None:
     if both:
         raise InputError(f"{point.place} is where orbits begin, which leave it to one side; both = "
-                         f"True goes with motions, regular and branch points.")
+                         f"True goes with motions, resonances, regular and branch points.")
 
 
 def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
