@@ -149,7 +149,7 @@ def of_several(at: StrongResonance, shift: Array) -> PeriodicMotion:
         If there is none.
     """
     e, q = at.exponent(shift), at.order
-    R = least_square(e, at.b, at.c, q)
+    R = _least_square(e, at.b, at.c, q)
     if R is None:
         raise AnalysisError(f"{at.point.place}: there is no orbit of {q} periods to this side of "
                             f"it.")
@@ -157,7 +157,7 @@ def of_several(at: StrongResonance, shift: Array) -> PeriodicMotion:
     return at.motion(shift, complex(np.sqrt(R) * np.exp(1j * np.angle(-at.b / rest) / q)))
 
 
-def least_square(e: complex, b: complex, c: complex, q: int) -> float | None:
+def _least_square(e: complex, b: complex, c: complex, q: int) -> float | None:
     """Smallest R > 0 with |e + c R|^2 = |b|^2 R^(q - 2), q = 3 or 4; None if there is none."""
     square = abs(c) ** 2 - (abs(b) ** 2 if q == 4 else 0.0)
     half = (e * c.conjugate()).real - (0.5 * abs(b) ** 2 if q == 3 else 0.0)
