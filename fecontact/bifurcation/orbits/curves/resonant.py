@@ -51,8 +51,7 @@ class StrongResonance:
         first = point.branch.parameter_name
         self.point, self.order, self.names = point, order, (parameter, first)
         widths = np.asarray(point.branch.attributes["scales"], dtype=float)[-2:]
-        self.widths, self._field = widths.copy(), field
-        self.curve: OrbitCurve
+        self.widths = widths.copy()
         self.curve, self.u, _ = orbit_curve(
             field, over_first(point, "Neimark-Sacker"), parameter,
             dict(zip(self.names, widths.tolist(), strict=True)), None, "Neimark-Sacker")
