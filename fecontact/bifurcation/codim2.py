@@ -80,8 +80,8 @@ def codim2_curve(
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
         What the points have in common; 'period' takes any orbit of a system without excitation.
-    to : 'fold', 'other fold', 'period doubling', 'Neimark-Sacker' or 'homoclinic', optional
-        Which curve, where several begin at the point; 'homoclinic' also from orbits of long period.
+    to : str, optional
+        Which curve, where several begin, such as 'homoclinic', also from orbits of long period.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def codim2_curve(
     crossing = point.kind in _CROSSINGS
     if keep == "kind" and not (crossing or homoclinic) and not isinstance(
             point, FoldPoint | HopfPoint | PeriodDoublingPoint | NeimarkSackerPoint
-            | DiscontinuityPoint):
+            | DiscontinuityPoint) and point.kind != "neutral saddle":
         raise InputError(f"{point.place} starts no curve; take a point of the kind 'fold', 'Hopf', "
                          f"'period doubling', 'Neimark-Sacker' or 'Bautin', a border that "
                          f"set-valued orbits meet, or an orbit with keep='period'.")
@@ -142,7 +142,9 @@ def codim2_curve(
     elif isinstance(point, DiscontinuityPoint):
         problem, u, attributes = border_curve(field, point, parameter, widths, scales)
     elif point.is_orbit:
-        curve, u, attributes = orbit_curve(field, point, parameter, widths, scales, kind)
+        # Neutral saddles too have two multipliers whose product is one.
+        curve, u, attributes = orbit_curve(field, point, parameter, widths, scales, (
+            "Neimark-Sacker" if kind == "neutral saddle" else kind))
         problem = curve
         if given.kind == "resonance 1:1" and kind == "Neimark-Sacker":
             # To the other side lie neutral saddles, whose multipliers are real.

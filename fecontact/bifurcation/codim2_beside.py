@@ -6,7 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.codim2_quarter import folds_at_quarter
+from fecontact.bifurcation.codim2_resonances import (
+    fold_at_third,
+    folds_at_quarter,
+    neutral_saddle_at_third,
+)
 from fecontact.bifurcation.codim2_switch import (
     other_curve,
     tangent_at,
@@ -35,6 +39,7 @@ from fecontact.bifurcation.equilibria.normal_forms import hopf
 from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.bifurcation.orbits.restored import over_first
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
@@ -236,21 +241,6 @@ def _hopf_at(
     return made
 
 
-def over_first(point: BranchPoint, kind: str) -> BranchPoint:
-    """A point of a curve of orbits as one of some kind on a branch over the first parameter."""
-    known = point.branch.attributes
-    second = str(known["parameters"][1])
-    values = np.array(known["parameter_values"], dtype=float)
-    values[list(map(str, known["parameter_names"])).index(second)] = point.u[-2]
-    kept = {name: value for name, value in known.items()
-            if name not in ("parameters", "kind", "limits")}
-    scales = np.delete(np.asarray(known["scales"], dtype=float), -2)
-    header = BranchHeader(point.branch.parameter_name,
-                          {**kept, "parameter_values": values, "scales": scales})
-    return special_point(np.delete(point.u, -2), np.delete(point.tangent, -2), point.values, kind,
-                         {}, header)
-
-
 def of_doubled(
     field: VectorField, point: BranchPoint, parameter: str, kind: str
 ) -> BranchPoint:
@@ -292,10 +282,19 @@ def of_quadrupled(
     field: VectorField, point: BranchPoint, parameter: str, side: float
 ) -> BranchPoint:
     """A fold of orbits of four periods at a side; see :func:`folds_at_quarter`."""
-    single = over_first(point, "Neimark-Sacker")
-    found = folds_at_quarter(field, point, single, parameter, side)
-    first = point.branch.parameter_name
-    return _over(field, found, first, float(np.asarray(point.branch.attributes["scales"])[-1]))
+    found = folds_at_quarter(field, point, parameter, side)
+    return _over(field, found, *_first_of(point))
+
+
+def of_tripled(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
+    """A fold of orbits of three periods; see :func:`fold_at_third`."""
+    return _over(field, fold_at_third(field, point, parameter), *_first_of(point))
+
+
+def _first_of(point: BranchPoint) -> tuple[str, float]:
+    """Name and width of the first parameter of a curve of orbits."""
+    return (point.branch.parameter_name,
+            float(np.asarray(point.branch.attributes["scales"])[-1]))
 
 
 _Found = Callable[[VectorField, BranchPoint, str], BranchPoint]
@@ -315,6 +314,8 @@ BEGIN: Mapping[str, Mapping[str, _Found]] = {
         "period doubling": lambda field, point, parameter: over_first(point, "period doubling"),
         "Neimark-Sacker": lambda field, point, parameter: of_doubled(
             field, point, parameter, "Neimark-Sacker")},
+    "resonance 1:3": {
+        "fold": of_tripled, "neutral saddle": neutral_saddle_at_third},
     "resonance 1:4": {
         "fold": lambda field, point, parameter: of_quadrupled(field, point, parameter, 1.0),
         "other fold": lambda field, point, parameter: of_quadrupled(field, point, parameter, -1.0)},

@@ -155,3 +155,32 @@ def test_published_values_of_a_catalytic_oscillator():
     assert [other.normal_form["a"], other.normal_form["b"]] == pytest.approx(
         [8.378442e-2, 2.136280], rel=1e-6)
     assert point.normal_form["c"] == pytest.approx(0.3627844, rel=3e-5)
+
+
+def lorenz84(t, x, p, out):
+    # The extended model of Lorenz' atmosphere of 1984.
+    out[0] = -x[1] * x[1] - x[2] * x[2] - 0.25 * (x[0] - p[0]) - 0.987 * x[3] * x[3]
+    out[1] = x[0] * x[1] - x[0] * x[2] - x[1] + 0.25
+    out[2] = x[0] * x[1] + x[0] * x[2] - x[2]
+    out[3] = -1.04 * x[3] + 0.987 * x[3] * x[0] + p[1]
+
+
+def test_second_lyapunov_coefficient_of_an_atmosphere():
+    """Values of BifurcationKit.jl (test/lorenz84.jl), whose l2 is w times as large.
+
+    Its Bogdanov-Takens point is one of Newton's method, its Bautin point is where a step of the
+    curve is bisected to 1e-3 of l2.
+    """
+    field = vector_field(lorenz84, {"F": 3.0, "T": 0.04}, 4)
+    box = {"F": (0.5, 4.0), "T": (-0.05, 0.1)}
+    branch = equilibrium_branch(field, [2.9787, -0.0387, 0.0582, -0.0211], "F", bounds=(0.5, 3.2),
+                                both=True)
+    hopf = min(branch.of_kind("Hopf"), key=lambda point: abs(point.parameter - 2.4672))
+    curve = codim2_curve(field, hopf, "T", bounds=box)
+    point, = curve.of_kind("Bautin")
+    w = 2.0 * np.pi * point.values["frequency_hz"]
+    assert w == pytest.approx(0.6903636672622595, abs=1e-5)
+    assert w * point.normal_form["l2"] == pytest.approx(0.15555332623343107, rel=2e-3)
+    takens, = curve.of_kind("Bogdanov-Takens")
+    assert [takens.normal_form["a"], takens.normal_form["b"]] == pytest.approx(
+        [0.2144233509273467, 0.6065145518280868], rel=1e-8)

@@ -5,7 +5,13 @@ import pytest
 from test_orbit_curves import circle_field
 
 from fecontact import AnalysisError, InputError
-from fecontact.bifurcation import Collocation, PeriodicMotion, codim2_curve, orbit_branch
+from fecontact.bifurcation import (
+    Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    codim2_curve,
+    orbit_branch,
+)
 from fecontact.io import read_branch, write_branch
 
 BOX = {"e": (-0.3, 0.3), "f": (-0.3, 0.3)}
@@ -59,6 +65,46 @@ def test_folds_from_a_resonance_1_4(tmp_path):
     with pytest.raises(InputError, match="no curve to = 'period doubling' begins there; known "
                                          "are: 'fold', 'other fold'"):
         codim2_curve(field, point, "f", to="period doubling", bounds=BOX)
+
+
+def test_normal_form():
+    """|w|^2 = 2 |z|^2 of a vector of unit mean square."""
+    _, tori = resonance(0.9 * np.exp(1.1j))
+    point, = tori.of_kind("resonance 1:4")
+    expected = {"a": -2.6 * np.pi, "b": 1.4 * np.pi, "d": 1.8 * np.pi}
+    assert point.normal_form == pytest.approx(expected, rel=1e-7)
+    for name, error in point.normal_form_errors.items():
+        assert abs(point.normal_form[name] - expected[name]) < error < 1e-5
+
+
+@pytest.mark.parametrize("size", [0.9, 1.6])
+def test_orbits_of_four_periods(size):
+    """|E + C R| = |D| R of E = e + i f and one R = |w|^2 all along.
+
+    For |C| < |D| they surround the point; else both orbits lie between the folds, where the sine
+    of the angle from -C to E is less than |D / C|.
+    """
+    C, D = -1.3 + 0.7j, size * np.exp(1.1j)
+    field, tori = resonance(D)
+    point, = tori.of_kind("resonance 1:4")
+    branch = orbit_branch(field, point, "e", bounds=(-0.05, 0.05), both=True,
+                          options=ContinuationOptions(largest_step=0.03))
+    E, R = branch.parameter, []
+    for at in branch.points:
+        x = at.orbit(samples=601).states
+        r, z = np.hypot(x[:, 0], x[:, 1]), x[:, 2]
+        R.append(((r - 1.0 - 0.2 * z * z) ** 2 + z * z).mean())
+    assert abs(E + C * np.array(R)) == pytest.approx(size * np.array(R), rel=1e-5)
+    assert branch.column("period") == pytest.approx(np.full(len(E), 4.0 * np.pi), rel=1e-9)
+    near = branch.points[int(np.argmin(np.abs(E)))]
+    assert near.values["unstable"] == 1
+    if size > abs(C):
+        assert [E.min(), E.max()] == pytest.approx([-0.05, 0.05], rel=1e-9)
+        return
+    # e > 0 along f = 0 is the side of -C, at an angle with the sine 0.7 / |C| < |D / C|.
+    assert E.min() > 0.0
+    with pytest.raises(AnalysisError, match="no orbit of 4 periods to this side"):
+        orbit_branch(field, point, "e", bounds=BOX["e"], direction=-1.0)
 
 
 def test_there_are_no_folds_where_the_cubic_term_that_turns_is_larger():

@@ -140,7 +140,7 @@ def _iterated(
         size = improve(weights, steps, count_kept)
         change = steps[count_kept]
         if count > 2 and size > before and before <= problem.rounding * scale:
-            return u, linearisation, count
+            return u, linearisation if kept is None else problem.linearise(u), count
         if not math.isfinite(size) or (count > 2 - more and size > before):
             return None
         u = u + change

@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 # Coefficients of points of codimension two, in the order in which they are stored.
 _NORMAL_FORMS: Mapping[str, tuple[str, ...]] = {
     "cusp": ("c",), "Bautin": ("l2",), "Bogdanov-Takens": ("a", "b"),
-    "zero-Hopf": ("b", "c", "d", "e"), "double Hopf": ("p11", "p12", "p21", "p22")}
+    "zero-Hopf": ("b", "c", "d", "e"), "double Hopf": ("p11", "p12", "p21", "p22"),
+    "generalised period doubling": ("e",), "Chenciner": ("d",), "resonance 1:1": ("a", "b"),
+    "resonance 1:2": ("c", "d"), "resonance 1:3": ("b", "c"), "resonance 1:4": ("a", "b", "d"),
+    "fold-flip": ("b", "c", "d", "e"), "fold-Neimark-Sacker": ("b", "c", "d", "e"),
+    **dict.fromkeys(("flip-Neimark-Sacker", "double Neimark-Sacker"),
+                    ("p11", "p12", "p21", "p22"))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +283,7 @@ class BranchPoint:
 
     @property
     def normal_form(self) -> dict[str, float]:
-        r"""Coefficients by name, of points of codimension two of equilibria; empty for others.
+        r"""Coefficients by name, of points of codimension two; empty for others.
 
         With amplitudes z of critical eigenvectors of length one, x = z q + conj(z q), u of real
         ones and r = |z|: 'c' of a cusp, u' = c u^3; 'l2' of a Bautin point, the second Lyapunov
@@ -288,15 +293,29 @@ class BranchPoint:
         r2' = r2 (p21 r1^2 + p22 r2^2), first the pair that is followed. One that is not defined is
         left out, as 'e' is where b or c is zero.
 
+        Of orbits by collocation eigenfunctions have unit mean square in the scales of the curve,
+        time is in periods, and amplitudes turn with the multipliers: u' = c u^3 of a cusp,
+        u' = e u^5 of a generalised period doubling, r' = d r^5 of a Chenciner point;
+        u'' = a u^2 + b u u', a > 0, of a resonance 1:1, u'' = c u^3 + d u^2 u' of 1:2,
+        z' = b conj(z)^2 + (c + i f) z r^2, b > 0, of 1:3 (f depends on the choice of z),
+        z' = (a + i b) z r^2 + d conj(z)^3, d > 0, of 1:4; the form of a zero-Hopf point where a
+        fold meets a doubling (r its amplitude) or a pair, that of a double Hopf point where a pair
+        meets a doubling (r1) or another pair.
+
         References
         ----------
-        Y. A. Kuznetsov, SIAM J. Numer. Anal. 36, 1104-1124 (1999).
+        Y. A. Kuznetsov, SIAM J. Numer. Anal. 36, 1104-1124 (1999). V. De Witte, F. Della Rossa,
+        W. Govaerts, Y. A. Kuznetsov, SIAM J. Appl. Dyn. Syst. 12, 722-788 (2013).
         """
         return self._by_name("normal_form")
 
     @property
     def normal_form_errors(self) -> dict[str, float]:
-        """Errors of :attr:`normal_form`: differences of two formulas for the derivatives."""
+        """Errors of :attr:`normal_form`.
+
+        Of equilibria differences of two formulas for the derivatives, of orbits the change from
+        half the intervals, with that between two sizes of the amplitudes.
+        """
         return self._by_name("normal_form_error")
 
     def _by_name(self, detail: str) -> dict[str, float]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from fecontact.bifurcation.linalg import bordered_kernels
 from fecontact.bifurcation.linalg.condensation import CondensedFactors, pivot_rows
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ComplexArray
 
 
 class Border:
@@ -45,24 +45,39 @@ def expand_open(factors: CondensedFactors, start: Array, end: Array) -> Array:
     return out
 
 
-def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> Array:
+def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> ComplexArray:
     """All nodes (N m d,) with x(1) = closing x(0), the common unknowns zero.
 
     ``rhs`` (N m d,) are the right-hand sides of the collocation rows; both are complex.
     """
-    d, columns = factors.end.shape
-    parts = [np.ascontiguousarray(part, dtype=float) for part in (rhs.real, rhs.imag)]
-    reduced, side = np.empty((2, pivot_rows(factors))), np.empty((2, d))
+    d = len(factors.end)
+    reduced, side = open_side(factors, rhs)
+    start = np.asarray(np.linalg.solve(
+        factors.end[:, :d] + closing * factors.end[:, d : 2 * d], side), dtype=complex)
+    return open_solution(factors, reduced, start, closing * start)
+
+
+def open_side(factors: CondensedFactors, rhs: Array) -> tuple[ComplexArray, ComplexArray]:
+    """Complex right-hand sides (N m d,) over the pivot rows, and for the rows of both ends (d,)."""
+    parts = [np.array(part, dtype=float) for part in (np.real(rhs), np.imag(rhs))]
+    reduced, side = np.empty((2, pivot_rows(factors))), np.empty((2, len(factors.end)))
     for place, part in enumerate(parts):
         bordered_kernels.reduce_side(factors, part, reduced[place], side[place])
-    start = np.linalg.solve(factors.end[:, :d] + closing * factors.end[:, d : 2 * d],
-                            side[0] + 1j * side[1])
-    ends = [(np.ascontiguousarray(of(start)), np.ascontiguousarray(of(closing * start)))
-            for of in (np.real, np.imag)]
-    out = np.empty((2, len(rhs)))
-    for place, both in enumerate(ends):
-        bordered_kernels.expand(factors, reduced[place], *both, np.zeros(columns - 2 * d),
-                                out[place])
+    return np.asarray(reduced[0] + 1j * reduced[1]), np.asarray(side[0] + 1j * side[1])
+
+
+def open_solution(
+    factors: CondensedFactors, reduced: ComplexArray, start: ComplexArray, end: ComplexArray
+) -> ComplexArray:
+    """All nodes (N m d,), complex, from both ends (d,) and the :func:`open_side` over the pivots.
+
+    The common unknowns are zero.
+    """
+    d, columns = factors.end.shape
+    out = np.empty((2, len(factors.local) * factors.inner.shape[1]))
+    for of, nodes in zip((np.real, np.imag), out, strict=True):
+        pivots, *ends = (np.array(of(one)) for one in (reduced, start, end))
+        bordered_kernels.expand(factors, pivots, *ends, np.zeros(columns - 2 * d), nodes)
     return np.asarray(out[0] + 1j * out[1])
 
 

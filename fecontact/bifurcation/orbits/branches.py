@@ -24,12 +24,18 @@ from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
 from fecontact.bifurcation.orbits import shooting_branches, starts
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
+from fecontact.bifurcation.orbits.curves.resonant import (
+    AWAY,
+    StrongResonance,
+    is_single,
+    of_several,
+)
 from fecontact.bifurcation.orbits.mesh import state_error
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import FecontactError, InputError, require_finite
+from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.trajectory import Trajectory
@@ -41,6 +47,8 @@ _FIRST_STEPS = (1.0, 0.2, 0.04)
 _NEWTON = 1e-2
 # Special points of orbits at which other orbits branch off.
 _BRANCHING = ("period doubling", "branch point")
+# Points of curves of tori around which orbits of several periods lie.
+_STRONG = {"resonance 1:3": 3, "resonance 1:4": 4}
 
 T = TypeVar("T")
 
@@ -65,8 +73,8 @@ def orbit_branch(
     field : VectorField
         The system; that of the branch if ``start`` is a point of one.
     start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
-        A Hopf point of equilibria, a period doubling or branch point of orbits; another point of a
-        branch of orbits, to continue it; or a settled motion over at least one period.
+        A Hopf point of equilibria, a period doubling or branch point of orbits, a resonance 1:3 or
+        1:4 of a curve; another point of a branch of orbits, to continue it; or a settled motion.
     parameter : str, optional
         The parameter to vary; by default that of the point, or the only one of the field.
     method : Collocation, Shooting or HarmonicBalance, optional
@@ -81,9 +89,9 @@ def orbit_branch(
         Parameter range that counts as one; by default that of the point's branch, or of the bounds.
     direction : float
         Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
-        its branch and -1 back, or along either half of the other branch at a branch point.
+        its branch and -1 back, or to either side of a branch point or resonance.
     both : bool
-        Follow the branch in both directions, from a motion, a regular or a branch point.
+        Follow the branch in both directions, not from Hopf points and period doublings.
 
     Raises
     ------
@@ -111,6 +119,8 @@ def orbit_branch(
     require_no_family(start)
     known = start.branch.parameter_name
     name = known if parameter is None else field.parameter_or_only(parameter)
+    if start.kind in _STRONG:
+        return _around(field, start, name, method, chosen, scales, width, direction, both)
     if name == known and start.kind in _BRANCHING:
         if both and start.kind == "branch point":
             return _both_halves(
@@ -144,7 +154,7 @@ def as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -
 def _require_one_side(point: BranchPoint, both: bool) -> None:
     if both:
         raise InputError(f"{point.place} is where orbits begin, which leave it to one side; both = "
-                         f"True goes with motions, regular and branch points.")
+                         f"True goes with motions, resonances, regular and branch points.")
 
 
 def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
@@ -234,16 +244,50 @@ def _from_motion(
     return _followed((problem, u, None), method, options, limits, direction=direction, both=both)
 
 
+def _around(
+    field: VectorField, point: BranchPoint, name: str, method: Method | None,
+    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
+    both: bool,
+) -> Branch:
+    """Orbits of three or four periods around a strong resonance of a curve of tori."""
+    first, second = map(str, point.branch.attributes["parameters"])
+    if name not in (first, second):
+        raise InputError(f"{point.place} is one over {first!r} and {second!r}: parameter = "
+                         f"{name!r} must be one of them.")
+    at = StrongResonance(field, point, second, _STRONG[str(point.kind)])
+    place = at.names.index(name)
+    chosen = method or Collocation(at.order * at.orbit.intervals, at.orbit.degree)
+
+    def beside(side: float, options: ContinuationOptions, away: float) -> Branch:
+        branch = _from_motion(
+            field, of_several(at, side * away * np.eye(2)[place]), name, chosen, options, scales,
+            width or float(at.widths[place]), side, False)
+        if is_single(branch.points[0], at.order):
+            raise AnalysisError(f"{point.place}: no orbit of {at.order} periods was found there.")
+        return branch
+
+    def go(side: float, options: ContinuationOptions) -> Branch:
+        return _first_that_goes(iter(AWAY), lambda away: beside(side, options, away))
+
+    sign = float(np.copysign(1.0, direction))
+    if not both:
+        return go(sign, options)
+    return _both_halves(None, options, lambda side, options: go(sign * side, options))
+
+
 def _both_halves(
-    point: BranchPoint, options: ContinuationOptions,
+    point: BranchPoint | None, options: ContinuationOptions,
     go: Callable[[float, ContinuationOptions], Branch],
 ) -> Branch:
-    """Both halves of the other branch at a branch point, from end to end through it."""
+    """Both halves of the other branch at a branch point, from end to end through it, if given."""
     halves: list[Branch | None] = []
     failed: FecontactError = InputError("There is nothing to start from.")
     for side in (1.0, -1.0):
         try:
-            halves.append(go(side, replace(options, points=max(options.points // 2, 2))))
+            half = go(side, replace(options, points=max(options.points // 2, 2)))
+            if point is None and half.status is BranchStatus.CLOSED:
+                return half
+            halves.append(half)
         except FecontactError as error:
             halves.append(None)
             failed = error
@@ -253,8 +297,8 @@ def _both_halves(
         if one is None:
             raise failed
         return one
-    there = replace(point, tangent=ahead.points[0].tangent)
-    return replace(ahead, points=(*back.reversed().points, there, *ahead.points),
+    there = () if point is None else (replace(point, tangent=ahead.points[0].tangent),)
+    return replace(ahead, points=(*back.reversed().points, *there, *ahead.points),
                    message=" ".join(filter(None, (ahead.message, back.message))))
 
 

@@ -18,6 +18,7 @@ from fecontact.bifurcation.orbits.collocation import (
     less_accurate,
     told_of,
 )
+from fecontact.bifurcation.orbits.curves.codim2_forms import orbit_form
 from fecontact.bifurcation.orbits.curves.singularity import (
     Bend,
     ContinuedSign,
@@ -180,9 +181,23 @@ class OrbitCurve(Problem):
         if kind != "fold":
             floquet, pair = linearisation.orbit.floquet, _PAIRS.get(self.kind)
             # The product of two real multipliers may be one too.
-            return {} if kind != pair or floquet.turning(*linearisation.critical) else None
+            if kind == pair and not floquet.turning(*linearisation.critical):
+                return None
+            return orbit_form(kind, self.orbit, u, linearisation.orbit,
+                              *self._pairs(linearisation, kind))
         both = np.abs(tangent[-2:]) / self.orbit.scales[-2:]
         return {"kind": "turning point"} if both.max() > _CUSP_RATE else None
+
+    def _pairs(self, linearisation: "CurveLinearised", kind: str) -> tuple[complex, complex]:
+        """Multipliers of the critical pair and of the one beside it, where there are any."""
+        critical = linearisation.critical
+        own = max(critical, key=lambda one: one.imag) if self.kind == "Neimark-Sacker" else 1.0
+        if self.kind == "Neimark-Sacker" and kind in _PAIRS.values() and kind != _PAIRS[self.kind]:
+            return 1.0, own
+        beside = linearisation.orbit.floquet.beside(*critical)
+        turning = beside[beside.imag > 0.0]
+        near = turning[np.argmin(np.abs(np.abs(turning) - 1.0))] if len(turning) else 1.0
+        return own, complex(near)
 
 
 class PeriodCurve(OrbitCurve):

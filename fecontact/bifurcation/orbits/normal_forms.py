@@ -138,25 +138,6 @@ class Expansion:
 
     def torus(self, bends: Sequence[Bend]) -> Share:
         """Coefficient Re D of a Neimark-Sacker point, whose multipliers are complex."""
-        left, V, third, _ = self._turning(bends)
-        found, size = self._share(left, V, third)
-        unit = self._size(V) ** 2
-        return Share(found.real / unit, size / unit)
-
-    def quarter(self, step: float) -> tuple[complex, complex]:
-        """C and D of a resonance 1:4, z' = C z |z|^2 + D conj(z)^3, with v as it is."""
-        one, other = self._at.terms
-        along, across = self.bends(step)
-        left, V, third, h20 = self._turning((along, across))
-        mixed = (self._bend(one.states + other.states, step).second
-                 - self._bend(one.states - other.states, step).second) / 4.0
-        W = V.conj()
-        cube = (_applied(along.second - across.second - 2j * mixed, W) / 6.0
-                + _applied(along.first - 1j * across.first, h20.conj()) / 2.0)
-        return self._share(left, V, third)[0], self._share(left, V, cube)[0]
-
-    def _turning(self, bends: Sequence[Bend]) -> tuple[Any, Any, Any, Any]:
-        """Multiples of the equations, v, the terms of z |z|^2, and h of z^2 / 2, all complex."""
         assert self._at.pair is not None
         (p, pp, _), (q, qq, _) = bends
         one, other = self._at.terms
@@ -167,7 +148,9 @@ class Expansion:
         third = (_applied(pp + qq, V) / 2.0 + _applied(first, h11)
                  + _applied(first.conj(), h20) / 2.0
                  - drift * (_applied(self._J, V) - 1j * angle / self._T * V))
-        return one.left - 1j * other.left, V, third, h20
+        found, size = self._share(one.left - 1j * other.left, V, third)
+        unit = self._size(V) ** 2
+        return Share(found.real / unit, size / unit)
 
     def bends(self, step: float) -> list[Bend]:
         """Differences of fourth order along v, over a step in ranges of the states."""
@@ -217,7 +200,8 @@ class Expansion:
     def _turned(self, bend: Array, closing: complex) -> Array:
         """The h with h' - A h = T bend at the points and h(1) = closing h(0), complex."""
         side = (self._T * self._h * bend).reshape(-1)
-        shaped = solve_turned(self._linearised.factors, side, closing).reshape(bend.shape)
+        found: Array = solve_turned(self._linearised.factors, side, closing)
+        shaped = found.reshape(bend.shape)
         return at_points(self._problem, shaped, closing * shaped[0])
 
 

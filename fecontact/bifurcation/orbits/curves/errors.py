@@ -9,13 +9,16 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.newton import norm
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.points import with_details
+from fecontact.bifurcation.continuation.points import details_of, with_details
 from fecontact.bifurcation.continuation.sharpening import found_near, reach
 from fecontact.bifurcation.orbits.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.curves.singularity import ContinuedSign
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.core.types import Array
+
+# Names of the coefficients of a normal form and of their errors.
+_FORM = ("normal_form", "normal_form_error")
 
 
 class Finer(NamedTuple):
@@ -29,8 +32,9 @@ class Finer(NamedTuple):
 def with_errors(curve: OrbitCurve, branch: Branch, events: Sequence[str]) -> Branch:
     """The special points with the change of both parameters on twice the intervals as their errors.
 
-    Of points that are not found there the errors are the changes over the stretch that was
-    searched, and the branch's message tells of them.
+    Normal forms are those on the finer mesh. Of points that are not found there the errors are the
+    changes over the stretch that was searched, and the branch's message tells of them; their normal
+    forms are left out.
     """
     points, missing = list(branch.points), []
     try:
@@ -45,13 +49,23 @@ def with_errors(curve: OrbitCurve, branch: Branch, events: Sequence[str]) -> Bra
             else:
                 first, second = (abs(float(finer.u[k] - point.u[k])) for k in (-1, -2))
             points[index] = with_details(point, parameter_error=first,
-                                         second_parameter_error=second)
+                                         second_parameter_error=second, **_form(point, finer))
     except KeyboardInterrupt:
         branch = replace(branch, status=BranchStatus.INTERRUPTED)
     said = (f"On twice the intervals these special points are not found nearby: "
             f"{', '.join(missing)}." if missing else "")
     return replace(branch, points=tuple(points),
                    message=" ".join(filter(None, (branch.message, said))))
+
+
+def _form(point: BranchPoint, finer: BranchPoint | None) -> dict[str, Array]:
+    """The normal form on the finer mesh, its change being part of its error; none without that."""
+    one, other = ({} if at is None else details_of(at) for at in (point, finer))
+    if not ("normal_form" in one and "normal_form" in other):
+        return dict.fromkeys(_FORM, np.zeros(0)) if "normal_form" in one else {}
+    value = np.asarray(other["normal_form"])
+    change = np.abs(value - np.asarray(one["normal_form"]))
+    return dict(zip(_FORM, (value, change + np.asarray(other["normal_form_error"])), strict=True))
 
 
 def _on_twice(curve: OrbitCurve, point: BranchPoint) -> Finer:
