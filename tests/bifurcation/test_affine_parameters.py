@@ -71,9 +71,9 @@ def test_arrays_between_two_systems_are_those_of_systems_made_there(names, dashp
             assert np.allclose(one, other, rtol=1e-14, atol=1e-14), name
 
 
-def test_a_field_makes_systems_at_the_ends_of_its_range_alone(monkeypatch):
-    made, plain = [], ContactSystem._excited
-    monkeypatch.setattr(ContactSystem, "_excited", lambda self, parts: made.append(
+def test_a_field_over_a_drive_looks_at_the_ends_of_its_range_alone(monkeypatch):
+    made, plain = [], ContactSystem.arrays_with
+    monkeypatch.setattr(ContactSystem, "arrays_with", lambda self, parts: made.append(
         parts["drive"].angular_frequency) or plain(self, parts))
     field_between(masses(drive=driven(), load=fc.Load(20.0)), ((FREQUENCY, (0.5, 1.5)),))
     assert made == pytest.approx([0.48, 1.52], rel=1e-12)

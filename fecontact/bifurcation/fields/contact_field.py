@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.parametrised_system import AffineArrays, ParametrisedSystem
+from fecontact.bifurcation.fields.corners import AffineArrays
+from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels

@@ -17,6 +17,7 @@ import numpy as np
 
 from fecontact.bifurcation.fields.corners import AffineArrays, Corners, NotAffineError
 from fecontact.core.checks import require_kind
+from fecontact.core.dotted_parameters import with_parameters
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array
 from fecontact.system.arrays import multilinear
@@ -129,6 +130,19 @@ class ParametrisedSystem:
         if len(self._made) > _CACHED_BOXES:
             self._made.popitem(last=False)
         return made
+
+    def excited(self, values: Array) -> SystemArrays:
+        """Arrays for values of drives and loads alone, without a system that is kept.
+
+        Raises
+        ------
+        InputError
+            If a value is out of its parameter's range.
+        """
+        parts = {name.partition(".")[0] for name in self.parameters}
+        return self.base.arrays_with(with_parameters(
+            {part: getattr(self.base, part) for part in parts},
+            dict(zip(self.parameters, values.tolist(), strict=True))))
 
     @property
     def base_values(self) -> Array:
@@ -278,9 +292,9 @@ def _corners_between(family: ParametrisedSystem, low: Array, high: Array) -> Cor
     # The first parameter changes fastest, as in the weights.
     order = [np.array(corner[::-1])
              for corner in product(*zip(low[::-1].tolist(), high[::-1].tolist(), strict=True))]
-    result = Corners(low, high, [family.system(corner).arrays for corner in order])
     if family.multilinear:
-        return result
+        return Corners(low, high, [family.excited(corner) for corner in order])
+    result = Corners(low, high, [family.system(corner).arrays for corner in order])
     inside = np.modf(np.sqrt(2.0) * np.arange(1.0, 1.0 + len(low)))[0]
     other, base = low + (1.0 - inside**2) * (high - low), family.base_values
     # There is a system for the base values already.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
-from fecontact.bifurcation.fields.parametrised_system import AffineArrays
+from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
 from fecontact.core.types import Array
