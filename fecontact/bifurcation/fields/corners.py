@@ -69,12 +69,12 @@ class Corners:
             if values[0].dtype.kind != "f":
                 raise NotAffineError
             size = values[0].size
-            parts.append(np.stack([value.reshape(-1) for value in values]))
+            parts.append(np.array([value.reshape(-1) for value in values]))
             self._places.append((number, slice(start, start + size), values[0].shape))
             start += size
         self.varying = frozenset(first._fields[number] for number, _, _ in self._places)
         # All varying arrays in one matrix: one product interpolates them.
-        self._flat = np.hstack(parts or [np.empty((len(corners), 0))])
+        self._flat = np.concatenate(parts or [np.empty((len(corners), 0))], axis=1)
 
     def hold(self, values: Array) -> bool:
         """Whether values (k,) lie in the box."""
