@@ -12,8 +12,8 @@ from fecontact.bifurcation import (
     frequency_response,
     nonlinear_mode,
 )
-from fecontact.bifurcation.harmonic import branches, sampling
-from fecontact.bifurcation.harmonic.sampling import sampling_error
+from fecontact.bifurcation.harmonic import branches
+from fecontact.bifurcation.harmonic.branches import sampling_error
 from fecontact.bifurcation.harmonic.starts import corrected, problem_for
 from fecontact.bifurcation.response_options import ResponseSettings
 from fecontact.core.errors import AnalysisError, InputError
@@ -127,7 +127,7 @@ def test_an_orbit_whose_friction_does_not_repeat_has_an_infinite_error(monkeypat
     def fails(self, u):
         raise AnalysisError("The internal variables do not come to repeat.")
 
-    monkeypatch.setattr(sampling, "replace", lambda problem, **changes: type(
+    monkeypatch.setattr(branches, "replace", lambda problem, **changes: type(
         "Failing", (), {"linearise": fails})())
     assert sampling_error(problem, u) == np.inf
 
