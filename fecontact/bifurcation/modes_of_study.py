@@ -56,15 +56,15 @@ def follow_mode(
         Told the number of points.
     earlier : NonlinearMode, optional
         What an interrupted computation of the same has left: it goes on at its last point. With a
-        tolerance the mode is followed anew, since the number of harmonics may still change.
+        tolerance the mode is followed anew, since harmonics or samples may still grow.
     keep : callable, optional
         Given what there is after each part, as interrupted.
     preload : LoadHistory, optional
         Whose end elements that never slide keep.
     """
     observe, method = observed_point(system, wanted), wanted.method()
-    parts = method.tolerance is None and keep is not None
-    mode = earlier if earlier is not None and method.tolerance is None else None
+    parts = not method.refines and keep is not None
+    mode = earlier if earlier is not None and not method.refines else None
     while True:
         done = 0 if mode is None else _regular(mode)
         most = min(wanted.points, done + _PART) if parts else wanted.points

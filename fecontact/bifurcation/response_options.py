@@ -45,6 +45,8 @@ class ResponseSettings:
         Largest truncation error, relative to the orbit, for which harmonics are added.
     most_harmonics : int
         Limit for that.
+    sampling_tolerance : float, optional
+        Largest error from few samples, relative to the orbit, for which samples are doubled.
     stability : 'transitions', 'Koopman-Hill' or 'none'
         How it is told whether orbits are stable; without it points take a fraction of the time and
         folds alone are found.
@@ -71,6 +73,7 @@ class ResponseSettings:
     samples: int | None = None
     tolerance: float | None = None
     most_harmonics: int = 100
+    sampling_tolerance: float | None = None
     stability: Literal["transitions", "Koopman-Hill", "none"] = "transitions"
     preload: bool = False
     step: float = 0.01
@@ -163,7 +166,8 @@ class ResponseSettings:
 
         return HarmonicBalance(self.harmonics, self.samples, self.tolerance,
                                max(self.harmonics, self.most_harmonics),
-                               None if self.stability == "none" else self.stability)
+                               None if self.stability == "none" else self.stability,
+                               self.sampling_tolerance)
 
     def options(self) -> "ContinuationOptions":
         """How responses are followed."""

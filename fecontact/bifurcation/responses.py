@@ -139,7 +139,7 @@ def _goes_on(known: FrequencyResponse, wanted: "ResponseSettings") -> bool:
     """
     low, high = wanted.checked_bounds
     return (known.branches[0].status is BranchStatus.INTERRUPTED
-            and not low < wanted.first < high and wanted.tolerance is None)
+            and not low < wanted.first < high and not wanted.method().refines)
 
 
 def _with_rest(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -52,9 +53,15 @@ def with_parameters(whole: Any, changes: Mapping[str, Any]) -> Any:
     return tuple(direct.get(str(index), item) for index, item in enumerate(whole))
 
 
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    """Names of the arguments of a dataclass."""
+    return tuple(entry.name for entry in fields(kind) if entry.init)
+
+
 def _members(whole: Any) -> dict[str, Any]:
     if is_dataclass(whole) and not isinstance(whole, type):
-        return {entry.name: getattr(whole, entry.name) for entry in fields(whole) if entry.init}
+        return {name: getattr(whole, name) for name in _names(type(whole))}
     if isinstance(whole, Mapping):
         return dict(whole)
     if isinstance(whole, tuple) and whole and all(is_dataclass(item) for item in whole):

@@ -24,6 +24,8 @@ from fecontact.laws.signals.harmonic import Harmonic, Signal
 AXES = ("x", "y", "z")
 BOUNDARY_STRESSES = ("pressure", "shear", "shear_across")
 _BASE = tuple(f"base_acceleration_{axis}" for axis in AXES)
+_SUPPORTS = tuple(f"{part}_{axis}" for part in ("stiffness", "damping") for axis in AXES)
+_MOTIONS = tuple((f"motion_{axis}", f"amplitude_{axis}") for axis in AXES)
 _COMPONENTS = ("x", "y", "z", "phi", "phi_x", "phi_y", "phi_z")
 
 
@@ -75,22 +77,19 @@ class Drive:
     dashpots: Literal["absolute", "relative"] = "absolute"
 
     def __post_init__(self) -> None:
-        given = {f"{part}_{axis}": getattr(self, f"{part}_{axis}")
-                 for part in ("stiffness", "damping", "amplitude") for axis in AXES}
-        require_not_negative(
-            "Drive", angular_frequency=self.angular_frequency,
-            **{name: value for name, value in given.items() if not name.startswith("amplitude")})
+        given = vars(self)
+        require_not_negative("Drive", angular_frequency=self.angular_frequency,
+                             **{name: given[name] for name in _SUPPORTS})
         require_choice("Drive", "dashpots", self.dashpots, ("absolute", "relative"))
-        require_finite("Drive", **{name: value for name, value in given.items()
-                                   if name.startswith("amplitude")})
-        for axis in AXES:
-            motion, amplitude = getattr(self, f"motion_{axis}"), given[f"amplitude_{axis}"]
+        require_finite("Drive", **{name: given[name] for _, name in _MOTIONS})
+        for name, amplitude in _MOTIONS:
+            motion = given[name]
             if motion is None:
                 continue
-            _require_signal("Drive", f"motion_{axis}", motion)
-            if amplitude != 0.0:
-                raise InputError(f"Drive: amplitude_{axis} = {amplitude!r} cannot be "
-                                 f"combined with motion_{axis}; give one of them.")
+            _require_signal("Drive", name, motion)
+            if given[amplitude] != 0.0:
+                raise InputError(f"Drive: {amplitude} = {given[amplitude]!r} cannot be combined "
+                                 f"with {name}; give one of them.")
         if self.motion_x is not None and self.motion_y is not None and self.angular_frequency and (
                 self.motion_z is not None or not self.amplitude_z):
             raise InputError(f"Drive: angular_frequency = {self.angular_frequency!r} has no "

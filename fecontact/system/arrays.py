@@ -8,9 +8,10 @@ import numpy as np
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
-from fecontact.laws.excitation import Drive, Load
+from fecontact.laws.excitation import AXES, Drive, Load
 from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.ground.ground import Ground
+from fecontact.laws.signals.harmonic import Harmonic
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.interfaces import PrescribedMotion
 from fecontact.system.loads import load_rows
@@ -18,6 +19,10 @@ from fecontact.system.nodes import SystemArrays
 from fecontact.system.space_nodes import SIDES, space_node
 
 LawGroup = tuple[slice, Array, Any]
+
+# Numbers of a drive and a load of which the arrays are multilinear functions.
+_MULTILINEAR = frozenset({"load.normal", "drive.angular_frequency", *(
+    f"drive.{part}_{axis}" for part in ("stiffness", "damping", "amplitude") for axis in AXES)})
 
 
 def system_arrays(
@@ -119,6 +124,30 @@ def excited(
     if "load" in parts:
         changed |= load_arrays(basis, parts["load"])
     return arrays._replace(**changed)
+
+
+def multilinear(names: Iterable[str], drive: Drive, load: Load) -> bool:
+    """Whether the arrays are known to be affine in each of some parameters, the others fixed.
+
+    They are in the numbers of drives and loads, and of their harmonic signals, by what
+    :func:`drive_arrays` and :func:`load_arrays` are. ``names`` are dotted; a drive, load or signal
+    of another class may do as it likes.
+    """
+    return all(_multilinear(name, {"drive": drive, "load": load}) for name in names)
+
+
+def _multilinear(name: str, parts: Mapping[str, Any]) -> bool:
+    first, _, inner = name.partition(".")
+    owner = parts.get(first)
+    if type(owner) not in (Drive, Load):
+        return False
+    if name in _MULTILINEAR:
+        return True
+    *path, _ = inner.split(".")
+    for step in path:
+        owner = (owner[int(step)] if isinstance(owner, tuple) and step.isdecimal()
+                 and int(step) < len(owner) else getattr(owner, step, None))
+    return type(owner) is Harmonic
 
 
 def with_sides(arrays: SystemArrays) -> SystemArrays:

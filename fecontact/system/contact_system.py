@@ -191,9 +191,13 @@ class ContactSystem(Summarised):
         made.__dict__.update(self.__dict__, **parts)
         made.__dict__.pop("_fields", None)  # Fields of parameters that it keeps.
         made._require_parts(parts)
-        require_motion(made.basis, made.drive, made.load)
-        made.__dict__["arrays"] = excited(self.arrays, self.basis, self.drive, parts)
+        made.__dict__["arrays"] = self.arrays_with(parts)
         return made
+
+    def arrays_with(self, parts: Mapping[str, Any]) -> SystemArrays:
+        """Arrays with another 'drive' or 'load' in ``parts``, which is checked as by with_()."""
+        require_motion(self.basis, parts.get("drive", self.drive), parts.get("load", self.load))
+        return excited(self.arrays, self.basis, self.drive, parts)
 
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
         names = [group for group, _ in self.basis.groups]

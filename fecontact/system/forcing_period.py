@@ -6,6 +6,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.laws.excitation import Drive
 from fecontact.laws.ground.fourier_series import FourierSeries
 from fecontact.laws.ground.measured_profile import MeasuredProfile
 from fecontact.laws.ground.profile import Profile, Sine
@@ -28,12 +29,31 @@ def common_period(system: ContactSystem) -> float | None:
         longest.
     """
     require_kind("common_period", ContactSystem, system=system)
+    return _common([period for _, period in _periods(system)])
+
+
+def drive_sets_period(system: ContactSystem) -> bool:
+    """Whether nothing repeats in time but the drive's motion with its angular frequency.
+
+    Raises
+    ------
+    AnalysisError
+        As :func:`common_period`.
+    """
+    names = [name for name, _ in _periods(system)]
+    own = [f"drive.motion_{axis}" for axis in "xyz"
+           if getattr(system.drive, f"motion_{axis}") is None]
+    return type(system.drive) is Drive and bool(names) and set(names) <= set(own)
+
+
+def _periods(system: ContactSystem) -> list[tuple[str, float]]:
+    """What repeats in time, with its period [s]."""
     drive, ground = system.drive, system.ground
     given: list[tuple[str, Any]] = [
         (f"drive.motion_{axis}", motion)
         for axis, acts, motion in zip("xyz", drive.moves, drive.motions, strict=True) if acts]
     given += [(f"load.{name}", signal) for name, signal in system.load.signals.items()]
-    periods = []
+    periods: list[tuple[str, float]] = []
     for name, source in given:
         if isinstance(source, Constant) or (isinstance(source, _REPEATING)
                                             and source.shortest_period is None):
@@ -41,7 +61,7 @@ def common_period(system: ContactSystem) -> float | None:
         if source.frequency_hz is None:
             raise AnalysisError(f"{name} is not periodic; periodic orbits need a drive and loads "
                                 f"that repeat.")
-        periods.append(1.0 / source.frequency_hz)
+        periods.append((name, 1.0 / source.frequency_hz))
     if not system.prescribed_motion.constant:
         raise AnalysisError("A motion of the ground, or of a side that slides, makes its speed "
                             "depend on time; periodic orbits are computed for constant speed.")
@@ -58,8 +78,8 @@ def common_period(system: ContactSystem) -> float | None:
             speed = (ground.speed * ground.wave_direction[0]
                      + ground.speed_y * ground.wave_direction[1])
         if shape is not None and not shape.flat and speed != 0.0:
-            periods.append(_repeat_length(name, shape) / abs(speed))
-    return _common(periods)
+            periods.append((name, _repeat_length(name, shape) / abs(speed)))
+    return periods
 
 
 def forcing_period(system: ContactSystem | VectorField) -> float:

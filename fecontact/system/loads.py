@@ -111,15 +111,19 @@ def work_of_loads(basis: ModalBasis, load: Load, depth: float) -> float:
 
 def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
     """Raise InputError for a drive or load in a direction in which no mode moves its point."""
-    acting = [(f"Drive: {part}_{name} = {value!r}", basis.T[0, axis], f"'B' moves along {name}")
-              for axis, name in enumerate(AXES[: basis.dimension])
-              for part in ("stiffness", "damping")
-              if (value := getattr(drive, f"{part}_{name}"))]
-    acting += [(f"Load: {part.what}", part.row, part.still) for part in acting_loads(basis, load)]
-    for what, row, still in acting:
-        if not row.any():
-            raise InputError(f"{what} has no effect, as {still} in no mode of the basis; leave it "
-                             f"out, or give the basis rows for that point.")
+    for axis, name in enumerate(AXES[: basis.dimension]):
+        for part, values in (("stiffness", drive.stiffness), ("damping", drive.damping)):
+            if values[axis] and not basis.T[0, axis].any():
+                raise _without_effect(f"Drive: {part}_{name} = {values[axis]!r}",
+                                      f"'B' moves along {name}")
+    for acting in acting_loads(basis, load):
+        if not acting.row.any():
+            raise _without_effect(f"Load: {acting.what}", acting.still)
+
+
+def _without_effect(what: str, still: str) -> InputError:
+    return InputError(f"{what} has no effect, as {still} in no mode of the basis; leave it out, or "
+                      f"give the basis rows for that point.")
 
 
 def load_summary(load: Load) -> str:

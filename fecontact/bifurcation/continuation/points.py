@@ -214,10 +214,12 @@ def branch_points(
     """
     found = []
     nothing: dict[str, Any] = {}
+    new = object.__new__
     for at, tangent, stored, fold in zip(u, tangents, values, folds, strict=True):
-        point: BranchPoint = object.__new__(FoldPoint if fold else BranchPoint)
-        point.__dict__.update(u=at, tangent=tangent, values=stored, kind="fold" if fold else None,
-                              _details=nothing, header=header)
+        point: BranchPoint = new(FoldPoint if fold else BranchPoint)
+        own = point.__dict__
+        own["u"], own["tangent"], own["values"] = at, tangent, stored
+        own["kind"], own["_details"], own["header"] = "fold" if fold else None, nothing, header
         found.append(point)
     return found
 

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.parametrised_system import AffineArrays, ParametrisedSystem
+from fecontact.bifurcation.fields.corners import AffineArrays
+from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
-from fecontact.system.forcing_period import common_period
+from fecontact.system.forcing_period import common_period, drive_sets_period
 from fecontact.system.nodes import SystemArrays
 
 # Relative step of differences in a parameter.
@@ -118,6 +119,19 @@ class ContactField(VectorField):
             If what is given in time has no common period.
         """
         return self._base_period if self._constant_period else common_period(self.system(values))
+
+    def repeats_with_drive(self, values: Array, index: int) -> bool:
+        """Whether a parameter is the drive's frequency w, and the forcing has the period 2 pi / w.
+
+        Raises
+        ------
+        AnalysisError
+            If what is given in time is not periodic.
+        """
+        name = "drive.angular_frequency"
+        if name in self._family.own or list(self.parameters)[index] != name:
+            return False
+        return drive_sets_period(self.system() if len(values) == 1 else self.system(values))
 
     @cached_property
     def _base_period(self) -> float | None:

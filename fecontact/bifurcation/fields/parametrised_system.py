@@ -2,23 +2,25 @@
 
 Building a system and its arrays takes some 0.2 ms of Python. Most arrays are constant or affine in
 each parameter; these are interpolated between the corners of a box, after a check at further
-points of it. The boxes lie about the base values, each twice as wide as the one before, so that the
-result depends on the parameter values alone and not on earlier calls. Where ranges are given, they
-are the first box.
+points of it, which numbers of drives and loads need not: how they enter is known. The boxes lie
+about the base values, each twice as wide as the one before, so that the result depends on the
+parameter values alone and not on earlier calls. Where ranges are given, they are the first box.
 """
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from itertools import product
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.fields.corners import AffineArrays, Corners, NotAffineError
 from fecontact.core.checks import require_kind
+from fecontact.core.dotted_parameters import with_parameters
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array
+from fecontact.system.arrays import multilinear
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.nodes import SystemArrays
 
@@ -27,34 +29,12 @@ Setter = Callable[[ContactSystem, float], ContactSystem]
 _CACHED_BOXES = 64
 # With more parameters the corners cost more than they save.
 _MOST_PARAMETERS = 4
-_AFFINE_ERROR = 1e-12
 # Largest number of doublings of the box; values farther away are not interpolated.
 _MOST_LEVELS = 50
 # Part of a range by which its box is wider, for differences at its ends.
 _BEYOND = 0.02
 # Part of a box, about its middle, within which base values serve to check what is affine.
 _WITHIN = 0.9
-
-
-@dataclass(frozen=True, eq=False)
-class AffineArrays:
-    """Arrays over one parameter p, the others fixed: those that vary are views of one vector.
-
-    Attributes
-    ----------
-    arrays : SystemArrays
-    flat, base, slope : (k,) arrays
-        What varies; ``flat[:] = base + p * slope`` sets it.
-    low, high : float
-        Range of p.
-    """
-
-    arrays: SystemArrays
-    flat: Array
-    base: Array
-    slope: Array
-    low: float
-    high: float
 
 
 class ParametrisedSystem:
@@ -66,6 +46,10 @@ class ParametrisedSystem:
         The system before any of the parameters is set.
     parameters : dict
         Names and base values.
+    own : frozenset of str
+        Names of those that a function of the user sets.
+    multilinear : bool
+        Whether the arrays are known to be affine in each parameter.
 
     ``ranges`` are those of the parameters, for all of them or none.
     """
@@ -84,6 +68,8 @@ class ParametrisedSystem:
         for name, value in given.items():
             self.parameters[name], setter = _parameter(system, name, value)
             self._setters.append(setter)
+        self.own = frozenset(name for name, value in given.items() if isinstance(value, tuple))
+        self.multilinear = not self.own and multilinear(self.parameters, system.drive, system.load)
         self._made: OrderedDict[bytes, ContactSystem] = OrderedDict()
         self._size = system.size
         self._known: bytes | None = None
@@ -91,19 +77,19 @@ class ParametrisedSystem:
         if all(value is None for value in given.values()):
             self._known = values.tobytes()
         self._latest: tuple[bytes, SystemArrays] | None = None
-        self._boxes: dict[tuple[int, ...], _Corners | None] = {}
+        self._boxes: dict[tuple[int, ...], Corners | None] = {}
         self._intervals: dict[tuple[int, int], tuple[float, float]] = {}
         self._base, self._width = values, np.where(values != 0.0, 0.05 * np.abs(values), 0.05)
-        self._first: _Corners | None = None
-        self._given: _Corners | None = None
+        self._first: Corners | None = None
+        self._given: Corners | None = None
         # The box used last, and its range of values.
-        self._recent: tuple[list[tuple[float, float]], _Corners] | None = None
+        self._recent: tuple[list[tuple[float, float]], Corners] | None = None
         if 0 < len(values) <= _MOST_PARAMETERS:
             self.system(values)
             self._first = self._between(ranges or {}) or self._box((0,) * len(values))
         self._fixed = self.system(values).arrays if not len(values) else None
 
-    def _between(self, ranges: Mapping[str, tuple[float, float]]) -> "_Corners | None":
+    def _between(self, ranges: Mapping[str, tuple[float, float]]) -> Corners | None:
         """A box of ranges that are given; None where some are not, or none is affine over it."""
         if set(ranges) != set(self.parameters):
             return None
@@ -112,9 +98,9 @@ class ParametrisedSystem:
             return None
         for beyond in (_BEYOND, 0.0):
             try:
-                self._given = _corners(self, low - beyond * (high - low),
+                self._given = _corners_between(self, low - beyond * (high - low),
                                        high + beyond * (high - low))
-            except (_NotAffineError, FecontactError):
+            except (NotAffineError, FecontactError):
                 continue
             return self._given
         return None
@@ -144,6 +130,19 @@ class ParametrisedSystem:
         if len(self._made) > _CACHED_BOXES:
             self._made.popitem(last=False)
         return made
+
+    def excited(self, values: Array) -> SystemArrays:
+        """Arrays for values of drives and loads alone, without a system that is kept.
+
+        Raises
+        ------
+        InputError
+            If a value is out of its parameter's range.
+        """
+        parts = {name.partition(".")[0] for name in self.parameters}
+        return self.base.arrays_with(with_parameters(
+            {part: getattr(self.base, part) for part in parts},
+            dict(zip(self.parameters, values.tolist(), strict=True))))
 
     @property
     def base_values(self) -> Array:
@@ -191,7 +190,7 @@ class ParametrisedSystem:
         corners = None if self._fixed is not None else self._corners_of(values)
         return None if corners is None else corners.along(values, index)
 
-    def _corners_of(self, values: Array) -> "_Corners | None":
+    def _corners_of(self, values: Array) -> Corners | None:
         """The box for these values; None where they are not interpolated."""
         if self._first is None:
             return None
@@ -213,14 +212,14 @@ class ParametrisedSystem:
                 map(_offsets, levels, self._width.tolist()), strict=True)], corners
         return corners
 
-    def _box(self, levels: tuple[int, ...]) -> "_Corners | None":
+    def _box(self, levels: tuple[int, ...]) -> Corners | None:
         """The box of given doublings in each parameter; None if no array is affine in it."""
         if levels not in self._boxes:
             low, high = np.array([self._interval(index, level)
                                   for index, level in enumerate(levels)]).T
             try:
-                made = _corners(self, low, high)
-            except (_NotAffineError, FecontactError):
+                made = _corners_between(self, low, high)
+            except (NotAffineError, FecontactError):
                 made = None
             self._boxes[levels] = made
         return self._boxes[levels]
@@ -260,108 +259,6 @@ class ParametrisedSystem:
         return None if self._first is None else self._first.varying
 
 
-class _Corners:
-    """Arrays at the corners of a box of parameter values, and between them."""
-
-    def __init__(self, low: Array, high: Array, corners: list[SystemArrays]) -> None:
-        self.low, self.high = low, high
-        first = corners[0]
-        self._plain = first
-        # Rates of what does not vary.
-        self._still = [np.zeros_like(array) if isinstance(array, np.ndarray)
-                       and array.dtype.kind == "f" else array for array in first]
-        # Of each parameter, with the values at which they hold.
-        self._slopes: dict[int, tuple[bytes, SystemArrays]] = {}
-        stacked: dict[str, Array] = {}
-        for name in first._fields:
-            if all(getattr(arrays, name) is getattr(first, name) for arrays in corners):
-                continue
-            values = [np.asarray(getattr(arrays, name)) for arrays in corners]
-            if any(value.shape != values[0].shape for value in values):
-                raise _NotAffineError
-            if any((value != values[0]).any() for value in values[1:]):
-                if values[0].dtype.kind != "f":
-                    raise _NotAffineError
-                stacked[name] = np.stack(values)
-        self.varying = frozenset(stacked)
-        # All varying arrays in one matrix: one product interpolates them.
-        self._flat = np.hstack([array.reshape(len(corners), -1) for array in stacked.values()]
-                               or [np.empty((len(corners), 0))])
-        self._limits = list(zip(low.tolist(), high.tolist(), strict=True))
-        self._places: list[tuple[int, slice, tuple[int, ...]]] = []
-        start = 0
-        for name, array in stacked.items():
-            size = array[0].size
-            number = first._fields.index(name)
-            self._places.append((number, slice(start, start + size), array.shape[1:]))
-            start += size
-
-    def hold(self, values: Array) -> bool:
-        for (low, high), value in zip(self._limits, values.tolist(), strict=True):
-            if not low <= value <= high:
-                return False
-        return True
-
-    def along(self, values: Array, index: int) -> AffineArrays:
-        """Arrays of their own over one value, the others fixed."""
-        ends = [values.copy(), values.copy()]
-        ends[0][index], ends[1][index] = self.low[index], self.high[index]
-        low, high = (np.array(self._weights(end)) @ self._flat for end in ends)
-        slope = (high - low) / (self.high[index] - self.low[index])
-        flat = low.copy()
-        return AffineArrays(self._with(flat, list(self._plain)), flat,
-                            low - self.low[index] * slope, slope, float(self.low[index]),
-                            float(self.high[index]))
-
-    def at(self, values: Array) -> SystemArrays:
-        return self._with(np.array(self._weights(values)) @ self._flat, list(self._plain))
-
-    def _weights(self, values: Array) -> list[float]:
-        weights = [1.0]
-        for (low, high), value in zip(self._limits, values.tolist(), strict=True):
-            x = (value - low) / (high - low)
-            weights = [w * (1.0 - x) for w in weights] + [w * x for w in weights]
-        return weights
-
-    def _with(self, flat: Array, arrays: list[Any]) -> SystemArrays:
-        for number, place, shape in self._places:
-            arrays[number] = flat[place].reshape(shape)
-        return SystemArrays(*arrays)
-
-    def slopes(self, values: Array, index: int) -> SystemArrays:
-        """Derivatives of the arrays to one value."""
-        place = values.copy()
-        place[index] = 0.0
-        key = place.tobytes()
-        if index not in self._slopes or self._slopes[index][0] != key:
-            weights = [1.0]
-            for each, ((low, high), value) in enumerate(zip(self._limits, values.tolist(),
-                                                            strict=True)):
-                x, rate = (value - low) / (high - low), 1.0 / (high - low)
-                below, above = (-rate, rate) if each == index else (1.0 - x, x)
-                weights = [w * below for w in weights] + [w * above for w in weights]
-            self._slopes[index] = key, self._with(np.array(weights) @ self._flat,
-                                                  list(self._still))
-        return self._slopes[index][1]
-
-    def agrees(self, arrays: SystemArrays, values: Array) -> bool:
-        mine = self.at(values)
-        for one, other in zip(arrays, mine, strict=True):
-            if one is other:
-                continue
-            expected, found = np.asarray(one), np.asarray(other)
-            if expected.shape != found.shape:
-                return False
-            scale = np.abs(expected).max(initial=0.0)
-            if np.abs(expected - found).max(initial=0.0) > _AFFINE_ERROR * scale:
-                return False
-        return True
-
-
-class _NotAffineError(Exception):
-    pass
-
-
 def _slope(step: float, here: Any, above: Any, below: Any, far_above: Any, far_below: Any) -> Any:
     """Derivative of fourth order of one array; ``here`` if it does not hold numbers of laws."""
     if not (isinstance(here, np.ndarray) and here.dtype.kind == "f"):
@@ -391,11 +288,13 @@ def _inside(values: Array, limits: list[tuple[float, float]]) -> bool:
     return True
 
 
-def _corners(family: ParametrisedSystem, low: Array, high: Array) -> _Corners:
+def _corners_between(family: ParametrisedSystem, low: Array, high: Array) -> Corners:
     # The first parameter changes fastest, as in the weights.
     order = [np.array(corner[::-1])
              for corner in product(*zip(low[::-1].tolist(), high[::-1].tolist(), strict=True))]
-    result = _Corners(low, high, [family.system(corner).arrays for corner in order])
+    if family.multilinear:
+        return Corners(low, high, [family.excited(corner) for corner in order])
+    result = Corners(low, high, [family.system(corner).arrays for corner in order])
     inside = np.modf(np.sqrt(2.0) * np.arange(1.0, 1.0 + len(low)))[0]
     other, base = low + (1.0 - inside**2) * (high - low), family.base_values
     # There is a system for the base values already.
@@ -403,7 +302,7 @@ def _corners(family: ParametrisedSystem, low: Array, high: Array) -> _Corners:
         other = base
     for point in (low + inside * (high - low), other):
         if not result.agrees(family.system(point).arrays, point):
-            raise _NotAffineError
+            raise NotAffineError
     return result
 
 

@@ -10,7 +10,7 @@ _STABILITY = ("transitions", "Koopman-Hill", None)
 # Samples per harmonic, and at least.
 _PER_HARMONIC, _LEAST = 8, 32
 # Largest number of harmonics or samples.
-_MOST = 100_000
+MOST = 100_000
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,9 @@ class HarmonicBalance:
         half each time, until it is met, up to ``most_harmonics``.
     most_harmonics : int
         Limit for that.
+    sampling_tolerance : float, optional
+        Largest error from few samples allowed on a branch, relative to the orbit: it is followed
+        again with twice the samples until the estimate is met, 'sampling_error' of the branch.
     stability : 'transitions', 'Koopman-Hill' or None
         How Floquet multipliers are found: from the linearised equations along the orbit, or by the
         projection of Bayer and Leine with 2 H harmonics, which suits smooth systems of few states.
@@ -51,23 +54,30 @@ class HarmonicBalance:
     tolerance: float | None = None
     most_harmonics: int = 100
     stability: str | None = "transitions"
+    sampling_tolerance: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("harmonics", "most_harmonics"):
             value = getattr(self, name)
-            if not (isinstance(value, int | np.integer) and 1 <= value <= _MOST):
+            if not (isinstance(value, int | np.integer) and 1 <= value <= MOST):
                 raise InputError(f"HarmonicBalance: {name} = {value!r} must be a whole number from "
-                                 f"1 to {_MOST}.")
+                                 f"1 to {MOST}.")
         least = 2 * self.harmonics + 2
         if self.samples is not None and not (isinstance(self.samples, int | np.integer)
-                                             and least <= self.samples <= _MOST):
+                                             and least <= self.samples <= MOST):
             raise InputError(f"HarmonicBalance: samples = {self.samples!r} must be a whole number "
-                             f"from {least}, twice the harmonics and two, to {_MOST}.")
-        if self.tolerance is not None:
-            require_positive("HarmonicBalance", tolerance=self.tolerance)
+                             f"from {least}, twice the harmonics and two, to {MOST}.")
+        for name in ("tolerance", "sampling_tolerance"):
+            if getattr(self, name) is not None:
+                require_positive("HarmonicBalance", **{name: getattr(self, name)})
         if self.stability not in _STABILITY:
             raise InputError(f"HarmonicBalance: stability = {self.stability!r} must be "
                              f"'transitions' or 'Koopman-Hill', or None.")
+
+    @property
+    def refines(self) -> bool:
+        """Whether branches may be followed again."""
+        return self.tolerance is not None or self.sampling_tolerance is not None
 
     @property
     def count(self) -> int:

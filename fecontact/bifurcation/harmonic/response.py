@@ -342,7 +342,7 @@ def _raised(
     low = values.copy()
     low[level] = 1e-3 * wanted
     bounds = (min(low[level], wanted), max(low[level], wanted))
-    plain = replace(method, tolerance=None)
+    plain = replace(method, tolerance=None, sampling_tolerance=None)
     problem, u = _from_rest(field, low, level, plain, replace(options, bounds=bounds), held)
     branch = branches.follow(problem, u, None, plain, replace(
         options, bounds=bounds, locate=False, progress=None), direction=np.sign(wanted))

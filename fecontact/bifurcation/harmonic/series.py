@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, i8, kernel, matrix
+from fecontact.core.compiled import f8, helper, i8, kernel, matrix
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -96,17 +96,8 @@ def with_harmonics(X: Array, harmonics: int) -> Array:
     return out
 
 
-@kernel(types.void(matrix, matrix, matrix, matrix, f8, i8, i8, _blocks))
-def fill_blocks(Cx, Sx, Cv, Sv, T, displacements, rows, out):
-    """Fill out (2 H + 1, b, 2 H + 1, b) with the derivatives of the balance to coefficients.
-
-    Cx, Sx (2 H + 1, b^2) are the cosine and sine coefficients k = 0..2 H, with the factor 2 / N for
-    k = 0 too, of the derivatives J of the rates to the unknown functions; Cv, Sv (2 H + 1, b m)
-    those to the velocities x' / T of the first m functions. The matrix is that of x'' / T^2 - f for
-    these m, and of x' / T - f for the others.
-    """
-    Cx, Sx, Cv, Sv, out = borrowed(Cx), borrowed(Sx), borrowed(Cv), borrowed(Sv), borrowed(out)
-    b, m = rows, displacements
+@helper
+def _fill(Cx, Sx, Cv, Sv, T, m, b, out):
     H = len(out) // 2
     for k in range(H + 1):
         row_c, row_s = max(2 * k - 1, 0), 2 * k
@@ -147,3 +138,20 @@ def fill_blocks(Cx, Sx, Cv, Sv, T, displacements, rows, out):
             else:
                 out[row_c, i, row_s, i] += turn
                 out[row_s, i, row_c, i] -= turn
+
+
+@kernel(types.void(matrix, matrix, matrix, matrix, f8, i8, i8, _blocks))
+def fill_blocks(Cx, Sx, Cv, Sv, T, displacements, rows, out):
+    """Fill out (2 H + 1, b, 2 H + 1, b) with the derivatives of the balance to coefficients.
+
+    Cx, Sx (2 H + 1, b^2) are the cosine and sine coefficients k = 0..2 H, with the factor 2 / N for
+    k = 0 too, of the derivatives J of the rates to the unknown functions; Cv, Sv (2 H + 1, b m)
+    those to the velocities x' / T of the first m functions. The matrix is that of x'' / T^2 - f for
+    these m, and of x' / T - f for the others.
+    """
+    Cx, Sx, Cv, Sv, out = borrowed(Cx), borrowed(Sx), borrowed(Cv), borrowed(Sv), borrowed(out)
+    # One function alone is common, and its loops of one round take most of the time.
+    if rows == 1 and displacements == 1:
+        _fill(Cx, Sx, Cv, Sv, T, 1, 1, out)
+    else:
+        _fill(Cx, Sx, Cv, Sv, T, displacements, rows, out)

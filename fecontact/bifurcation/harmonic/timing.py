@@ -1,5 +1,7 @@
 """How the period of the forcing depends on a parameter."""
 
+import math
+
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, made_values
@@ -19,12 +21,19 @@ def timing_of(
     """Period of the forcing times a parameter, and the period; None for what is not constant.
 
     In the first case the parameter is a frequency. In both the period need not be asked for at
-    other values, which takes long with contact systems. Compared at values beside the given one, or
-    at those for which there are systems already.
+    other values, which takes long with contact systems. Known where the parameter is the drive's
+    frequency and nothing else repeats; else compared at values beside the given one, or at those
+    for which there are systems already.
     """
     if isinstance(field, ContactField) and field.constant_period:
         return None, field.forcing_period(values)
     here = float(values[free])
+    try:
+        if (isinstance(field, ContactField) and here > 0.0
+                and field.repeats_with_drive(values, free)):
+            return 2.0 * math.pi, None
+    except FecontactError:
+        return None, None
     made = made_values(field, values, free) if isinstance(field, ContactField) else []
     places = [value for value in made if value * here > 0.0][: 1 + len(_BESIDE)]
     if len(places) <= len(_BESIDE):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
-from fecontact.bifurcation.fields.parametrised_system import AffineArrays
+from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
 from fecontact.core.types import Array
@@ -17,7 +17,9 @@ from fecontact.system.nodes import SystemArrays
 
 # Most unknowns that compiled code without LAPACK solves for together.
 MOST_UNKNOWNS = 160
-# Relative error of loads that are affine in the parameter.
+# Places within the range of the parameter that tell whether loads are affine in it.
+_PLACES = np.array([0.02, 0.98, 0.31])
+# Relative error of such loads.
 _AFFINE = 1e-13
 # Part of the forces on a body at rest up to which their mean is nothing.
 _NOTHING = 1e-14
@@ -127,31 +129,21 @@ class CompiledBalance:
         The latter holds for all values of the parameter if contact forces do not depend on it. None
         where loads are not affine.
         """
-        system, m, N = near.arrays, problem.layout.displacements, problem.samples
-        places = near.low + (near.high - near.low) * np.array([0.02, 0.98, 0.31])
-        periods = np.array([problem.period(places[k : k + 1]) for k in range(len(places))])
-        loads, matrices = np.empty((len(places), N, m)), np.empty((len(places), 2, m, m))
-        forces = np.empty((N, m))
+        m, N = problem.layout.displacements, problem.samples
+        places = near.low + (near.high - near.low) * _PLACES
+        periods = (problem.periods * problem.turn / places if problem.turn is not None
+                   else np.full(len(places), problem.periods * problem.fixed))
+        body, given, told = np.empty((4, m, m)), np.empty((2, N, m)), np.empty(3)
         forces_at_rest(places, periods, problem.series.times, near.flat, near.base, near.slope,
-                       system, loads, matrices, forces)
-        given = np.stack(_affine(places, loads))
-        if any(np.abs(given[0] + value * given[1] - load).max()
-               > _AFFINE * np.abs(given).max() * max(1.0, abs(value))
-               for value, load in zip(places, loads, strict=True)):
-            return None
-        # The forces are those at the last place; the means of the loads are to be its everywhere.
-        means = loads.mean(axis=1)
-        rests = (np.abs(forces.mean(axis=0)).max() <= _NOTHING * np.abs(forces).max()
-                 and np.abs(means - means[-1]).max() <= _NOTHING * np.abs(loads).max())
-        return np.concatenate(_affine(places, matrices)), given, bool(rests)
+                       near.arrays, body, given, told)
+        off, mean, change = told.tolist()
+        return None if off > _AFFINE else (body, given, mean <= _NOTHING and change <= _NOTHING)
 
     def _steady(self, near: AffineArrays) -> bool:
         """Whether contact forces depend neither on the parameter nor on time."""
         ground = self.contact_field.system().ground
-        return not ground.wavy and ground.friction_variation is None and not any(
-            isinstance(array, np.ndarray) and array.base is not None and name not in _OF_BODY
-            and np.may_share_memory(array, near.flat)
-            for name, array in zip(near.arrays._fields, near.arrays, strict=True))
+        return (not ground.wavy and ground.friction_variation is None
+                and near.varying <= _OF_BODY)
 
     def _plain(self, near: AffineArrays) -> bool:
         """Whether contact forces are those of plane bodies on ground of constant speed."""
@@ -166,12 +158,6 @@ class CompiledBalance:
         system = self.contact_field.system()
         return needs_friction(system.basis) or not all(
             isinstance(law, BilateralCubic) for _, _, law in system.law_groups("normal"))
-
-
-def _affine(places: Array, found: Array) -> tuple[Array, Array]:
-    """Value at zero and slope from the first two of arrays (P, ...) at places (P,)."""
-    slope = (found[1] - found[0]) / (places[1] - places[0])
-    return found[0] - places[0] * slope, slope
 
 
 def _contact_alone(system: SystemArrays) -> SystemArrays:

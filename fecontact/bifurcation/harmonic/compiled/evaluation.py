@@ -366,10 +366,12 @@ def condense(u, T, central, e):
         _add_memory(T, e)
     condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
     square = room.square[: k * k].reshape((k, k))
-    for i in range(k):
-        for j in range(k):
-            condensed[i, j] = square[i, j]
-        condensed[i, k] = room.column[(i // s) * m + room.order[i % s]]
+    for q in range(L):
+        for place in range(s):
+            i = q * s + place
+            for j in range(k):
+                condensed[i, j] = square[i, j]
+            condensed[i, k] = room.column[q * m + room.order[place]]
 
 
 @helper

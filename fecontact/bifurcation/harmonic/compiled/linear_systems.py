@@ -122,10 +122,12 @@ def factorise_with(row, T, e):
     k = L * count
     condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
     a = room.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
-    for i in range(k):
-        for j in range(k + 1):
-            a[i, j] = condensed[i, j]
-        a[k, i] = row[(i // count) * m + room.order[i % count]]
+    for q in range(L):
+        for place in range(count):
+            i = q * count + place
+            for j in range(k + 1):
+                a[i, j] = condensed[i, j]
+            a[k, i] = row[q * m + room.order[place]]
     a[k, k] = row[n]
     if count < m:
         for i in range(n):
@@ -152,12 +154,14 @@ def _once(row, T, e, x):
                 i = q * m + room.order[place]
                 x[n] -= row[i] * x[i]
     known = parts[: k + 1]
-    for i in range(k):
-        known[i] = x[(i // count) * m + room.order[i % count]]
+    for q in range(L):
+        for place in range(count):
+            known[q * count + place] = x[q * m + room.order[place]]
     known[k] = x[n]
     solve(a, room.pivots[: k + 1], known)
-    for i in range(k):
-        x[(i // count) * m + room.order[i % count]] = known[i]
+    for q in range(L):
+        for place in range(count):
+            x[q * m + room.order[place]] = known[q * count + place]
     x[n] = known[k]
     for place in range(count, m):
         for q in range(L):

@@ -1,46 +1,88 @@
 """Forces on a body at rest over a period, for several values of a parameter, in compiled code."""
 
+import math
+
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, f8, kernel, matrix, vector
+from fecontact.core.compiled import block, kernel, vector
 from fecontact.core.references import borrowed
 from fecontact.system.kernels import given_at, node_forces
 from fecontact.system.nodes import SYSTEM, force_room, in_space, leaning, memory_of, node_motion
 
 
-@kernel(types.void(vector, vector, vector, vector, vector, vector, SYSTEM, block,
-                   types.Array(f8, 4, "C"), matrix))
-def forces_at_rest(places, periods, tau, flat, base, slope, s, loads, matrices, forces):
-    """Fill loads (P, N, m) and matrices (P, 2, m, m), stiffness and damping, at P values.
+@kernel(types.void(vector, vector, vector, vector, vector, vector, SYSTEM, block, block, vector))
+def forces_at_rest(places, periods, tau, flat, base, slope, s, body, given, told):
+    """Fill body (4, m, m) and given (2, N, m), affine in a parameter p, from its first two places.
 
-    The arrays of the system are ``flat`` = ``base`` + p ``slope``. With the forces (N, m) of loads
-    and contact at rest for the last value.
+    These are stiffness and damping, and loads at the samples: values at p = 0 and their slopes. The
+    arrays of the system are ``flat`` = ``base`` + p ``slope``. told (3,) says how far loads are
+    from being affine at all places, relative to the largest; the largest mean of the forces of
+    loads and contact at rest for the last place, relative to the largest force; and the largest
+    change of the mean of the loads, relative to the largest load.
     """
-    s, loads, forces = borrowed(s), borrowed(loads), borrowed(forces)
+    s, body, given, told = borrowed(s), borrowed(body), borrowed(given), borrowed(told)
     n, m = s.Tx.shape
-    states = s.memory.max()
+    P, N, states = len(places), len(tau), s.memory.max()
     length, width = force_room(states, in_space(s))
     force, rates = np.empty(length), np.empty((states, width))
     load, still = np.empty(m), np.zeros(2 * m + n * states)
-    for place in range(len(places)):
+    loads, rest, matrices = np.empty((P, N, m)), np.empty((N, m)), np.empty((P, 2, m, m))
+    for place in range(P):
         for k in range(len(flat)):
             flat[k] = base[k] + places[place] * slope[k]
-        for c in range(len(tau)):
+        for c in range(N):
             moved = given_at(tau[c] * periods[place], s, load)
             for i in range(m):
                 loads[place, c, i] = load[i]
-            if place + 1 < len(places):
+            if place + 1 < P:
                 continue
             for i in range(m):
-                forces[c, i] = load[i]
+                rest[c, i] = load[i]
             for j in range(n):
                 F, R, contact = node_forces(j, node_motion(j, still, s), moved,
                                             memory_of(j, still, s), s, force, rates)
                 T = leaning(F, R, contact.slope, s)
                 for i in range(m):
-                    forces[c, i] += s.Ty[j, i] * F - s.Tx[j, i] * T
+                    rest[c, i] += s.Ty[j, i] * F - s.Tx[j, i] * T
         for i in range(m):
             for j in range(m):
                 matrices[place, 0, i, j] = s.stiffness[i, j]
                 matrices[place, 1, i, j] = s.damping[i, j]
+    span = places[1] - places[0]
+    for part in range(2):
+        for i in range(m):
+            for j in range(m):
+                first, rate = matrices[0, part, i, j], (
+                    matrices[1, part, i, j] - matrices[0, part, i, j]) / span
+                body[part, i, j], body[2 + part, i, j] = first - places[0] * rate, rate
+    largest, most, off = 0.0, 0.0, 0.0
+    for c in range(N):
+        for i in range(m):
+            rate = (loads[1, c, i] - loads[0, c, i]) / span
+            given[0, c, i], given[1, c, i] = loads[0, c, i] - places[0] * rate, rate
+            largest = max(largest, abs(given[0, c, i]), abs(rate))
+    mean, change, heaviest = 0.0, 0.0, 0.0
+    for place in range(P):
+        p, worst = places[place], 0.0
+        for c in range(N):
+            for i in range(m):
+                worst = max(worst, abs(given[0, c, i] + p * given[1, c, i] - loads[place, c, i]))
+                heaviest = max(heaviest, abs(loads[place, c, i]))
+        if worst > 0.0:
+            off = max(off, worst / (largest * max(1.0, abs(p)))) if largest > 0.0 else math.inf
+    for i in range(m):
+        last, total = 0.0, 0.0
+        for c in range(N):
+            last += loads[P - 1, c, i] / N
+            total += rest[c, i] / N
+            most = max(most, abs(rest[c, i]))
+        mean = max(mean, abs(total))
+        for place in range(P):
+            other = 0.0
+            for c in range(N):
+                other += loads[place, c, i] / N
+            change = max(change, abs(other - last))
+    told[0] = off
+    told[1] = mean / most if mean > 0.0 else 0.0
+    told[2] = change / heaviest if change > 0.0 else 0.0

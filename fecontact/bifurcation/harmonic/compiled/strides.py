@@ -186,7 +186,10 @@ class Strides:
         distances = np.abs(u[:, -1] - start.u[-1]) / width
         near = np.flatnonzero(distances <= 6.0 * lengths)
         if here is start:
-            near = near[near > 0]
+            # As long as the parameter goes on from the start, it does not come back to it.
+            p = u[:, -1]
+            turned = np.flatnonzero((p[1:] - p[:-1]) * (p[0] - start.u[-1]) <= 0.0)
+            near = near[near > turned[0]] if len(turned) else near[:0]
         # With several periods of the forcing in another phase.
         if problem.periods != 1:
             ends = np.append(abs(float(here.u[-1] - start.u[-1])) / width, distances)
