@@ -26,6 +26,8 @@ Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 _SLIP = 0.05
 # Change of the state for a difference of runs, in parts of its largest value.
 _DIFFERENCE = 1e-5
+# Steps between two output times at which states are looked at for their largest values.
+_BETWEEN = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +163,13 @@ def _differences(
     # Errors of runs are divided by the change of the state.
     settings: dict[str, Any] = {"solver": solver, "rtol": max(1e-3 * rtol, 1e-12),
                                 "max_step": max_step}
-    states = _states(ensemble(system, times, initial=state[None], **settings))[0]
     size, pieces = len(state), len(times) - 1
-    largest = np.abs(states).reshape(len(times), 2, -1).max(axis=(0, 2))
+    # At the output times alone the system may be at rest.
+    parts = np.linspace(0.0, 1.0, _BETWEEN + 1)[:-1]
+    close = np.append((times[:-1, None] + np.diff(times)[:, None] * parts).reshape(-1), times[-1])
+    found = _states(ensemble(system, close, initial=state[None], **settings))[0]
+    states = found[::_BETWEEN]
+    largest = np.abs(found).reshape(len(close), 2, -1).max(axis=(0, 2))
     moves = np.repeat(_DIFFERENCE * np.where(largest > 0.0, largest, 1.0), size // 2)
     spans = np.stack([times[:-1], times[1:]], axis=1)
     aside = np.concatenate([np.diag(moves), -np.diag(moves)])

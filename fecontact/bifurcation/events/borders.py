@@ -19,7 +19,7 @@ from fecontact.bifurcation.events.orbit import EventOrbit
 from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase
 from fecontact.bifurcation.events.tracing import jumps, order_of, released_sense
 from fecontact.core.types import Array
-from fecontact.integrate.nonsmooth.problem import STICK
+from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, STICK
 
 # Part of the period below which a phase vanishes together with another condition.
 _VANISHING = 1e-5
@@ -231,11 +231,13 @@ def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Succ
     k = len(phase.status)
     cluster = event // 2 if 0 <= event < 2 * k else None
     found = Successor(problem, u)
+    if condition.what in (RATE, WITHIN, BEGIN) and cluster is not None and phase.opens(event):
+        return
     if condition.what == STRIKE:
         if cluster is not None:
             yield from _other_impacts(problem, u, condition, cluster)
     elif cluster is None and condition.what != DURATION:
-        yield from _at_stop(problem, found, condition)
+        yield from _at_stop(problem, u, condition)
     elif condition.what == DURATION and problem.count > 1:
         found.drop(i)
         yield found
@@ -265,10 +267,11 @@ def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Succ
 
 
 def _at_stop(
-    problem: EventOrbit, found: Successor, condition: Condition
+    problem: EventOrbit, u: Array, condition: Condition
 ) -> Iterator[Successor]:
     """Orbits behind a touch without speed."""
     i, event, count = condition.phase, condition.event, problem.count
+    found = Successor(problem, u)
     phase, motion = problem.phases[i], found.motion
     stop = event - 2 * motion.clusters
     if condition.what == RATE and not phase.closed[stop]:
@@ -278,10 +281,44 @@ def _at_stop(
     elif condition.what == WITHIN and not phase.closed[stop]:
         begin, after = found.begin(i), condition.after
         state = motion.run(begin, np.array([after]), found.starts[i], phase)[0][-1]
-        touch = motion.touch(begin + after, state, phase.ending(event))
-        if touch is not None:
+        for touch in motion.touches(begin + after, state, phase.ending(event)):
+            found = Successor(problem, u)
             found.split(i, after, phase.ending(event, touch))
             yield found
+    elif phase.lifts_off(event) and motion.problem.restitution == 0.0 and (
+            condition.what == WITHIN
+            or (condition.what == BEGIN and problem.phases[i - 1].event == event)):
+        yield from _with_flight(problem, u, condition)
+
+
+def _with_flight(
+    problem: EventOrbit, u: Array, condition: Condition
+) -> Iterator[Successor]:
+    """Orbits with a flight without duration where the force of a closed stop touches zero.
+
+    That is within the phase, or where the stop has just been struck. Masses that rebound strike it
+    without end before they rest again.
+    """
+    i, event, after = condition.phase, condition.event, condition.after
+    found = Successor(problem, u)
+    phase, motion, begin = problem.phases[i], found.motion, found.begin(i)
+    stop = event - 2 * motion.clusters
+    closed = tuple(int(each and j != stop) for j, each in enumerate(phase.closed))
+    own, status = motion.problem.cluster[stop], list(phase.status)
+    beside = any(each and motion.problem.cluster[j] == own for j, each in enumerate(closed))
+    if status[own] != FIXED and not beside:
+        status[own] = OPEN
+    flight = Phase(tuple(status), closed, event)
+    state = motion.run(begin, np.array([after]), found.starts[i], phase)[0][-1]
+    for touch in motion.touches(begin + after, state, flight):
+        found = Successor(problem, u)
+        flight = replace(flight, strike=touch)
+        if condition.what == WITHIN:
+            found.split(i, after, phase.ending(event))
+            found.insert(0 if phase.event == PERIOD else i + 1, flight)
+        else:
+            found.insert(i, flight)
+        yield found
 
 
 def _other_impacts(
@@ -299,6 +336,8 @@ def _other_impacts(
     modes[cluster] = sense if stopped else STICK
     found = Successor(problem, u)
     found.phases[i] = phase.ending(phase.event, replace(phase.strike, modes=tuple(modes)))
-    if stopped and behind.status[cluster] in (STICK, -sense):
+    # With tangential restitution what it stops rebounds, and slips behind it on either side.
+    rests = stopped and found.motion.problem.tangential == 0.0
+    if rests and behind.status[cluster] in (STICK, -sense):
         found.insert((i + 1) % problem.count, _with(behind, cluster, sense, 2 * cluster))
     yield found

@@ -16,9 +16,9 @@ from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
 from fecontact.bifurcation.events.conditions import DURATION, STRIKE, Condition
 from fecontact.bifurcation.events.orbit import EventOrbit, anchor
 from fecontact.bifurcation.events.phases import Motion
-from fecontact.bifurcation.events.tracing import Traced, traced
+from fecontact.bifurcation.events.tracing import Traced, sizes_without_contact, traced
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.core.errors import FecontactError
+from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.integrate.solvers import SetValued
@@ -28,6 +28,8 @@ _BEYOND, FITS = (0.1, 0.01, 1e-3), 1e-5
 # What is left of a condition at a border counts as nothing below this; at most so many borders are
 # met at once.
 _NOTHING, _DEPTH = 1e-5, 4
+# Ranges of the states below this part of the largest one are those of a system at rest.
+_STILL, _NONE = 1e-10, 1e-200
 # Most borders on one branch.
 _MOST = 40
 # Distance from a border within which turns of the branch belong to it.
@@ -48,9 +50,15 @@ def orbit_from(
         If the motion cannot be taken apart into phases; see
         :func:`fecontact.bifurcation.events.tracing.traced`.
     """
-    scales = np.concatenate([widths[:-1], [period, widths[-1]]])
-    motion = Motion(field, values, free, solver, widths[:-1], float(widths[-1]), period,
-                    max(1e-13, 1e-2 * rtol))
+    tolerance = max(1e-13, 1e-2 * rtol)
+
+    def moving(sizes: Array) -> Motion:
+        return Motion(field, values, free, solver, sizes, float(widths[-1]), period, tolerance)
+
+    sizes = widths[:-1]
+    if not sizes.max() > max(_STILL * np.abs(start).max(), _NONE):
+        sizes = sizes_without_contact(moving(np.ones(len(start))), begin, start, period)
+    scales, motion = np.concatenate([sizes, [period, widths[-1]]]), moving(sizes)
     forced = field.forcing_period(values) is not None
     found = traced(motion, begin, start, period, forced)
     problem = EventOrbit(field, values.copy(), free, found.phases, solver, scales,
@@ -142,6 +150,9 @@ def _side(
             if not points:
                 raise
             return Going(points, BranchStatus.STALLED, str(error))
+        if not points and problem.linearise(piece.points[0].u).least.left < -_NOTHING:
+            raise AnalysisError("The orbit at the start breaks the conditions of its phases; run "
+                                "the motion longer until it has settled.")
         found, whole = shortened(piece.points, left)
         last = found[-1]
         ended = whole and piece.status is BranchStatus.DISCONTINUITY

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase, scales_of
+from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, scales_of
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.problem import STICK
 
@@ -23,9 +23,9 @@ DURATION, RATE, WITHIN, BEGIN, CROSSING, STRIKE = range(6)
 _NEAR = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 _PARTS = np.concatenate([[0.0], _NEAR, np.linspace(0.02, 0.98, 49), 1.0 - _NEAR[::-1], [1.0]])
 _PLACES, _ONCE_MORE = 9, 1.0 + 0.02 * np.arange(5)
-# Parts of the period below which a phase has no rate at its end, and what vanishes at both of its
-# ends has no minimum between them.
-_BRIEF, _SHORT = 1e-6, 1e-2
+# Part of the period below which what vanishes at both ends of a phase has no minimum between them,
+# and part of a phase in which what vanishes at its begin with speed and acceleration is rounding.
+_SHORT, _FLAT = 1e-2, 0.02
 # Minima below this part of the scale are looked at closely.
 _CLOSE = 0.3
 
@@ -76,7 +76,7 @@ def of_phase(course: Course, i: int, rate: float) -> Iterator[Condition]:
     phase, T, duration = course.phases[i], course.period, float(course.durations[i])
     yield Condition(duration / T, DURATION, i, phase.event, duration)
     # What vanishes at both ends of a phase has no rate where the phase has no duration.
-    if phase.event != PERIOD and not (phase.order and abs(duration) < _BRIEF * T):
+    if phase.event != PERIOD and not abs(duration) < BRIEF[phase.order] * T:
         scale = scales_of(phase, course.margins)[phase.event] * (duration / T) ** phase.order
         yield Condition(float(-rate * T / scale), RATE, i, phase.event, duration)
     if duration > 0.0:
@@ -114,6 +114,8 @@ def _within(course: Course, i: int) -> Iterator[Condition]:
         if between or not np.isfinite(column).all():
             continue
         low = 1 + np.flatnonzero((column[1:-1] < column[:-2]) & (column[1:-1] <= column[2:]))
+        if event == phase.event and phase.order == len(BRIEF) - 1:
+            low = low[parts[low] > _FLAT]
         for place in low:
             after, value = float(times[place]), float(column[place])
             if value < _CLOSE:
@@ -152,7 +154,8 @@ def _at_begin(course: Course, i: int) -> Iterator[Condition]:
         elif cluster is None and place == event and not phase.closed[event - 2 * k]:
             continue
         elif own is not None and place == 2 * own and before.strike is not None and (
-                before.strike.modes[own] == STICK and phase.status[own] in (1, -1)):
+                before.strike.modes[own] == STICK and phase.status[own] in (1, -1)
+                and course.motion.problem.tangential == 0.0):
             # What an impact has stopped slips again at once.
             turning.append(own)
             continue

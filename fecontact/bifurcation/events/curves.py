@@ -11,10 +11,10 @@ from fecontact.bifurcation.continuation.points import DiscontinuityPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, sizes_of
 from fecontact.bifurcation.events.borders import beyond
 from fecontact.bifurcation.events.branches import FITS, nothing_left
-from fecontact.bifurcation.events.conditions import Condition, Course, of_phase
+from fecontact.bifurcation.events.conditions import DURATION, Condition, Course, of_phase
 from fecontact.bifurcation.events.linearisation import EventLinearisation
 from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventOrbit
-from fecontact.bifurcation.events.phases import PERIOD, Phase, Strike
+from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Phase, Strike
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.core.errors import AnalysisError, InputError
@@ -219,8 +219,10 @@ def border_curve(
     value = float(orbit.values[second])
     width = widths.get(parameter, abs(value) or 1.0)
     what, phase, event = (int(each) for each in np.asarray(point._detail("condition")))
-    if orbit.phases[0].event == PERIOD:
-        orbit, u, (what, phase, event) = _with_event(orbit, u, (what, phase, event))
+    here = orbit.phases[phase]
+    flight = what == DURATION and here.order == len(BRIEF) - 1
+    if flight or (here.event == PERIOD and not here.lifts_off(event)):
+        orbit, u, (what, phase, event) = _other_side(orbit, u, (what, phase, event))
     beside = frozenset(named(each) for each in orbit.linearise(u).conditions
                        if abs(each.left) < _SAME) | {(what, phase, event)}
     problem = BorderCurve(orbit, second, width, what, phase, event, beside)
@@ -229,12 +231,13 @@ def border_curve(
         "scales": sizes}
 
 
-def _with_event(
+def _other_side(
     orbit: EventOrbit, u: Array, condition: tuple[int, int, int]
 ) -> tuple[EventOrbit, Array, tuple[int, int, int]]:
-    """An orbit without events at a border, begun where it meets that, and the condition there.
+    """The orbit on the other side of a border, and the condition there.
 
-    The border may come to any time of the period, also to the begin of the orbit.
+    One without events then begins where it meets the border, which may come to any time of the
+    period. One with a flight without duration has no flight.
     """
     for each in nothing_left(orbit, u):
         for successor in beyond(orbit, u, each):

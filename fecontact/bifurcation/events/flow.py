@@ -39,6 +39,7 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at
 from fecontact.integrate.nonsmooth.transitions import decide_clusters
+from fecontact.laws.signatures import normal_at
 
 # Step of differences, in sizes of the states or in the longest step, and their weights: to both
 # sides from -2 to 2, to one from 0 to 4.
@@ -46,6 +47,8 @@ PART = 3e-4
 _BOTH = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
 _ONE = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 12.0
 _SHORTEST = 1e-13
+# Penetration at first contact [m].
+_FIRST = 1e-100
 
 
 @helper
@@ -209,6 +212,24 @@ def flow(held_p, held_above, held_below, held_w, change, tick, limits, begin, lo
     return 0
 
 
+@helper
+def _pressed(j, p, w):
+    """Normal force of a node on compliant contact; where it is open, below zero and smooth.
+
+    The law without its limit, of damping that is proportional to the speed, and for a height what
+    it would push at that penetration.
+    """
+    s = p.system
+    force, depth, rate = w.nodes[j, FORCE], w.nodes[j, PENETRATION], w.nodes[j, RATE]
+    if force > 0.0:
+        return force
+    law = normal_at(s.normal[j])
+    if depth > 0.0:
+        return (2.0 * law(depth, 0.0, s.normal_parameters[j])[0]
+                - law(depth, abs(rate), s.normal_parameters[j])[0])
+    return -law(-depth, max(-rate, 0.0), s.normal_parameters[j])[0]
+
+
 @kernel(types.void(PROBLEM, WORKSPACE, vector, matrix, integers, integers, vector, vector, matrix,
                    matrix))
 def observe(held_p, held_w, times, states, status, closed, full, rate, margins, rates):
@@ -216,7 +237,8 @@ def observe(held_p, held_w, times, states, status, closed, full, rate, margins, 
 
     Of a cluster c that slips the speed in its sense at 2 c and, on compliant contact, its normal
     force at 2 c + 1; of one that sticks what its force has left to either side; of a closed stop j
-    its force at 2 k + j, of an open one its height. The rest is infinite.
+    and of a node on compliant contact its force at 2 k + j, of an open stop its height. The rest is
+    infinite. The force of an open node is what its law would pull.
     """
     p, w = borrowed(held_p), borrowed(held_w)
     clusters, n = len(p.rows), len(p.cluster)
@@ -231,10 +253,17 @@ def observe(held_p, held_w, times, states, status, closed, full, rate, margins, 
                 margins[row, 2 * c] = status[c] * w.slip[c]
                 if p.restitution < 0.0:
                     margins[row, 2 * c + 1] = w.pressing[c]
-        if p.restitution >= 0.0:
-            for j in range(n):
-                margins[row, 2 * clusters + j] = (w.nodes[j, FORCE] if closed[j]
-                                                  else -w.nodes[j, PENETRATION])
+                    if not w.pressing[c] > 0.0:
+                        margins[row, 2 * c + 1] = -np.inf
+        for j in range(n):
+            place = 2 * clusters + j
+            if p.restitution >= 0.0:
+                margins[row, place] = w.nodes[j, FORCE] if closed[j] else -w.nodes[j, PENETRATION]
+                continue
+            margins[row, place] = _pressed(j, p, w)
+            c = p.cluster[j]
+            if (status[c] == 1 or status[c] == -1) and not margins[row, 2 * c + 1] > 0.0:
+                margins[row, 2 * c + 1] = max(margins[row, 2 * c + 1], margins[row, place])
 
 
 @kernel(types.void(PROBLEM, WORKSPACE, f8, vector, integers, integers, vector, vector, matrix,
@@ -261,7 +290,8 @@ def strike_rows(held_p, held_w, t, state, status, closed, full, rate, held, push
 
 @kernel(f8(PROBLEM, WORKSPACE, PROGRESS, ROOM, f8, f8, f8))
 def decide(held_p, held_w, held_progress, held_room, t, near, slow):
-    """Change the contact state at a moment as a run does; negative where that is impossible.
+    """Change the contact state at a moment as a run does; NO_ACCELERATION or NO_IMPULSES where that
+    is impossible, else the time of a flight.
 
     What ``room`` marks changes: see :func:`fecontact.integrate.nonsmooth.rigid_stops` and
     :func:`fecontact.integrate.nonsmooth.transitions.decide_clusters`.
@@ -273,6 +303,16 @@ def decide(held_p, held_w, held_progress, held_room, t, near, slow):
                                             room.slopes[0])
     decide_clusters(t, p, progress, room, near, w, room.slopes[0])
     return 0.0
+
+
+@kernel(types.void(PROBLEM, vector))
+def forces_of_touch(held_p, out):
+    """Fill out (n,) with the normal forces at first contact of dashpots, at a unit rate."""
+    p = borrowed(held_p)
+    for j in range(len(out)):
+        law = normal_at(p.system.normal[j])
+        out[j] = (law(_FIRST, 1.0, p.system.normal_parameters[j])[0]
+                  - law(_FIRST, 0.0, p.system.normal_parameters[j])[0])
 
 
 @kernel(types.void(PROBLEM, vector))

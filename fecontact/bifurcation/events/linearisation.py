@@ -8,18 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.events.conditions import Condition, Course, conditions
-from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase, scales_of
+from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, scales_of
 from fecontact.bifurcation.orbits.floquet import Floquet
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
 _SAMPLES = 129  # of a phase, for the extremes of the states
-# Part of the period below which equations divided by a duration are interpolated over it.
-_BRIEF = 1e-5
+# Places between which equations divided by a brief duration are interpolated over it, by order.
+_TWO, _FOUR = np.array([-1.0, 1.0]), np.array([-2.0, -1.0, 1.0, 2.0])
+_PLACES = (np.zeros(0), _TWO, _TWO, _FOUR)
 # Singular values of a jump below this part of the largest are zero.
 _RANK = 1e-9
 # Smallest rate with which something vanishes, relative to its scale and the period.
 _SLOWEST = 1e-13
+
+
+def _weights(places: Array, at: float) -> tuple[Array, Array]:
+    """Weights of values at places for the polynomial through them, and for its slope."""
+    powers = np.vander(places, increasing=True)
+    exponents = np.arange(len(places))
+    here = at**exponents
+    slope = np.append(0.0, exponents[1:] * at ** exponents[:-1])
+    return np.linalg.solve(powers.T, here), np.linalg.solve(powers.T, slope)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +111,13 @@ class EventLinearisation:
             after = motion.struck(t, state, phase)
             jumped = motion.slopes_of(
                 lambda t, state, problem: motion.struck(t, state, phase, problem), t, state)
+        elif phase.lifts_off():
+            # A flight begins at the stop and without speed, whatever the equations of rest say.
+            stops = (phase.event - 2 * motion.clusters,)
+            after = motion.settled(t, state, phase, stops)
+            jumped = motion.slopes_of(
+                lambda t, state, problem: motion.settled(t, state, phase, stops, problem),
+                t, state)
         return End(state, rates[0], moved, after, jumped, margin, slopes)
 
     def _event(self, i: int) -> tuple[float, Array]:
@@ -108,20 +125,20 @@ class EventLinearisation:
         problem, phase, end = self.problem, self.problem.phases[i], self._ends[i]
         T, scale = float(problem.scales[-2]), float(scales_of(phase, problem.margins)[phase.event])
         tau = float(problem.durations(self.u)[i])
-        if phase.order == 0 or abs(tau) > _BRIEF * T:
+        factor, near = T**phase.order / scale, BRIEF[phase.order] * T
+        if phase.order == 0 or abs(tau) > near:
             value, slopes = self._divided(end, phase.order, tau)
-            return value * T**phase.order / scale, slopes * (T**phase.order / scale)
+            return value * factor, slopes * factor
         # The quotient is smooth where the duration vanishes.
-        near = _BRIEF * T
-        sides = [self._divided(self.end(phase, float(self.begins[i]),
-                                        problem.starts(self.u)[i], sign * near),
-                               phase.order, sign * near) for sign in (1.0, -1.0)]
-        parts = ((near + tau) / (2.0 * near), (near - tau) / (2.0 * near))
-        value = sum(part * side[0] for part, side in zip(parts, sides, strict=True))
-        slopes = parts[0] * sides[0][1] + parts[1] * sides[1][1]
-        slopes[-1] = (sides[0][0] - sides[1][0]) / (2.0 * near)
-        factor = T**phase.order / scale
-        return float(value * factor), slopes * factor
+        places = _PLACES[phase.order]
+        sides = [self._divided(self.end(phase, float(self.begins[i]), problem.starts(self.u)[i],
+                                        near * place), phase.order, near * place)
+                 for place in places.tolist()]
+        parts, rates = _weights(places, tau / near)
+        values = np.array([side[0] for side in sides])
+        slopes = parts @ np.array([side[1] for side in sides])
+        slopes[-1] = rates @ values / near
+        return float(parts @ values) * factor, slopes * factor
 
     @staticmethod
     def _divided(end: End, order: int, tau: float) -> tuple[float, Array]:

@@ -1,6 +1,6 @@
 """Phases of set-valued orbits: contact states between events, their motion, and impacts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, product
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.events.flow import (
     PART,
     flow,
+    forces_of_touch,
     kinetic_coefficients,
     observe,
     strike_rows,
@@ -31,6 +32,9 @@ _CHANGE = 1e-5
 _LONGEST = 0.02
 # Impulses and speeds within rounding of zero, relative to the largest.
 _ROUNDING = 1e-9
+# Durations in periods below which what vanishes at the end of a phase, divided by the power of the
+# duration with which it vanishes at the begin too, is mostly rounding.
+BRIEF = (0.0, 1e-5, 1e-5, 5e-3)
 # Offsets and weights of a difference of fourth order.
 _OFFSETS, _WEIGHTS = np.array([-2.0, -1.0, 1.0, 2.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 
@@ -71,6 +75,18 @@ class Phase:
     event: int
     strike: Strike | None = None
     order: int = 0
+
+    def opens(self, event: int) -> bool:
+        """Whether an event ends the normal force of a cluster that slips, or of a node."""
+        cluster = self.cluster(event)
+        if cluster is None:
+            return self.lifts_off(event)
+        return event % 2 == 1 and self.status[cluster] in (1, -1)
+
+    def lifts_off(self, event: int | None = None) -> bool:
+        """Whether an event, by default its own, is where the force of a closed stop vanishes."""
+        stop = (self.event if event is None else event) - 2 * len(self.status)
+        return stop >= 0 and bool(self.closed[stop])
 
     @property
     def state(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -143,6 +159,15 @@ class Motion:
         kinetic_coefficients(self.problem, found)
         return found
 
+    @cached_property
+    def _unwatched(self) -> NDArray[np.bool_]:
+        """Nodes (n,) whose opening is no event of their own: their forces begin from zero."""
+        found = np.zeros(self.nodes)
+        if self.problem.restitution < 0.0:
+            forces_of_touch(self.problem, found)
+            return found == 0.0
+        return found > 0.0
+
     def _problem(self, values: Array) -> tuple[NonsmoothProblem, NDArray[np.bool_]]:
         solver = self.solver
         found, rubbing = nonsmooth_problem(
@@ -204,6 +229,7 @@ class Motion:
         observe(self.problem if problem is None else problem, self._workspace,
                 np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states),
                 *phase.arrays, self._full, self._rate, margins, rates)
+        margins[:, 2 * self.clusters :][:, self._unwatched] = np.inf
         return margins, rates
 
     def margin_slopes(self, t: float, state: Array, phase: Phase, event: int) -> Array:
@@ -340,18 +366,36 @@ class Motion:
                                           / fastest)))
         return after, left
 
-    def touch(self, t: float, state: Array, phase: Phase) -> Strike | None:
-        """The impact of the stop at the end of a phase that is only touched; None in stick."""
+    def touches(self, t: float, state: Array, phase: Phase) -> Iterator[Strike]:
+        """Impacts that the stop at the end of a phase may have that is only touched.
+
+        Its contact slips; which closed stops beside it take part, its speed tells alone.
+        """
         node = phase.event - 2 * self.clusters
         own = int(self.problem.cluster[node])
-        for mode in (1, -1) if self.rubbing[own] else (0,):
-            modes = [0] * self.clusters
-            modes[own] = mode
-            strike = Strike((node,), tuple(modes))
+        for nodes, modes in self._strikes(node, phase):
+            if modes[own] == STICK:
+                continue
+            strike = Strike(nodes, modes)
             if all(part > 0.0 for event, part in self._impact(t, state, phase, strike)[1]
-                   if event < 2 * self.clusters):
-                return strike
-        return None
+                   if event < 2 * self.clusters and modes[event // 2] != STICK):
+                yield strike
+
+    def _strikes(
+        self, node: int, phase: Phase
+    ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+        """Nodes that an impact may press, and whether it may stop or rub their clusters."""
+        others = [j for j in range(self.nodes) if phase.closed[j] and j != node]
+        for count in range(len(others), -1, -1):
+            for beside in combinations(others, count):
+                nodes = (node, *beside)
+                rubbed = sorted({int(self.problem.cluster[j]) for j in nodes})
+                choices = [(STICK, 1, -1) if self.rubbing[c] else (0,) for c in rubbed]
+                for modes in product(*choices):
+                    given = [0] * self.clusters
+                    for c, mode in zip(rubbed, modes, strict=True):
+                        given[c] = mode
+                    yield nodes, tuple(given)
 
     def strike_at(
         self, t: float, state: Array, phase: Phase, wanted: Array
@@ -364,20 +408,11 @@ class Motion:
             If there is none.
         """
         node = phase.event - 2 * self.clusters
-        others = [j for j in range(self.nodes) if phase.closed[j] and j != node]
-        for count in range(len(others), -1, -1):
-            for beside in combinations(others, count):
-                nodes = (node, *beside)
-                rubbed = sorted({int(self.problem.cluster[j]) for j in nodes})
-                choices = [(STICK, 1, -1) if self.rubbing[c] else (0,) for c in rubbed]
-                for modes in product(*choices):
-                    given = [0] * self.clusters
-                    for c, mode in zip(rubbed, modes, strict=True):
-                        given[c] = mode
-                    strike = Strike(nodes, tuple(given))
-                    after, left = self._impact(t, state, phase, strike)
-                    size = np.abs(np.concatenate([state, wanted])[self.modes :]).max()
-                    fits = all(part >= -_ROUNDING for _, part in left)
-                    if fits and np.abs(after[self.modes :] - wanted).max() <= 1e-6 * size:
-                        return strike
+        size = np.abs(np.concatenate([state, wanted])[self.modes :]).max()
+        for nodes, modes in self._strikes(node, phase):
+            strike = Strike(nodes, modes)
+            after, left = self._impact(t, state, phase, strike)
+            fits = all(part >= -_ROUNDING for _, part in left)
+            if fits and np.abs(after[self.modes :] - wanted).max() <= 1e-6 * size:
+                return strike
         raise AnalysisError("An impact of the orbit is of a kind that has no derivative.")

@@ -16,13 +16,17 @@ from fecontact.integrate.nonsmooth.problem import (
     Progress,
     progress_for,
 )
+from fecontact.integrate.nonsmooth.rigid_stops import NO_ACCELERATION, NO_IMPULSES
 
 # Samples of a period in which events are looked for, and most events of one.
 _SAMPLES, _MOST = 1000, 60
 # Part of a period below which phases are chatter.
 _SHORTEST = 1e-5
+_CLOSELY = "The motion has events that follow each other too closely."
 # Speeds below this part of the largest are none.
 _NEAR = 1e-9
+# Heights below this part of the largest displacement are rounding at the begin of a motion.
+_AT_REST = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +59,8 @@ def traced(motion: Motion, begin: float, start: Array, period: float, forced: bo
             end > begin) else start
         return Traced((phases[0].ending(PERIOD),), np.zeros(1), moved[None],
                       np.array([period]))
+    if np.diff(begins[1:]).min(initial=period) < _SHORTEST * period:
+        raise AnalysisError(_CLOSELY)
     # What follows the last event leads to the first one again, a period later.
     if phases[-1].state != phases[0].state:
         raise AnalysisError("The contact state does not repeat after the period; run the motion "
@@ -64,10 +70,23 @@ def traced(motion: Motion, begin: float, start: Array, period: float, forced: bo
     ends = np.append(begins[2:], begins[1] + period)
     durations = ends - begins[1:]
     if durations.min() < _SHORTEST * period:
-        raise AnalysisError("The motion has events that follow each other too closely.")
+        raise AnalysisError(_CLOSELY)
     ordered = tuple(phase.ending(phase.event, phase.strike, order_of(motion, before, phase))
                     for before, phase in zip([found[-1], *found[:-1]], found, strict=True))
     return Traced(ordered, begins[1:], states[1:], durations)
+
+
+def sizes_without_contact(motion: Motion, begin: float, start: Array, period: float) -> Array:
+    """Sizes (d,) of the states for a system that contacts hold at rest: a / w^2 and a / w.
+
+    a is the largest acceleration that it would have without them, w that of the period.
+    """
+    k, n, m = motion.clusters, motion.nodes, motion.modes
+    times = begin + np.linspace(0.0, period, 33)
+    free = motion.observed(times, np.tile(start, (len(times), 1)), Phase((OPEN,) * k, (0,) * n,
+                                                                         PERIOD))[1][:, m:]
+    turn, largest = period / (2.0 * np.pi), float(np.abs(free).max()) or 1.0
+    return np.repeat([largest * turn**2, largest * turn], m)
 
 
 def order_of(motion: Motion, before: Phase, phase: Phase) -> int:
@@ -79,8 +98,9 @@ def order_of(motion: Motion, before: Phase, phase: Phase) -> int:
         stop = _stop(motion, phase)
         if phase.event != before.event or phase.closed[stop]:
             return 0
-        # Behind a lift-off, and an impact without rebound, the speed vanishes too.
-        return 2 if before.closed[stop] or motion.problem.restitution == 0.0 else 1
+        # Behind an impact without rebound the speed vanishes too, and where the force of a stop
+        # has vanished the acceleration.
+        return 3 if before.closed[stop] else 2 if motion.problem.restitution == 0.0 else 1
     if phase.status[cluster] == STICK or before.status[cluster] == OPEN:
         return 0
     if before.status[cluster] != STICK:
@@ -111,6 +131,8 @@ def _followed(
     phases: list[Phase] = []
     begins, states, t = [begin], [start], begin
     _first_state(motion, progress, room, t)
+    if motion.problem.restitution < 0.0:
+        progress.closed[:] = 1
     while True:
         phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
         _require_known(motion, phase)
@@ -120,6 +142,8 @@ def _followed(
         if found is None:
             return [*phases, phase], np.array(begins), np.array(states)
         after, event, end = found
+        if motion.problem.restitution < 0.0 and phase.opens(event):
+            raise AnalysisError("A compliant contact opens.")
         ending = phase.ending(event)
         t += after
         moved = _decided(motion, progress, room, t, end, ending)
@@ -135,9 +159,7 @@ def _followed(
 
 
 def _require_known(motion: Motion, phase: Phase) -> None:
-    if motion.problem.restitution >= 0.0:
-        return
-    if any(status == OPEN for status in phase.status):
+    if motion.problem.restitution < 0.0 and OPEN in phase.status:
         raise AnalysisError("A compliant contact opens.")
 
 
@@ -149,16 +171,17 @@ def _first_state(motion: Motion, progress: Progress, room: Room, t: float) -> No
     for flags in (room.released, room.arrived, room.touched, room.parting):
         flags[:] = False
     if motion.problem.restitution >= 0.0:
-        scale = np.abs(progress.state[: motion.modes]).max() or 1.0
-        room.touched[:] = heights[2 * motion.clusters :] <= 1e-12 * scale
+        scale = float(motion.sizes[: motion.modes].max())
+        room.touched[:] = heights[2 * motion.clusters :] <= _AT_REST * scale
     _require_decided(motion, progress, room, t)
 
 
 def _require_decided(motion: Motion, progress: Progress, room: Room, t: float) -> None:
     fastest = float(motion.sizes[motion.modes :].max())
     progress.largest[SLIP_SIZE] = fastest
+    # Elsewhere it is the time of a flight, which where stops part may be below zero by rounding.
     if decide(motion.problem, motion._workspace, progress, room, t, _NEAR * fastest,
-              1e-12 * fastest) < 0.0:
+              1e-12 * fastest) in (NO_ACCELERATION, NO_IMPULSES):
         raise AnalysisError("The contact state is not unique there.")
 
 

@@ -158,7 +158,7 @@ def _from_event_to_event(
                            problem.solver)
     except AnalysisError as error:
         return None, f"The runs of the orbit were differenced: {error}"
-    whole = {**_attributes(problem), "segments": 1}
+    whole = {**_attributes(problem), "scales": found[0].scales, "segments": 1}
     try:
         return followed(*found, options, name=_name(problem), attributes=whole, **how), ""
     except InputError as error:
