@@ -122,12 +122,13 @@ class FunctionField(VectorField):
             kernels.batch_jacobians(self._jacobian.address, t, x, values, J)
         places = kernels.Places(t, x, f, values, sizes, self._sizes, chosen,
                                 self._jacobian is None)
-        if self._complex is None or self._was_wrong:
-            kernels.central_differences(self._rates.address, places, step, np.empty(len(values)),
-                                        np.empty((3, d)), J, P)
-        else:
+        if self._complex is not None and not self._was_wrong:
             kernels.unchecked_complex_steps(self._complex.address, places,
                                             kernels.complex_room_for(d, len(values)), J, P)
+            if np.isfinite(J.sum() + P.sum()):
+                return f, J, P
+        kernels.central_differences(self._rates.address, places, step, np.empty(len(values)),
+                                    np.empty((3, d)), J, P)
         return f, J, P
 
     def heed(self, wrong: Integers, active: Integers = _NONE) -> None:
