@@ -282,3 +282,20 @@ def test_a_jump_at_the_start_of_a_step_is_no_zero():
 
     assert step.zero(jumps, 1e-12) is None
     assert sum(at not in ends for at in calls) < 12
+
+
+def test_a_step_meets_a_value_of_an_unknown():
+    """On a circle, both unknowns; beyond the step there is nothing to meet, nor where it turns."""
+    options = ContinuationOptions()
+    ends = [start_of(CIRCLE, np.array([np.cos(w), np.sin(w)]), options, None, 1.0)
+            for w in (0.3, 0.35)]
+    step = Step(CIRCLE, *ends, options, CIRCLE.weights() * ends[0].tangent)
+    for place, value in ((0, np.cos(0.34)), (1, np.sin(0.31)), (1, np.sin(0.35))):
+        met = step.meeting(place, value)
+        assert met.u[place] == value
+        assert met.u @ met.u == pytest.approx(1.0, abs=1e-14)
+        assert 0.3 < np.arctan2(met.u[1], met.u[0]) < 0.35 + 1e-12
+        assert met.values["x"] == met.u[0]
+        assert met.tangent @ met.u == pytest.approx(0.0, abs=1e-9)
+    assert step.meeting(1, np.sin(0.4)) is None
+    assert step.meeting(0, 1.01) is None

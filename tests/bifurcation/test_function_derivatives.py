@@ -176,6 +176,37 @@ def test_what_goes_wrong_on_the_way_is_said():
         strict.derivatives(np.zeros(2), x[::2].copy(), field.values)
 
 
+@pytest.mark.parametrize(("way", "error"), [("complex", 1e-14), ("differences", 2e-9)])
+def test_rough_derivatives(way, error):
+    """By the complex step exact, else of second order in the step: x^2 h^2 / 6 of the third one."""
+    field = vector_field(moved, {"p": 0.1}, 1, differentiation=way)
+    x, none = PLACES[:, None].copy(), np.zeros(len(PLACES))
+    exact = 1.0 / np.cosh(PLACES - 0.1) ** 2
+    step, errors = 1e-5, []
+    for factor in (1.0, 100.0):
+        f, J, P = field.rough_derivatives(none, x, field.values, (0,), np.array([2.0]),
+                                          step * factor)
+        assert f[:, 0] == pytest.approx(np.tanh(PLACES - 0.1), rel=1e-15)
+        errors.append(np.abs(J[:, 0, 0] - exact).max())
+        assert P[:, 0, 0] == pytest.approx(-exact, abs=max(error, 1e4 * error * (factor - 1.0)))
+    assert errors[0] <= error
+    if way == "differences":
+        third = np.abs(exact * (4.0 - 6.0 * exact)).max()
+        assert errors[1] == pytest.approx(third * (2e-3) ** 2 / 6.0, rel=0.02)
+
+
+def test_rough_derivatives_where_the_complex_step_fails():
+    """Far from the scale it overflows; what is not finite is never given away, nor used again."""
+    field = vector_field(moved, {"p": 0.0}, 1, scales=[10.0])
+    x = np.array([[0.3], [-800.0]])
+    for _ in range(2):
+        _, J, P = field.rough_derivatives(np.zeros(2), x, field.values, (0,), np.ones(1), 1e-4)
+        assert J[:, 0, 0] == pytest.approx([1.0 / np.cosh(0.3) ** 2, 0.0], abs=1e-8)
+        assert P[:, 0, 0] == pytest.approx(-J[:, 0, 0], abs=1e-8)
+        with pytest.warns(UserWarning, match="complex step"):
+            field.derivatives(np.zeros(2), x, field.values, (0,))
+
+
 def test_rounding_is_no_derivative_of_zero():
     """Over steps shorter than the rounding of 1e5 the function does not change at all."""
     field = vector_field(offset, {"p": 1.5}, 1)

@@ -360,7 +360,8 @@ def test_rotations_of_a_pendulum():
     assert curve.status is BranchStatus.SADDLE_NODE
     drive, a = curve.parameter, curve.column("a")
     some = (a > 0.01) & (a < 0.5)
-    assert polyfit(a[some] ** 2, (drive / a)[some], 3)[0] == pytest.approx(4.0 / np.pi, abs=1e-6)
+    small, ratio = a[some], drive[some] / a[some]
+    assert polyfit(small**2, ratio, 3)[0] == pytest.approx(4.0 / np.pi, abs=1e-6)
     near = int(np.argmin(np.abs(a - 0.5)))
     assert drive[near] == pytest.approx(
         brentq(lambda value: left_over(a[near], value), 0.5, 0.7, xtol=1e-12), abs=1e-7)

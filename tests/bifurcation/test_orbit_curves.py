@@ -1,5 +1,7 @@
 """Curves of folds, doublings and tori of orbits against branches at other parameters."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from collocation_fields import two_masses_field
@@ -15,6 +17,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
+from fecontact.bifurcation.orbits.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 
 
@@ -59,6 +62,33 @@ def test_curves_keep_the_mesh_of_their_first_point(masses):
     curve = codim2_curve(field, start, "D", bounds={"B": (0.2, 20.0)}, both=False,
                          options=ContinuationOptions(points=2))
     assert curve.attributes["intervals"] == intervals == len(curve.points[0].values["mesh"]) - 1
+
+
+@pytest.mark.parametrize("kind", ["fold", "period doubling"])
+def test_a_point_takes_one_step_with_the_matrix_before_and_one_with_its_own(
+        masses, kind, monkeypatch):
+    """Which leaves the square of the tolerance, and critical multipliers within the tolerance."""
+    field, branch = masses
+    calls = {"linearise": [], "evaluate": []}
+    for name, told in calls.items():
+        made = getattr(OrbitCurve, name)
+        monkeypatch.setattr(OrbitCurve, name, lambda self, u, made=made, told=told: told.append(
+            made(self, u)) or told[-1])
+    curve = codim2_curve(field, branch.of_kind(kind)[0], "v0", bounds={"B": (0.2, 20.0)},
+                         both=False, options=ContinuationOptions(step=0.01, largest_step=0.03,
+                                                                 points=15))
+    assert len(curve) == 15
+    # Along the doublings some steps are too long for the matrix before.
+    most = len(curve) + 4 if kind == "fold" else 2 * len(curve)
+    assert max(map(len, calls.values())) <= most
+    critical = 1.0 if kind == "fold" else -1.0
+    for point in curve.points:
+        problem = calls["linearise"][0].problem
+        orbit = replace(problem.orbit, mesh=point.values["mesh"], reference=point.u[:-3].reshape(
+            problem.orbit.reference.shape))
+        assert np.abs(OrbitCurve(orbit, kind).linearise(point.u).residual).max() < 1e-9
+        assert np.sort(np.abs(point.values["multipliers"] - critical))[
+            1 if kind == "fold" else 0] < 1e-5
 
 
 def torus(t, x, p, out):

@@ -67,8 +67,12 @@ def improve(weights, steps, count):
     return math.sqrt(_product(weights, change, change))
 
 
+# Step of rounding, in the size of the solution, after which its equations serve as they are.
+_AT_REST = 1e-13
 # A matrix is kept as long as each step is shorter than this part of the one before.
 _SERVES = 0.2
+# By this factor an error is likely to fall with a matrix that is kept along a curve.
+_LIKELY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,19 +144,29 @@ def _iterated(
         size = improve(weights, steps, count_kept)
         change = steps[count_kept]
         if count > 2 and size > before and before <= problem.rounding * scale:
-            return u, linearisation if kept is None else problem.linearise(u), count
+            if kept is not None:
+                u, linearisation, _ = _polished(problem, u, guess, row, exact)
+            return u, linearisation, count
         if not math.isfinite(size) or (count > 2 - more and size > before):
             return None
         u = u + change
         if kept is None and size <= tolerance * scale:
             return u, problem.linearise(u) if exact else linearisation, count
+        early = kept is not None and problem.polishes and not (exact or problem.kinked)
+        if early and size * _LIKELY <= tolerance * scale:
+            # A step with its own matrix tells whether the last one has led near enough.
+            u, kept, before = _polished(problem, u, guess, row, exact)
+            if before <= tolerance * scale:
+                return u, kept, max(1, count - 2 - more)
+            count_kept = 0
+            continue
         # With a matrix that is kept the error falls by about the same factor each time.
         falls = size / before if count > 1 else _SERVES
         # Behind a kink the next step may be no shorter.
         known_next = size <= tolerance * scale or not problem.kinked
         if (kept is not None and known_next
                 and size * falls <= max(0.1 * tolerance, 1e-13) * scale):
-            return *_polished(problem, u, guess, row, exact), max(1, count - 2 - more)
+            return *_polished(problem, u, guess, row, exact)[:2], max(1, count - 2 - more)
         if problem.keeps_matrix:
             keeps = kept is None or falls <= _SERVES
             kept = (kept or linearisation) if keeps else None
@@ -163,15 +177,19 @@ def _iterated(
 
 def _polished(
     problem: Problem, u: Array, guess: Array, row: Array, exact: bool
-) -> tuple[Array, Linearisation]:
-    """The solution that a kept matrix has led to, and the equations there or just beside it."""
+) -> tuple[Array, Linearisation, float]:
+    """The solution that a kept matrix has led to, the equations there or just beside it, and the
+    length of the step between.
+    """
     linearisation = problem.linearise(u)
     if not problem.polishes:
-        return u, linearisation
+        return u, linearisation, 0.0
     rhs = np.empty(len(u))
     right_side(linearisation.residual, row, u, guess, rhs)
-    u = u + linearisation.solve(row, rhs)
-    return u, problem.linearise(u) if exact else linearisation
+    change = linearisation.solve(row, rhs)
+    u, size = u + change, norm(problem, change)
+    moved = exact and size > _AT_REST * (1.0 + norm(problem, u))
+    return u, problem.linearise(u) if moved else linearisation, size
 
 
 def finished(

@@ -121,13 +121,18 @@ def _bound_met(step: Step) -> tuple[Solution, bool] | None:
         before, after = (sign * (float(at.u[place]) - bound) for at in (step.here, end))
         if after < 0.0 or before > 0.0 or before == after:
             continue
-        zero = None if before == 0.0 else replace(step, there=end).zero(
-            _distance_to(place, bound), _BOUND)
-        if zero is None:
+        if before == 0.0:
             return None
-        u = zero[0].u.copy()
-        u[place] = bound
-        end, on_bound = replace(zero[0], u=u), True
+        shorter = replace(step, there=end)
+        met = shorter.meeting(place, bound)
+        if met is None:
+            zero = shorter.zero(_distance_to(place, bound), _BOUND)
+            if zero is None:
+                return None
+            u = zero[0].u.copy()
+            u[place] = bound
+            met = replace(zero[0], u=u)
+        end, on_bound = met, True
     return end, on_bound
 
 

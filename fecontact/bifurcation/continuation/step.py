@@ -31,6 +31,9 @@ _NEIGHBOURS = 3
 _BESIDE_START, _JUMP = 0.02, 0.1
 # Brent's method takes at most so many steps.
 _STEPS = 60
+# Halvings of a step in search of where its cubic has a value, and the largest distance from there,
+# in steps, of the solution that has this value.
+_HALVINGS, _BESIDE_CUBIC = 40, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +104,36 @@ class Step:
                                                        self.options)
         except FecontactError:
             return None
+
+    def meeting(self, place: int, value: float) -> Solution | None:
+        """The solution on the step at which an unknown has a value, by Newton's method.
+
+        None where that leads elsewhere or nowhere, as next to a turn of this unknown.
+        """
+        low, high, off = 0.0, self.length, self.there.u[place] - value
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if (self.cubic(middle)[place] - value) * off > 0.0:
+                high = middle
+            else:
+                low = middle
+        guess, row = self.cubic(low), np.zeros(len(self.here.u))
+        guess[place], row[place] = value, 1.0
+        try:
+            found = corrected(self.problem, guess, row, _EXACT, 2 * self.options.iterations,
+                              known=self.there.linearisation, exact=True)
+            if found is None or not self._holds(found[0], guess):
+                return None
+            found[0][place] = value
+            return finished(self.problem, *found, self.row, self.options)
+        except FecontactError:
+            return None
+
+    def _holds(self, u: Array, near: Array) -> bool:
+        """Whether a solution lies on the step, where the cubic says so."""
+        weights, away = self.problem.weights(), u - near
+        return (0.0 < self.along(u) <= self.length
+                and weighted_norm(weights, away) <= _BESIDE_CUBIC * self.length)
 
     def zero(
         self, test: Callable[[Solution], float], precision: float, *, remeshed: bool = False

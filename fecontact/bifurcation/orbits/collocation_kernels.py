@@ -110,3 +110,48 @@ def to_nodes(at_points, values, widths, out):
                 weight = widths[j] * values[point, k]
                 for i in range(d):
                     out[node, i] += weight * at_points[row, i]
+
+
+@kernel(f8(vector, matrix, matrix))
+def amplitude_along(weights, nodes, before):
+    """Amplitude of nodes (N m, d) about their mean along that of those before, in the latter."""
+    weights, nodes, before = borrowed(weights), borrowed(nodes), borrowed(before)
+    total, d = nodes.shape
+    mixed, square = 0.0, 0.0
+    for i in range(d):
+        mean, mean_before = 0.0, 0.0
+        for row in range(total):
+            mean += nodes[row, i]
+            mean_before += before[row, i]
+        mean /= total
+        mean_before /= total
+        for row in range(total):
+            weight, other = weights[row * d + i], before[row, i] - mean_before
+            mixed += weight * other * (nodes[row, i] - mean)
+            square += weight * other * other
+    return mixed / square
+
+
+@kernel(types.void(vector, matrix, matrix, matrix, matrix, vector))
+def compare_halves(weights, nodes, nodes_later, before, before_later, out):
+    """Fill out (3,) with weighted sums: products of both differences, squares of those before, and
+    squares of the nodes before about their mean.
+
+    Differences are those between a half of an orbit and the other, ``later`` by half a period.
+    """
+    weights, out = borrowed(weights), borrowed(out)
+    nodes, nodes_later = borrowed(nodes), borrowed(nodes_later)
+    before, before_later = borrowed(before), borrowed(before_later)
+    total, d = nodes.shape
+    out[:] = 0.0
+    for i in range(d):
+        mean = 0.0
+        for row in range(total):
+            mean += before[row, i]
+        mean /= total
+        for row in range(total):
+            weight = weights[row * d + i]
+            apart = before[row, i] - before_later[row, i]
+            out[0] += weight * apart * (nodes[row, i] - nodes_later[row, i])
+            out[1] += weight * apart * apart
+            out[2] += weight * (before[row, i] - mean) ** 2

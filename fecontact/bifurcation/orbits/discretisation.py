@@ -94,6 +94,14 @@ class Discretisation:
         return (self.free,) if self.second is None else (self.second, self.free)
 
     @cached_property
+    def ranges(self) -> Array:
+        """Range (d,) of each state over the orbit that fixes the phase, for steps."""
+        low, high = self.reference.min(axis=0), self.reference.max(axis=0)
+        least = np.maximum(_LEAST_OF_VALUES * np.maximum(np.abs(low), np.abs(high)),
+                           _LEAST_OF_SCALE * self.field.state_scales(self.values))
+        return np.maximum(high - low, least)
+
+    @cached_property
     def rule(self) -> Rule:
         """Basis polynomials and Gauss points."""
         return rule(self.degree)
@@ -160,6 +168,10 @@ class Discretisation:
 
 
 _DIFFERENCE = 1e-5  # relative parameter step for the derivative of the forcing period
+# Steps of rough Jacobians, in ranges of the states: of single ones, and of differences of these.
+_NEAR, _FAR = 1e-5, 3e-4
+# Smallest range of a state, in its values and in the scale that its field has.
+_LEAST_OF_VALUES, _LEAST_OF_SCALE = 1e-3, 1e-4
 
 
 class CollocationLinearisation:
@@ -170,7 +182,8 @@ class CollocationLinearisation:
     period : float
         Period T [s].
 
-    ``to`` says which derivatives are formed: those to the parameters are zero for 'states'.
+    ``to`` says which derivatives are formed: those to the parameters are zero for 'states', and
+    those to the states as rough as a field likes them, see :meth:`VectorField.rough_derivatives`.
     Residual: the collocation rows (N m d), interval by interval, Gauss point by Gauss point, and
     the phase condition where the period is unknown.
     """
@@ -211,8 +224,10 @@ class CollocationLinearisation:
         T f(T tau, x, p), divided by T.
         """
         if self._to == "states":
-            f, J, _ = self.problem.field.derivatives(self.times, self._x,
-                                                     self.problem.parameters(self.u), ())
+            values = self.problem.parameters(self.u)
+            found = self.problem.field.rough_derivatives(
+                self.times, self._x, values, (), self.problem.ranges, _NEAR)
+            f, J, _ = found or self.problem.field.derivatives(self.times, self._x, values, ())
             return f, J, np.zeros((*f.shape, len(self.problem.active)))
         return self._derivatives_at(self.times, self._x)
 
@@ -220,11 +235,39 @@ class CollocationLinearisation:
         self, shifts: list[Array], *, states_alone: bool = False
     ) -> tuple[Array, Array, Array]:
         """As :attr:`derivatives`, (k, N m, ...), beside the orbit by k shifts (N m, d)."""
-        x = np.concatenate([self._x + shift for shift in shifts])
-        times = np.tile(self.times, len(shifts))
+        x, times = self._beside(shifts)
         found = (self.problem.field.derivatives(times, x, self.problem.parameters(self.u), ())
                  if states_alone else self._derivatives_at(times, x))
-        f, J, P = (part.reshape(len(shifts), len(self._x), *part.shape[1:]) for part in found)
+        return self._apart(found, len(shifts))
+
+    def bent(self, shifts: list[Array]) -> tuple[Array, Array, Array]:
+        """Jacobians (k, N m, d, d) and (k, N m, d, q) beside the orbit, and (N m, d, d) on it.
+
+        All are of the same kind, that which takes the least time, so that errors of their
+        differences cancel.
+        """
+        problem, values = self.problem, self.problem.parameters(self.u)
+        x, times = self._beside(shifts)
+        rough = problem.field.rough_derivatives(times, x, values, problem.active, problem.ranges,
+                                                _FAR)
+        here = problem.field.rough_derivatives(self.times, self._x, values, (), problem.ranges,
+                                               _FAR)
+        if rough is None or here is None:
+            _, J, P = self.derivatives_beside(shifts)
+            return J, P, self.derivatives[1]
+        if not problem.autonomous:
+            self._add_forcing(times / self.period, x, values, rough[2])
+        _, J, P = self._apart(rough, len(shifts))
+        return J, P, here[1]
+
+    def _beside(self, shifts: list[Array]) -> tuple[Array, Array]:
+        return (np.concatenate([self._x + shift for shift in shifts]),
+                np.tile(self.times, len(shifts)))
+
+    def _apart(
+        self, found: tuple[Array, Array, Array], count: int
+    ) -> tuple[Array, Array, Array]:
+        f, J, P = (part.reshape(count, len(self._x), *part.shape[1:]) for part in found)
         return f, J, P
 
     def _derivatives_at(self, times: Array, x: Array) -> tuple[Array, Array, Array]:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.bordered import solve_turned
+from fecontact.bifurcation.orbits.curves.kernels import multiplied
 from fecontact.bifurcation.orbits.curves.singularity import (
     Bend,
     Singularity,
@@ -141,13 +142,14 @@ class Expansion:
         assert self._at.pair is not None
         (p, pp, _), (q, qq, _) = bends
         one, other = self._at.terms
-        V, first = one.states + 1j * other.states, p + 1j * q
+        V = one.states + 1j * other.states
         angle = float(np.angle(self._at.pair[0]))
-        h11, drift = self._response(_applied(first, V.conj()).real)
-        h20 = self._turned(_applied(first, V), np.exp(2j * angle))
-        third = (_applied(pp + qq, V) / 2.0 + _applied(first, h11)
-                 + _applied(first.conj(), h20) / 2.0
-                 - drift * (_applied(self._J, V) - 1j * angle / self._T * V))
+        h11, drift = self._response(_complex(p, q, V.conj()).real)
+        h20 = self._turned(_complex(p, q, V), np.exp(2j * angle))
+        along, across = pp + qq, np.zeros_like(p)
+        third = (_complex(along, across, V) / 2.0 + _complex(p, q, h11.astype(complex))
+                 + _complex(p, q, h20, -1.0) / 2.0
+                 - drift * (_complex(self._J, across, V) - 1j * angle / self._T * V))
         found, size = self._share(one.left - 1j * other.left, V, third)
         unit = self._size(V) ** 2
         return Share(found.real / unit, size / unit)
@@ -200,9 +202,17 @@ class Expansion:
     def _turned(self, bend: Array, closing: complex) -> Array:
         """The h with h' - A h = T bend at the points and h(1) = closing h(0), complex."""
         side = (self._T * self._h * bend).reshape(-1)
-        found: Array = solve_turned(self._linearised.factors, side, closing)
-        shaped = found.reshape(bend.shape)
-        return at_points(self._problem, shaped, closing * shaped[0])
+        shaped = solve_turned(self._linearised.factors, side, closing).reshape(bend.shape)
+        end = closing * shaped[0]
+        return (at_points(self._problem, np.ascontiguousarray(shaped.real), end.real)
+                + 1j * at_points(self._problem, np.ascontiguousarray(shaped.imag), end.imag))
+
+
+def _complex(real: Array, imaginary: Array, vectors: Array, sign: float = 1.0) -> Array:
+    """Products (N m, d) of complex matrices, given as two parts (N m, d, d), with vectors."""
+    out = np.empty_like(vectors)
+    multiplied(real, imaginary, sign, vectors, out)
+    return out
 
 
 def _applied(matrices: Array, vectors: Array) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.equilibria.equilibrium import newton, sorted_eigenvalues
+from fecontact.bifurcation.orbits.collocation_kernels import amplitude_along, compare_halves
 from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import interpolate, node_times
 from fecontact.core.types import Array
@@ -125,9 +126,7 @@ def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
 
 def vanishing(problem: Discretisation, u: Array, least: float = _VANISHED) -> float:
     """See :func:`shrunk`, of an orbit by collocation."""
-    nodes, before = problem.nodes(u), problem.reference
-    return shrunk(problem.weights()[: problem.size].reshape(before.shape),
-                  nodes - nodes.mean(axis=0), before - before.mean(axis=0), least)
+    return float(amplitude_along(problem.weights(), problem.nodes(u), problem.reference)) - least
 
 
 def shrunk(weights: Array, moved: Array, before: Array, least: float = _VANISHED) -> float:
@@ -154,13 +153,14 @@ def halves_apart(problem: Discretisation, u: Array) -> float:
     their halves exchanged.
     """
     times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
-    weights = problem.weights()[: problem.size].reshape(problem.reference.shape)
-    before, now = (nodes - interpolate(problem.mesh, np.ascontiguousarray(nodes), times)
-                   for nodes in (problem.reference, problem.nodes(u)))
-    whole = problem.reference - problem.reference.mean(axis=0)
-    if (weights * before**2).sum() < _HALVES_MEET**4 * (weights * whole**2).sum():
+    sums, sides = np.empty(3), []
+    for nodes in (problem.nodes(u), problem.reference):
+        sides += [nodes, interpolate(problem.mesh, nodes, times)]
+    compare_halves(problem.weights(), *sides, sums)
+    mixed, square, whole = sums.tolist()
+    if square < _HALVES_MEET**4 * whole:
         return 1.0
-    return shrunk(weights, now, before, VANISHED_ON_CURVES)
+    return float(mixed / square) - VANISHED_ON_CURVES
 
 
 def near_saddle(

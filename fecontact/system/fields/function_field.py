@@ -49,6 +49,7 @@ class FunctionField(VectorField):
         self.differentiation = "differences" if complex_rates is None else "complex"
         self._rates, self._jacobian, self._complex = rates, jacobian, complex_rates
         self._scales, self._period, self._required = scales, period, required
+        self._was_wrong = False
         # A value may pass zero, and be rounding there.
         base = np.abs(self.values)
         self._sizes = np.where(base > 0.0, base, 1.0)
@@ -106,9 +107,34 @@ class FunctionField(VectorField):
                                   kernels.complex_room_for(d, len(values)), J, P, wrong)
         return f, J, P, wrong
 
+    def rough_derivatives(
+        self, t: Array, x: Array, values: Array, active: Iterable[int], sizes: Array, step: float
+    ) -> tuple[Array, Array, Array]:
+        """See :meth:`VectorField.rough_derivatives`.
+
+        By the complex step without a check unless it was wrong before, or central differences.
+        """
+        chosen = np.array(tuple(active), dtype=np.int64)
+        n, d = x.shape
+        f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(chosen)))
+        kernels.batch_rates(self._rates.address, t, x, values, f)
+        if self._jacobian is not None:
+            kernels.batch_jacobians(self._jacobian.address, t, x, values, J)
+        places = kernels.Places(t, x, f, values, sizes, self._sizes, chosen,
+                                self._jacobian is None)
+        if self._complex is not None and not self._was_wrong:
+            kernels.unchecked_complex_steps(self._complex.address, places,
+                                            kernels.complex_room_for(d, len(values)), J, P)
+            if np.isfinite(J.sum() + P.sum()):
+                return f, J, P
+        kernels.central_differences(self._rates.address, places, step, np.empty(len(values)),
+                                    np.empty((3, d)), J, P)
+        return f, J, P
+
     def heed(self, wrong: Integers, active: Integers = _NONE) -> None:
         """Warn of a complex step that failed at places (d + a,), or raise; see derivatives."""
         if wrong.any():
+            self._was_wrong = True
             told = self.complaint(wrong, active)
             if self._required:
                 raise AnalysisError(told)

@@ -364,6 +364,70 @@ def differences(address, places, room, J, P):
                 P[n, i, a] = best[i]
 
 
+@kernel(types.void(i8, PLACES, f8, vector, matrix, block, block))
+def central_differences(address, places, step, q, beside, J, P):
+    """Fill J (N, d, d) if wanted, and P (N, d, a), by central differences over one step in sizes.
+
+    ``q`` (k,) and ``beside`` (3, d) are room.
+    """
+    function = rates_at(address)
+    places, q, beside = borrowed(places), borrowed(q), borrowed(beside)
+    t, x, p, active = places.t, places.x, places.p, places.active
+    d = x.shape[1]
+    y, above, below = beside[0], beside[1], beside[2]
+    q[:] = p
+    for n in range(len(t)):
+        for i in range(d):
+            y[i] = x[n, i]
+        for j in range(d if places.states else 0):
+            h = step * places.scales[j]
+            y[j] = x[n, j] + h
+            function(t[n], y, q, above)
+            y[j] = x[n, j] - h
+            function(t[n], y, q, below)
+            y[j] = x[n, j]
+            for i in range(d):
+                J[n, i, j] = (above[i] - below[i]) / (2.0 * h)
+        for a in range(len(active)):
+            at = active[a]
+            h = step * places.sizes[at]
+            q[at] = p[at] + h
+            function(t[n], y, q, above)
+            q[at] = p[at] - h
+            function(t[n], y, q, below)
+            q[at] = p[at]
+            for i in range(d):
+                P[n, i, a] = (above[i] - below[i]) / (2.0 * h)
+
+
+@kernel(types.void(i8, PLACES, complex_matrix, block, block))
+def unchecked_complex_steps(complex_address, places, complex_room, J, P):
+    """As :func:`complex_steps`, without the comparison, which takes nearly all of the time."""
+    complex_function = complex_rates_at(complex_address)
+    places, complex_room = borrowed(places), borrowed(complex_room)
+    t, x, p, active = places.t, places.x, places.p, places.active
+    d, k = x.shape[1], len(p)
+    z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]
+    for a in range(k):
+        w[a] = p[a]
+    for n in range(len(t)):
+        for i in range(d):
+            z[i] = x[n, i]
+        for j in range(d if places.states else 0):
+            z[j] = complex(x[n, j], _TINY)
+            complex_function(t[n], z, w, out)
+            z[j] = x[n, j]
+            for i in range(d):
+                J[n, i, j] = out[i].imag / _TINY
+        for a in range(len(active)):
+            at = active[a]
+            w[at] = complex(p[at], _TINY)
+            complex_function(t[n], z, w, out)
+            w[at] = p[at]
+            for i in range(d):
+                P[n, i, a] = out[i].imag / _TINY
+
+
 def room_for(states: int, parameters: int) -> Room:
     """Room for a function of so many states and parameters."""
     y, above, below, best, error, column = np.empty((6, states))

@@ -46,6 +46,15 @@ class VectorField(ABC):
         All are C-contiguous.
         """
 
+    def rough_derivatives(
+        self, t: Array, x: Array, values: Array, active: Iterable[int], sizes: Array, step: float
+    ) -> tuple[Array, Array, Array] | None:
+        """As :meth:`derivatives` from plain differences, where these take much less time, or None.
+
+        The differences go over a step in ``sizes`` (d,) of the states.
+        """
+        return None
+
     def forcing_period(self, values: Array) -> float | None:
         """Period of f in t [s]; None where f does not depend on t."""
         return None

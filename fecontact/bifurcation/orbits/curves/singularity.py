@@ -24,6 +24,12 @@ from scipy.linalg.lapack import dggev
 from fecontact.bifurcation.linalg.bordered import expand_open, original_rows
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.orbits.collocation_kernels import to_nodes
+from fecontact.bifurcation.orbits.curves.kernels import (
+    add_term,
+    central,
+    open_values,
+    unit_factor,
+)
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.core.types import Array, ComplexArray
 
@@ -81,14 +87,12 @@ class ContinuedSign:
     def aligned(self, found: Singularity, widths: Array) -> Singularity:
         """The test function for w and v of length one, in the direction of those before."""
         term, = found.terms
-        h = np.repeat(widths, len(term.left) // len(widths))
-        factors = []
-        for number, part in enumerate((term.left, term.states)):
-            factor = 1.0 / float(np.sqrt(h @ (part * part).sum(axis=1)))
-            if self._before is not None and self._before.left.shape == part.shape:
-                factor = float(np.copysign(factor, (part * self._before[number]).sum()))
-            factors.append(factor)
-        one, other = factors
+        before = self._before
+        if before is None or before.left.shape != term.left.shape:
+            nothing = np.empty((0, 0))
+            before = Term(nothing, nothing)
+        one = float(unit_factor(widths, term.left, before.left))
+        other = float(unit_factor(widths, term.states, before.states))
         return Singularity(one * other * found.value,
                            (Term(one * term.left, other * term.states, other * term.period),),
                            None if found.v is None else other * found.v)
@@ -170,15 +174,16 @@ class Bend(NamedTuple):
 
 def bends(at: CollocationLinearisation, terms: tuple[Term, ...]) -> list[Bend]:
     """Derivatives along the states of each term at the Gauss points."""
-    span = np.ptp(at.problem.nodes(at.u), axis=0)
-    span = np.maximum(span, _LEAST_RANGE * span.max())
+    span = np.maximum(at.problem.ranges, _LEAST_RANGE * at.problem.ranges.max())
     steps = [_STEP / max(float(np.abs(term.states / span).max()), 1e-300) for term in terms]
     moves = [step * term.states for step, term in zip(steps, terms, strict=True)]
-    _, J, P = at.derivatives_beside([move * sign for move in moves for sign in (1.0, -1.0)])
-    twice = 2.0 * at.derivatives[1]
-    return [Bend((J[2 * k] - J[2 * k + 1]) / (2.0 * step),
-                 (J[2 * k] + J[2 * k + 1] - twice) / step**2,
-                 (P[2 * k] - P[2 * k + 1]) / (2.0 * step)) for k, step in enumerate(steps)]
+    J, P, here = at.bent([move * sign for move in moves for sign in (1.0, -1.0)])
+    found = []
+    for k, step in enumerate(steps):
+        first, second = np.empty_like(here), np.empty_like(here)
+        central(J[2 * k], J[2 * k + 1], here, step, first, second)
+        found.append(Bend(first, second, (P[2 * k] - P[2 * k + 1]) / (2.0 * step)))
+    return found
 
 
 def gradient(
@@ -187,15 +192,10 @@ def gradient(
     """Derivative (n,) of a test function to all unknowns, with the :func:`bends` of its terms."""
     problem, T = at.problem, at.period
     _, J, P = at.derivatives
-    h = np.repeat(problem.widths, problem.degree)[:, None]
     points, out = np.zeros(J.shape[:2]), np.zeros(len(at.u))
     for term, (bend, _, shift) in zip(terms, bent, strict=True):
-        points += (term.left[:, None, :] @ (T * bend + term.period * J))[:, 0, :]
-        weighted = (h * term.left).ravel()
-        if problem.autonomous:
-            out[problem.size] += weighted @ (J @ term.states[:, :, None]).ravel()
-        out[-len(problem.active) :] += weighted @ (T * shift + term.period * P).reshape(
-            len(weighted), -1)
+        add_term(term.left, term.states, term.period, T, problem.widths, J, P, bend, shift, points,
+                 out[problem.size :])
     to_nodes(points, problem.rule.values, problem.widths,
              out[: problem.size].reshape(-1, problem.field.dimension))
     return out
@@ -226,9 +226,7 @@ def _term(at: CollocationLinearisation, left: Array, start: Array, end: Array) -
 
 
 def at_points(problem: Discretisation, nodes: Array, end: Array) -> Array:
-    """Values (N m, D) at the Gauss points of v with these nodes (N m, D) and this end (D,)."""
-    N, m, values = problem.intervals, problem.degree, problem.rule.values
-    patches = nodes.reshape(N, m, -1)
-    last = np.concatenate([patches[1:, 0], end[None]])
-    return np.ascontiguousarray(
-        (values[:, :m] @ patches + values[:, m:] * last[:, None, :]).reshape(nodes.shape))
+    """Values (N m, d) at the Gauss points of v with these nodes (N m, d) and this end (d,)."""
+    out = np.empty_like(nodes)
+    open_values(nodes, np.ascontiguousarray(end), problem.rule.values, out)
+    return out

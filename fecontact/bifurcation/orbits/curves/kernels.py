@@ -1,0 +1,109 @@
+"""Compiled loops over the Gauss points of curves of orbits.
+
+Arrays at Gauss points are (N m, d) for N intervals of m points, nodes as in
+:mod:`fecontact.bifurcation.orbits.collocation_kernels`.
+"""
+
+import math
+
+from numba import types
+
+from fecontact.core.compiled import block, f8, kernel, matrix, vector
+from fecontact.core.references import borrowed
+
+
+@kernel(types.void(matrix, vector, matrix, matrix))
+def open_values(nodes, end, values, out):
+    """Fill out (N m, d) with the values of nodes (N m, d) that end at ``end`` (d,)."""
+    nodes, end, out, values = borrowed(nodes), borrowed(end), borrowed(out), borrowed(values)
+    m = len(values)
+    total, d = nodes.shape
+    for j in range(total // m):
+        for point in range(m):
+            row = j * m + point
+            for i in range(d):
+                out[row, i] = 0.0
+            for k in range(m + 1):
+                node, value = j * m + k, values[point, k]
+                for i in range(d):
+                    out[row, i] += value * (nodes[node, i] if node < total else end[i])
+
+
+_complex_matrix = types.Array(types.complex128, 2, "C")
+
+
+@kernel(types.void(block, block, f8, _complex_matrix, _complex_matrix))
+def multiplied(real, imaginary, sign, vectors, out):
+    """Fill out (N m, d) with the products of matrices, real + sign i imaginary, and vectors."""
+    real, imaginary = borrowed(real), borrowed(imaginary)
+    vectors, out = borrowed(vectors), borrowed(out)
+    rows, d = vectors.shape
+    for row in range(rows):
+        for i in range(d):
+            total = 0.0j
+            for c in range(d):
+                total += complex(real[row, i, c], sign * imaginary[row, i, c]) * vectors[row, c]
+            out[row, i] = total
+
+
+@kernel(f8(vector, matrix, matrix))
+def unit_factor(widths, part, before):
+    """Factor that gives part (N m, d) the mean square one, and the direction of ``before``.
+
+    Where there are no such vectors before, these are (0, 0).
+    """
+    part, before, widths = borrowed(part), borrowed(before), borrowed(widths)
+    total, d = part.shape
+    m = total // len(widths)
+    square, along = 0.0, 0.0
+    for row in range(total):
+        own = 0.0
+        for i in range(d):
+            own += part[row, i] ** 2
+            if len(before) > 0:
+                along += part[row, i] * before[row, i]
+        square += widths[row // m] * own
+    return math.copysign(1.0 / math.sqrt(square), along if len(before) > 0 else 1.0)
+
+
+@kernel(types.void(block, block, block, f8, block, block))
+def central(up, down, here, step, first, second):
+    """Fill first and second (N m, d, k), differences of matrices to both sides and here."""
+    up, down, here = borrowed(up), borrowed(down), borrowed(here)
+    first, second = borrowed(first), borrowed(second)
+    rows, d, columns = up.shape
+    one, two = 0.5 / step, 1.0 / (step * step)
+    for row in range(rows):
+        for i in range(d):
+            for c in range(columns):
+                a, b = up[row, i, c], down[row, i, c]
+                first[row, i, c] = one * (a - b)
+                second[row, i, c] = two * ((a + b) - 2.0 * here[row, i, c])
+
+
+@kernel(types.void(matrix, matrix, f8, f8, vector, block, block, block, block, matrix, vector))
+def add_term(left, states, period, T, widths, J, P, bend, shift, points, common):
+    """Add a term to the derivative of a test function, see the module ``singularity``.
+
+    ``points`` (N m, d) are its derivatives to the states at the Gauss points, over the width of
+    the interval, ``common`` those to the period, where there is room, and to the parameters.
+    """
+    left, states, points, common = (borrowed(left), borrowed(states), borrowed(points),
+                                    borrowed(common))
+    J, P, bend, shift, widths = (borrowed(J), borrowed(P), borrowed(bend), borrowed(shift),
+                                 borrowed(widths))
+    rows, d, q = P.shape
+    m = rows // len(widths)
+    first = len(common) - q
+    for row in range(rows):
+        h = widths[row // m]
+        for i in range(d):
+            w = left[row, i]
+            along = 0.0
+            for c in range(d):
+                points[row, c] += w * (T * bend[row, i, c] + period * J[row, i, c])
+                along += J[row, i, c] * states[row, c]
+            if first > 0:
+                common[0] += h * w * along
+            for c in range(q):
+                common[first + c] += h * w * (T * shift[row, i, c] + period * P[row, i, c])
