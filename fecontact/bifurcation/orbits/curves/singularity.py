@@ -73,25 +73,34 @@ class ContinuedSign:
 
     def __init__(self) -> None:
         self._before: Term | None = None
+        self._times = np.empty(0)
 
-    def keep(self, term: Term) -> None:
-        """Let vectors that follow have the direction of these."""
-        self._before = term
+    def keep(self, term: Term, times: Array) -> None:
+        """Let vectors that follow have the direction of these, which are given at some times."""
+        self._before, self._times = term, times
 
-    def aligned(self, found: Singularity, widths: Array) -> Singularity:
+    def aligned(self, found: Singularity, orbit: Discretisation) -> Singularity:
         """The test function for w and v of length one, in the direction of those before."""
         term, = found.terms
-        h = np.repeat(widths, len(term.left) // len(widths))
+        h, before = np.repeat(orbit.widths, orbit.degree), self._at(orbit.times)
         factors = []
         for number, part in enumerate((term.left, term.states)):
             factor = 1.0 / float(np.sqrt(h @ (part * part).sum(axis=1)))
-            if self._before is not None and self._before.left.shape == part.shape:
-                factor = float(np.copysign(factor, (part * self._before[number]).sum()))
+            if before is not None:
+                factor = float(np.copysign(factor, (part * before[number]).sum()))
             factors.append(factor)
         one, other = factors
         return Singularity(one * other * found.value,
                            (Term(one * term.left, other * term.states, other * term.period),),
                            None if found.v is None else other * found.v)
+
+    def _at(self, times: Array) -> tuple[Array, Array] | None:
+        """The vectors w and v before, between their times where a mesh has other intervals."""
+        if self._before is None or len(times) == len(self._times):
+            return None if self._before is None else self._before[:2]
+        left, states = (np.stack([np.interp(times, self._times, column) for column in part.T],
+                                 axis=1) for part in self._before[:2])
+        return left, states
 
 
 def of_fold(at: CollocationLinearisation) -> Singularity:
