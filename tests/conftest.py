@@ -25,7 +25,7 @@ LONG = {
     "test_bad_arguments", "test_damaged_caches", "test_memory_laws", "test_laws_by_name",
     "test_plots", "test_sweep_statistics", "test_assembled",
     "test_hairpin", "test_closed_and_flat_branches", "test_shooting", "test_orbit_curves",
-    "test_critical_orbits", "test_intervals_along_branches",
+    "test_critical_orbits", "test_intervals_along_branches", "test_intervals_along_curves",
     "test_changes_of_stability", "test_curves", "test_condensation", "test_diagrams",
     "test_bernstein", "test_harmonic_balance", "test_frequency_response",
     "test_nonlinear_modes", "test_resonances", "test_resonance_third", "test_resonance_quarter",

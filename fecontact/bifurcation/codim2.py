@@ -208,6 +208,8 @@ def _followed(
     stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
     ends = _ENDS.get(attributes["kind"], ())
     chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
+    if isinstance(problem, OrbitCurve) and problem.orbit.sizes is not None:
+        chosen = replace(chosen, tolerance=problem.orbit.sizes.newton(chosen.tolerance))
     tangent = tangent_at(problem, u, direction)
     if grows is not None:
         beside = _BESIDE * options.step * tangent

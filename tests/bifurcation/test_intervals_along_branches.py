@@ -341,7 +341,7 @@ def test_limits_below_the_intervals_are_raised_to_them():
 
 
 def test_curves_say_where_their_intervals_do_not_suffice():
-    """They keep those of the point from which they start."""
+    """They have the limit of the branch from which they start."""
     field, t, circle = circle_field(twisted, lam=0.7, nu=0.8)
     messages = []
     for intervals in (4, 16):
@@ -356,7 +356,7 @@ def test_curves_say_where_their_intervals_do_not_suffice():
             worst = curve.points[int(np.argmax(errors))]
             told = (f"The states of {(errors > 1e-5).sum()} of {len(curve)} orbits are less "
                     f"accurate than state_tolerance = 1e-05, off by up to {errors.max():.1e} at "
-                    f"the parameter {worst.parameter:.6g}: start from a point on more intervals.")
+                    f"the parameter {worst.parameter:.6g}: allow more than most_intervals = 4.")
     assert messages == [told, ""]
 
 

@@ -51,7 +51,7 @@ _FINEST_MESH = 16
 # Relative change between two meshes at which a coefficient counts as converged.
 _CONVERGED = 1e-3
 # Smallest factor by which the error of a parameter is taken to fall from one mesh to the next.
-_LEAST_FALL = 1e-3
+LEAST_FALL = 1e-3
 # Smallest error of a parameter, in widths of the diagram.
 _ROUNDING = 1e-13
 # Largest number of mesh doublings to confirm a fold or a branch point, and largest relative
@@ -173,10 +173,10 @@ class _Located:
         places = [point.parameter for point in self.points]
         changes = [abs(after - before) for before, after in pairwise(places)]
         if not self.points[0].located and len(self.points) > 1:
-            changes[0] = max(changes[0], self._tolerance * (1.0 + _LEAST_FALL))
+            changes[0] = max(changes[0], self._tolerance * (1.0 + LEAST_FALL))
         if not changes:
             return self.points[0], float("nan")
-        errors = [max(change, _LEAST_FALL * before, self._rounding)
+        errors = [max(change, LEAST_FALL * before, self._rounding)
                   for change, before in zip(changes, [0.0, *changes], strict=False)]
         # A coefficient may have needed finer meshes than are to be kept.
         kept = [k for k in range(len(errors))

@@ -43,8 +43,6 @@ from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Factors of the first step, tried in this order to leave a special point.
 _FIRST_STEPS = (1.0, 0.2, 0.04)
-# Largest tolerance of Newton's method, in that of the states.
-_NEWTON = 1e-2
 # Special points of orbits at which other orbits branch off.
 _BRANCHING = ("period doubling", "branch point")
 # Points of curves of tori around which orbits of several periods lie.
@@ -405,15 +403,15 @@ def _followed(
     attributes = attributes_of(problem, limits) | {
         "intervals": int(method.intervals), "tolerance": method.tolerance,
         "most_intervals": method.most_intervals}
-    newton = options.tolerance
-    if method.state_tolerance is not None:
-        attributes["state_tolerance"] = method.state_tolerance
-        newton = min(newton, _NEWTON * method.state_tolerance)
+    sizes, newton = _sizes(method), options.tolerance
+    if sizes is not None:
+        attributes["state_tolerance"] = sizes.tolerance
+        newton = sizes.newton(newton)
     name = list(field.parameters)[problem.free]
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     ended = replace(options, stop_at=[*stops, HALVING], tolerance=newton)
     # Locate special points coarsely here; they are refined below on meshes of their own.
-    problem = replace(problem, limits=limits, precision=ROUGHLY, sizes=_sizes(method))
+    problem = replace(problem, limits=limits, precision=ROUGHLY, sizes=sizes)
     branch = continue_branch(problem, u, ended, name=name, tangent=tangent, attributes=attributes,
                              **how)
     if branch.points[-1].kind == HALVING and HALVING not in stops:
@@ -426,7 +424,7 @@ def _followed(
                 points[index] = _sharpened(field, branch, index, accuracy)
     except KeyboardInterrupt:
         branch = replace(branch, status=BranchStatus.INTERRUPTED)
-    said = "" if problem.sizes is None else problem.sizes.note(points)
+    said = "" if sizes is None else sizes.note(points)
     return replace(branch, points=tuple(points),
                    message=" ".join(filter(None, (branch.message, said))))
 

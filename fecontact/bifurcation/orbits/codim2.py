@@ -10,14 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.linalg.bordered import Bordered
-from fecontact.bifurcation.orbits.collocation import (
-    CollocationProblem,
-    less_accurate,
-    told_of,
-)
+from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
 from fecontact.bifurcation.orbits.curves.codim2_forms import orbit_form
 from fecontact.bifurcation.orbits.curves.singularity import (
     Bend,
@@ -75,15 +72,12 @@ class OrbitCurve(Problem):
         The period [s] of all orbits, for the kind 'period'.
     sign : ContinuedSign
         Sign of the test function, continued along the curve.
-    state_tolerance : float, optional
-        Error of the states above which the curve tells of them; its orbits keep their intervals.
     """
 
     orbit: CollocationProblem
     kind: str
     period: float = 1.0
     sign: ContinuedSign = field(default_factory=ContinuedSign)
-    state_tolerance: float | None = None
 
     keeps_matrix: ClassVar[bool] = True
     polishes: ClassVar[bool] = True
@@ -111,6 +105,13 @@ class OrbitCurve(Problem):
         orbit, moved, turned = self.orbit.adapted(u, tangent)
         return replace(self, orbit=orbit), moved, turned
 
+    def refined(
+        self, u: Array, tangent: Array, ahead: Sequence[Solution | BranchPoint]
+    ) -> "tuple[OrbitCurve, Array, Array] | None":
+        """See :meth:`Problem.refined`: that of the orbits."""
+        finer = self.orbit.refined(u, tangent, ahead)
+        return None if finer is None else (replace(self, orbit=finer[0]), *finer[1:])
+
     def met_again(
         self, origin: Problem, u: Array, tangent: Array, like: Array, heading: Array, within: float,
     ) -> Array | None:
@@ -125,13 +126,6 @@ class OrbitCurve(Problem):
         assert self.orbit.second is not None
         return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
                 **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
-
-    def note(self, points: Sequence[BranchPoint]) -> str:
-        """Where the intervals of the start leave too large an error of the states."""
-        if self.state_tolerance is None:
-            return ""
-        return told_of(less_accurate(points, self.state_tolerance), points, self.state_tolerance,
-                       "start from a point on more intervals")
 
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
@@ -228,7 +222,7 @@ class CurveLinearised:
         if kind == "Neimark-Sacker":
             return of_torus(self.orbit, whole=self._whole)
         found = of_fold(self.orbit) if kind == "fold" else of_doubling(self.orbit)
-        return self.problem.sign.aligned(found, self.problem.orbit.widths)
+        return self.problem.sign.aligned(found, self.problem.orbit)
 
     @property
     def critical(self) -> tuple[complex, ...]:
@@ -254,7 +248,7 @@ class CurveLinearised:
         if self.problem.kind == "period":
             return _unit(len(self.u), -3) / self.problem.period
         if self.problem.kind != "Neimark-Sacker":
-            self.problem.sign.keep(self.singularity.terms[0])
+            self.problem.sign.keep(self.singularity.terms[0], self.problem.orbit.times)
         return gradient(self.orbit, self.singularity.terms, self.bends)
 
     @cached_property
@@ -274,6 +268,8 @@ def orbit_curve(
     scales: ArrayLike | None, kind: str,
 ) -> tuple[OrbitCurve, Array, dict[str, Any]]:
     """Problem, unknowns and attributes of the curve of some kind through a point of orbits.
+
+    Its orbits have at least the intervals of the point.
 
     Parameters
     ----------
@@ -296,16 +292,24 @@ def orbit_curve(
     index = field.index(second)
     value = float(problem.values[index])
     width = widths.get(second, abs(value) or 1.0)
-    orbit = replace(problem, second=index, scales=np.insert(problem.scales, -1, width))
+    orbit = replace(problem, second=index, scales=np.insert(problem.scales, -1, width),
+                    sizes=_sizes(point, problem.intervals))
     start = np.insert(u, -1, value)
     if kind == "period" and not orbit.autonomous:
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
                          f"cannot keep; vary the frequency of the excitation instead.")
     curve = (PeriodCurve if kind == "period" else OrbitCurve)(
-        orbit, kind, problem.period(u),
-        state_tolerance=point.branch.attributes.get("state_tolerance"))
+        orbit, kind, problem.period(u))
     return curve, start, {**point.branch.attributes, "scales": orbit.scales,
                           "intervals": problem.intervals}
+
+
+def _sizes(point: BranchPoint, least: int) -> Intervals | None:
+    """Numbers of intervals along a curve; None where those of the point's branch are kept."""
+    known = point.branch.attributes
+    tolerance = known.get("state_tolerance")
+    return None if tolerance is None else Intervals(
+        least, max(least, int(known.get("most_intervals", least))), float(tolerance))
 
 
 def _coefficient(

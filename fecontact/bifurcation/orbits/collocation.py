@@ -38,6 +38,8 @@ _AMPLITUDE_CHANGE = 0.1
 _AIM, _FEWER = 0.1, 0.65
 # Largest factor between the intervals of one mesh and the next.
 _MOST_CHANGE = 2.0
+# Largest tolerance of Newton's method, in that of the states.
+_NEWTON = 1e-2
 # Steps in a row that have to allow fewer intervals: where a motion begins to stick, errors vary.
 _CALM = 10
 # Numbers of intervals are multiples of this: so many are eliminated at once.
@@ -87,34 +89,26 @@ class Intervals:
 
     def note(self, points: Sequence[BranchPoint]) -> str:
         """Where orbits of a branch are less accurate than the tolerance, and why."""
-        poor = less_accurate(points, self.tolerance)
+        poor = [point for point in points if _error_of(point) > self.tolerance]
+        if not poor:
+            return ""
         if any(len(point.values["mesh"]) - 1 >= self.most for point in poor):
             reason = f"allow more than most_intervals = {self.most}"
         elif any(point.kind is None for point in poor):
             reason = "Newton's method failed on finer meshes there; start with more intervals"
         else:
             reason = f"take more than intervals = {self.least}"
-        return told_of(poor, points, self.tolerance, reason)
+        worst = max(poor, key=_error_of)
+        return (f"The states of {len(poor)} of {len(points)} orbits are less accurate than "
+                f"state_tolerance = {self.tolerance:g}, off by up to {_error_of(worst):.1e} at the "
+                f"parameter {worst.parameter:.6g}: {reason}.")
+
+    def newton(self, given: float) -> float:
+        """Tolerance of Newton's method: the given one, or a hundredth of that of the states."""
+        return min(given, _NEWTON * self.tolerance)
 
     def _wanted(self, given: int, error: float, degree: int) -> float:
         return float(given * (error / (_AIM * self.tolerance)) ** (1.0 / (degree + 1)))
-
-
-def less_accurate(points: Sequence[BranchPoint], tolerance: float) -> list[BranchPoint]:
-    """The points of which some state has an error above a tolerance."""
-    return [point for point in points if _error_of(point) > tolerance]
-
-
-def told_of(
-    poor: Sequence[BranchPoint], points: Sequence[BranchPoint], tolerance: float, reason: str
-) -> str:
-    """A sentence on the less accurate ones among points, with a reason or remedy; "" for none."""
-    if not poor:
-        return ""
-    worst = max(poor, key=_error_of)
-    return (f"The states of {len(poor)} of {len(points)} orbits are less accurate than "
-            f"state_tolerance = {tolerance:g}, off by up to {_error_of(worst):.1e} at the "
-            f"parameter {worst.parameter:.6g}: {reason}.")
 
 
 def _error_of(point: Solution | BranchPoint) -> float:

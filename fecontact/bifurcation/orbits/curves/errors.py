@@ -1,8 +1,8 @@
-"""Errors of the special points of curves of orbits over two parameters, from a finer mesh."""
+"""Special points of curves of orbits over two parameters on finer meshes, and their errors."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.newton import norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import details_of, with_details
-from fecontact.bifurcation.continuation.sharpening import found_near, reach
+from fecontact.bifurcation.continuation.sharpening import LEAST_FALL, found_near, reach
 from fecontact.bifurcation.orbits.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.curves.singularity import ContinuedSign
 from fecontact.bifurcation.orbits.mesh import equidistributed
@@ -30,32 +30,56 @@ class Finer(NamedTuple):
 
 
 def with_errors(curve: OrbitCurve, branch: Branch, events: Sequence[str]) -> Branch:
-    """The special points with the change of both parameters on twice the intervals as their errors.
+    """The special points, each on intervals that suffice for both parameters, with their errors.
 
-    Normal forms are those on the finer mesh. Of points that are not found there the errors are the
-    changes over the stretch that was searched, and the branch's message tells of them; their normal
-    forms are left out.
+    These are the changes on twice the intervals. Normal forms are those on the finest mesh. Of points
+    that are not found there the errors are the changes over the stretch that was searched, and the
+    branch's message tells of them; their normal forms are left out.
     """
     points, missing = list(branch.points), []
     try:
         for index, point in enumerate(points):
             if point.kind is None or point.kind == HALVING or point.kind in events:
                 continue
-            place = _on_twice(curve, point)
-            finer = found_near(place, point.kind)
-            if finer is None:
-                first, second = reach(place), reach(place, -2)
+            points[index], found = _sharpened(curve, point, branch.attributes)
+            if not found:
                 missing.append(f"{point.kind} at {point.parameter:.6g}")
-            else:
-                first, second = (abs(float(finer.u[k] - point.u[k])) for k in (-1, -2))
-            points[index] = with_details(point, parameter_error=first,
-                                         second_parameter_error=second, **_form(point, finer))
     except KeyboardInterrupt:
         branch = replace(branch, status=BranchStatus.INTERRUPTED)
+    sizes = curve.orbit.sizes
     said = (f"On twice the intervals these special points are not found nearby: "
             f"{', '.join(missing)}." if missing else "")
+    poor = "" if sizes is None else sizes.note(points)
     return replace(branch, points=tuple(points),
-                   message=" ".join(filter(None, (branch.message, said))))
+                   message=" ".join(filter(None, (branch.message, poor, said))))
+
+
+def _sharpened(
+    curve: OrbitCurve, point: BranchPoint, known: Mapping[str, Any]
+) -> tuple[BranchPoint, bool]:
+    """A special point on the first mesh that suffices, and whether twice the intervals have it.
+
+    Each mesh has twice the intervals of the one before, up to the most of the start's branch.
+    """
+    most, widths = int(known.get("most_intervals", 0)), curve.orbit.scales[-2:]
+    allowed = float(known.get("tolerance", np.inf)) * widths
+    best, here, errors = point, point, np.zeros(2)
+    place = _on_twice(curve, here)
+    found = finer = found_near(place, str(point.kind))
+    form = _form(here, finer)
+    if found is None:
+        errors = np.array([reach(place, -2), reach(place)])
+    while finer is not None:
+        errors = np.maximum(np.abs(finer.u[-2:] - here.u[-2:]), LEAST_FALL * errors)
+        form = _form(here, finer)
+        best, here = here, finer
+        if (errors <= allowed).all() or place.problem.orbit.intervals > most:
+            break
+        place = _on_twice(curve, here)
+        finer = found_near(place, str(point.kind))
+    second, first = errors.tolist()
+    return (with_details(best, parameter_error=first, second_parameter_error=second, **form),
+            found is not None)
 
 
 def _form(point: BranchPoint, finer: BranchPoint | None) -> dict[str, Array]:
@@ -72,7 +96,8 @@ def _on_twice(curve: OrbitCurve, point: BranchPoint) -> Finer:
     """The curve near a point, on twice its intervals."""
     mesh, d = np.asarray(point.values["mesh"], dtype=float), curve.orbit.field.dimension
     nodes = point.u[: (len(mesh) - 1) * curve.orbit.degree * d].reshape(-1, d).copy()
-    orbit = replace(curve.orbit, mesh=mesh, reference=nodes, before=(), renewal=0)
+    orbit = replace(curve.orbit, mesh=mesh, reference=nodes, before=(), renewal=0,
+                    sizes=None)
     twice = equidistributed(mesh, orbit.nodes(point.u), orbit.degree, 2 * orbit.intervals)
     orbit, u, tangent = orbit.on_mesh(twice, point.u, point.tangent)
     problem = replace(curve, orbit=orbit, sign=ContinuedSign())

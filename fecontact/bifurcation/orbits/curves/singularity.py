@@ -79,23 +79,34 @@ class ContinuedSign:
 
     def __init__(self) -> None:
         self._before: Term | None = None
+        self._times = np.empty(0)
 
-    def keep(self, term: Term) -> None:
-        """Let vectors that follow have the direction of these."""
-        self._before = term
+    def keep(self, term: Term, times: Array) -> None:
+        """Let vectors that follow have the direction of these, which are given at some times."""
+        self._before, self._times = term, times
 
-    def aligned(self, found: Singularity, widths: Array) -> Singularity:
+    def aligned(self, found: Singularity, orbit: Discretisation) -> Singularity:
         """The test function for w and v of length one, in the direction of those before."""
         term, = found.terms
-        before = self._before
-        if before is None or before.left.shape != term.left.shape:
-            nothing = np.empty((0, 0))
-            before = Term(nothing, nothing)
-        one = float(unit_factor(widths, term.left, before.left))
-        other = float(unit_factor(widths, term.states, before.states))
+        left, states = self._at(orbit.times)
+        one = float(unit_factor(orbit.widths, term.left, left))
+        other = float(unit_factor(orbit.widths, term.states, states))
         return Singularity(one * other * found.value,
                            (Term(one * term.left, other * term.states, other * term.period),),
                            None if found.v is None else other * found.v)
+
+    def _at(self, times: Array) -> tuple[Array, Array]:
+        """The vectors w and v before, between their times where a mesh has other intervals.
+
+        They are empty where there are none.
+        """
+        if self._before is None:
+            return np.empty((0, 0)), np.empty((0, 0))
+        if len(times) == len(self._times):
+            return self._before[:2]
+        left, states = (np.stack([np.interp(times, self._times, column) for column in part.T],
+                                 axis=1) for part in self._before[:2])
+        return left, states
 
 
 def of_fold(at: CollocationLinearisation) -> Singularity:
