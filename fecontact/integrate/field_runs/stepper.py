@@ -10,13 +10,13 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH
 from fecontact.integrate.courses import COEFFICIENTS
+from fecontact.integrate.event_arrays import take_events, watch_for
 from fecontact.integrate.events import AnyEvent, Events
 from fecontact.integrate.field_runs import step_loop
 from fecontact.integrate.field_runs.python_functions import PythonFunction
 from fecontact.integrate.field_runs.step_loop import Output, Progress, Room
 from fecontact.integrate.field_runs.variational import Varied, varied_for
 from fecontact.integrate.rodas5p import tableau
-from fecontact.integrate.rodas5p.event_arrays import take_events, watch_for
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.rodas5p.step_length import STEP, TIME
 from fecontact.integrate.rodas5p.step_loop import RUNNING

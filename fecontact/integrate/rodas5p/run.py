@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.integrate.event_arrays import take_events
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import state
-from fecontact.integrate.rodas5p.event_arrays import take_events
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.rodas5p.small_systems import advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
