@@ -308,6 +308,9 @@ def factorise_step(G, blocks, w):
     factorise_within(w.factors, blocks.reach, w.starts, w.pivots)
     if m <= _FEW and w.inverse.shape[1] == 0:
         set_solver(G, blocks, w, w.solver)
+        if not G * G < np.inf:
+            # All answers would be zero.
+            w.solver[0, 0] = np.nan
 
 
 @helper
