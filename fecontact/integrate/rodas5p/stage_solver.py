@@ -308,7 +308,7 @@ def factorise_step(G, blocks, w):
     factorise_within(w.factors, blocks.reach, w.starts, w.pivots)
     if m <= _FEW and w.inverse.shape[1] == 0:
         set_solver(G, blocks, w, w.solver)
-        if not G * G < np.inf:
+        if not G * G < np.inf:  # noqa: SIM300
             # All answers would be zero.
             w.solver[0, 0] = np.nan
 
