@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, helper, i8, integers, kernel, matrix, routine, vector
+from fecontact.core.compiled import f8, i8, integers, kernel, matrix, routine, vector
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
@@ -24,6 +24,15 @@ from fecontact.integrate.rodas5p.event_kernels import (
     note_own,
     set_own_places,
 )
+from fecontact.integrate.rodas5p.step_length import (
+    REJECTED_LAST,
+    SMALLEST_FACTOR,
+    STEP,
+    TIME,
+    growth,
+    next_length,
+    root_of,
+)
 from fecontact.integrate.rodas5p.step_loop import (
     FINISHED,
     MINIMUM_STEP,
@@ -33,12 +42,9 @@ from fecontact.integrate.rodas5p.step_loop import (
 )
 from fecontact.system.fields.one_place import FIELD, derive_at, evaluate_at
 
-# Entries of Progress.numbers and of Progress.counts.
-TIME, LENGTH, LAST_LENGTH, LAST_ERROR, REJECTED_LAST = range(5)
+# Entries of Progress.counts; those of Progress.numbers are those of `step_length`.
 OUTPUTS, STEPS, REJECTIONS, RATES, STARTED = range(5)
 
-_SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
-_POWER = -1.0 / tableau.ORDER
 _LOOKS = 16
 
 
@@ -127,11 +133,11 @@ def _start(t, field, progress, room, output, watch):
         size = max(size, abs(progress.rate[k]) / progress.sizes[k])
         output.states[0, k] = progress.state[k]
     if size > 0.0:
-        numbers[LENGTH] = min(numbers[LENGTH], 0.01 / size)
+        numbers[STEP] = min(numbers[STEP], 0.01 / size)
     # What is at rest may not stay there: the first step does not depend on the end of the run.
     steep = steepest(progress.J, progress.sizes)
     if steep > 0.0:
-        numbers[LENGTH] = min(numbers[LENGTH], 0.1 / steep)
+        numbers[STEP] = min(numbers[STEP], 0.1 / steep)
     for k in range(len(watch.own)):
         watch.own_values[k] = event_at(watch.own[k])(t, progress.state, watch.own_parameters[k])
     progress.counts[STARTED], progress.counts[OUTPUTS] = 1, 1
@@ -246,27 +252,6 @@ def _go_on(step, progress, room):
     progress.counts[STEPS] += 1
 
 
-@helper
-def _growth(error):
-    """Factor of the length of the next step, by the error of this one."""
-    if not error > 1e-6:
-        return _LARGEST_FACTOR
-    return min(_LARGEST_FACTOR, max(_SMALLEST_FACTOR, _SAFETY * error**_POWER))
-
-
-@helper
-def _next_length(h, error, longest, numbers):
-    """Length of the step after an accepted one, by predictive control (Gustafsson)."""
-    factor = _growth(error)
-    if numbers[LAST_LENGTH] > 0.0:
-        trend = (h / numbers[LAST_LENGTH]) * (max(error, 1e-6) / numbers[LAST_ERROR]) ** _POWER
-        factor = max(_SMALLEST_FACTOR, min(factor, factor * trend))
-    if numbers[REJECTED_LAST] != 0.0:
-        factor = min(factor, 1.0)
-    numbers[LAST_LENGTH], numbers[LAST_ERROR], numbers[REJECTED_LAST] = h, max(error, 1e-2), 0.0
-    return min(h * factor, longest)
-
-
 @kernel(ADVANCE, nogil=True)
 def advance(field, progress, room, output, varied, watch, most):
     """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
@@ -279,11 +264,11 @@ def advance(field, progress, room, output, varied, watch, most):
         borrowed(field), borrowed(progress), borrowed(room), borrowed(output), borrowed(varied),
         borrowed(watch))
     numbers, counts, times = progress.numbers, progress.counts, output.times
-    t, h, end = numbers[TIME], numbers[LENGTH], times[-1]
+    t, h, end = numbers[TIME], numbers[STEP], times[-1]
     smallest = 1e-14 * max(abs(times[0]), abs(end))
     if counts[STARTED] == 0:
         _start(t, field, progress, room, output, watch)
-        h = numbers[LENGTH]
+        h = numbers[STEP]
     new, attempts = True, 0
     while counts[OUTPUTS] < len(times):
         # A step that failed is repeated before the call returns.
@@ -305,11 +290,11 @@ def advance(field, progress, room, output, varied, watch, most):
         if not new:
             counts[REJECTIONS] += 1
             numbers[REJECTED_LAST] = 1.0
-            h = step.h * (_growth(error) if error < np.inf else _SMALLEST_FACTOR)
+            h = step.h * (growth(root_of(error)) if error < np.inf else SMALLEST_FACTOR)
             if not error < np.inf:
                 room.stages[:] = 0.0
             if not h >= smallest:
-                numbers[TIME], numbers[LENGTH] = t, h
+                numbers[TIME], numbers[STEP] = t, h
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
         tableau.dense_coefficients(room.stages, room.dense)
@@ -323,9 +308,9 @@ def advance(field, progress, room, output, varied, watch, most):
             for k in range(len(progress.state)):
                 progress.state[k] = room.right[k]
             counts[STEPS] += 1
-            numbers[TIME], numbers[LENGTH] = reached, step.h
+            numbers[TIME], numbers[STEP] = reached, step.h
             return STOPPED
         _go_on(step, progress, room)
-        t, h = step.target, _next_length(step.h, error, output.longest, numbers)
-    numbers[TIME], numbers[LENGTH] = t, h
+        t, h = step.target, next_length(step.h, root_of(error), output.longest, numbers)
+    numbers[TIME], numbers[STEP] = t, h
     return FINISHED if counts[OUTPUTS] == len(times) else RUNNING

@@ -10,14 +10,15 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH
 from fecontact.integrate.courses import COEFFICIENTS
+from fecontact.integrate.event_arrays import take_events, watch_for
 from fecontact.integrate.events import AnyEvent, Events
 from fecontact.integrate.field_runs import step_loop
 from fecontact.integrate.field_runs.python_functions import PythonFunction
 from fecontact.integrate.field_runs.step_loop import Output, Progress, Room
 from fecontact.integrate.field_runs.variational import Varied, varied_for
 from fecontact.integrate.rodas5p import tableau
-from fecontact.integrate.rodas5p.event_arrays import take_events, watch_for
 from fecontact.integrate.rodas5p.event_kernels import Watch
+from fecontact.integrate.rodas5p.step_length import STEP, TIME
 from fecontact.integrate.rodas5p.step_loop import RUNNING
 from fecontact.system.fields.one_place import FieldKernel, python_field
 from fecontact.system.fields.vector_field import VectorField
@@ -70,7 +71,7 @@ class FieldSteps:
     @property
     def time(self) -> float:
         """Time reached [s]."""
-        return float(self.progress.numbers[step_loop.TIME])
+        return float(self.progress.numbers[TIME])
 
     @property
     def attempts(self) -> int:
@@ -165,7 +166,7 @@ def start_field(
     if max_step is not None:
         longest = min(longest, float(max_step))
     numbers = np.zeros(5)
-    numbers[step_loop.TIME], numbers[step_loop.LENGTH] = times[0], min(0.01 * whole, longest)
+    numbers[TIME], numbers[STEP] = times[0], min(0.01 * whole, longest)
     vectors, squares = np.zeros((6, d)), np.zeros((2, d, d))
     return FieldSteps(
         field, kernel, function,

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent, Events
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
 from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.reference.scipy import longest_step
-from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.event_kernels import FOUND
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw

@@ -9,13 +9,13 @@ import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
+from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.reference.scipy import energy_scale
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
-from fecontact.integrate.rodas5p.event_arrays import watch_for
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.small_systems import propagate_for
 from fecontact.integrate.rodas5p.state import (

@@ -7,12 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.integrate.event_arrays import take_events
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import state
-from fecontact.integrate.rodas5p.event_arrays import take_events
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.rodas5p.small_systems import advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
+from fecontact.integrate.rodas5p.step_length import TIME
 from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.integrate.series.branches import Series
 
@@ -81,7 +82,7 @@ class Run:
     @property
     def time(self) -> float:
         """Time reached [s]."""
-        return float(self.progress.numbers[state.TIME])
+        return float(self.progress.numbers[TIME])
 
     @property
     def attempts(self) -> int:

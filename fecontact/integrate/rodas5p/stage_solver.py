@@ -32,7 +32,8 @@ class Reduced(NamedTuple):
 
     J = [Jq, Jv] (m, 2 m); factors (m, m), their first columns and pivots (m,) of its matrix; per
     node the inverse of G - Zz (n, s, s) and e (n, s), in space (n, 2 s), for both tangents; room to
-    work in: (m,), (4, 2 n) and (2 m, 2 n), in space (6, 3 n) and (2 m, 3 n).
+    work in: (m,), (4, 2 n) and (2 m, 2 n), in space (6, 3 n) and (2 m, 3 n). For few modes the
+    ``solver`` (m, 2 m) of :func:`set_solver`.
     """
 
     J: Array
@@ -44,10 +45,14 @@ class Reduced(NamedTuple):
     room: Array
     coefficients: Array
     answers: Array
+    solver: Array
 
 
 REDUCED = types.NamedTuple(
-    [matrix, matrix, integers, integers, block, matrix, vector, matrix, matrix], Reduced)
+    [matrix, matrix, integers, integers, block, matrix, vector, matrix, matrix, matrix], Reduced)
+
+# So few modes are solved for by the matrix that makes u_v of right sides.
+_FEW = 4
 
 
 def reduced_for(modes: int, nodes: int, states: int, dimension: int) -> Reduced:
@@ -57,7 +62,8 @@ def reduced_for(modes: int, nodes: int, states: int, dimension: int) -> Reduced:
         np.zeros((modes, 2 * modes)), np.zeros((modes, modes)),
         np.zeros(modes, dtype=np.int64), np.zeros(modes, dtype=np.int64),
         np.zeros((nodes, states, states)), np.zeros((nodes, (dimension - 1) * states)),
-        np.zeros(modes), np.zeros((2 * dimension, columns)), np.zeros((2 * modes, columns)))
+        np.zeros(modes), np.zeros((2 * dimension, columns)), np.zeros((2 * modes, columns)),
+        np.zeros((modes, 2 * modes) if modes <= _FEW else (0, 0)))
 
 
 @routine
@@ -300,6 +306,32 @@ def factorise_step(G, blocks, w):
     for i in range(m):
         w.factors[i, i] += G * G
     factorise_within(w.factors, blocks.reach, w.starts, w.pivots)
+    if m <= _FEW and w.inverse.shape[1] == 0:
+        set_solver(G, blocks, w, w.solver)
+        if not G * G < np.inf:  # noqa: SIM300
+            # All answers would be zero.
+            w.solver[0, 0] = np.nan
+
+
+@helper
+def set_solver(G, blocks, w, out):
+    """Fill out (m, 2 m), which makes u_v of a right side: the factors' F^-1 [Jq, G I]."""
+    m = len(w.pivots)
+    x = w.room
+    for c in range(m):
+        for i in range(m):
+            x[i] = 0.0
+        x[blocks.position[c]] = G
+        solve_within(w.factors, blocks.reach, w.starts, w.pivots, x)
+        for i in range(m):
+            out[i, m + c] = x[blocks.position[i]]
+    for i in range(m):
+        for k in range(m):
+            out[i, k] = 0.0
+        for c in range(m):
+            part = out[i, m + c] / G
+            for k in range(m):
+                out[i, k] += part * w.J[c, k]
 
 
 @helper
@@ -309,6 +341,14 @@ def solve_stage(G, s, blocks, g, w, r, motion, out):
     m, n = len(shapes), len(g.partial)
     states = w.inverse.shape[1]
     x = w.room
+    if m <= _FEW and states == 0:
+        part = 1.0 / G
+        for i in range(m):
+            speed = 0.0
+            for k in range(2 * m):
+                speed += w.solver[i, k] * r[k]
+            out[i], out[m + i] = part * (r[i] + speed), speed
+        return
     for i in range(m):
         out[m + i] = r[m + i]
     if states > 0:

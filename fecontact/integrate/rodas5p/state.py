@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, i8, integers, matrix, vector
+from fecontact.core.compiled import block, f8, i8, integers, matrix, vector
 from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks, near_blocks
+from fecontact.integrate.rodas5p.step_length import LAST_ROOT, STEP, TIME
 from fecontact.system.nodes import (
     CONTACT_FIELDS,
     GROUND_MOTION,
@@ -20,10 +21,11 @@ from fecontact.system.nodes import (
 )
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
-# Entries of Progress.numbers. CAUTIOUS is the length of a step that failed, while what made it
-# fail may still lie ahead, else zero. ENERGY is the largest energy or work so far.
+# Entries of Progress.numbers, after those of `step_length`. CAUTIOUS is the length of a step that
+# failed, while what made it fail may still lie ahead, else zero. ENERGY is the largest energy or
+# work so far.
 NUMBERS = 8
-TIME, STEP, SPEED_SCALE, REJECTED_LAST, LAST_STEP, LAST_ERROR, CAUTIOUS, ENERGY = range(NUMBERS)
+SPEED_SCALE, CAUTIOUS, ENERGY = range(LAST_ROOT + 1, NUMBERS)
 # Entries of Progress.counts.
 COUNTS = 6
 STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(COUNTS)
@@ -178,7 +180,8 @@ class Room(NamedTuple):
     ones, ``given`` and ``load`` for what acts at the time of a stage, ``between`` (2, d n) for the
     nodes at a point within the step, ``power`` (4, p + 2 n) for a quadrature. ``ends`` to
     ``places`` serve to look at the course of a step: the nodes at its ends, its coefficients,
-    those of the nodes, and room for what they may do.
+    those of the nodes, and room for what they may do. ``sums`` (2, size, 8) are what stages add to
+    those after them.
     """
 
     near: Blocks
@@ -207,12 +210,13 @@ class Room(NamedTuple):
     bound: Array
     halves: Array
     places: Array
+    sums: Array
 
 
 ROOM = types.NamedTuple(
     [BLOCKS, vector] + [matrix] * 2 + [vector] * 6 + [matrix] * 3 + [vector] * 3
-    + [matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector],
-    Room)
+    + [matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector]
+    + [block], Room)
 
 
 def gradients_for(
@@ -248,7 +252,8 @@ def room_for(modes: int, nodes: int, states: int, dimension: int, blocks: Blocks
         np.zeros((3, columns)), np.zeros((3, size)),
         np.zeros((courses.DOUBT + 1, (2 * dimension - 1) * nodes)),
         np.zeros((3, courses.COEFFICIENTS)),
-        np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST))
+        np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST),
+        np.zeros((2, size, tableau.STAGES)))
 
 
 def progress_for(

@@ -27,18 +27,21 @@ from fecontact.integrate.rodas5p.event_kernels import (
 )
 from fecontact.integrate.rodas5p.state import (
     CAUTIOUS,
-    LAST_ERROR,
-    LAST_STEP,
     OUTPUTS,
     RATES,
-    REJECTED_LAST,
     REJECTIONS,
     SPEED_SCALE,
     STARTED,
-    STEP,
     STEPS,
-    TIME,
     Step,
+)
+from fecontact.integrate.rodas5p.step_length import (
+    REJECTED_LAST,
+    STEP,
+    TIME,
+    growth,
+    next_length,
+    root_of,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
@@ -54,8 +57,6 @@ from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, VARY, WATCH, i8)
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
-_SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
-_POWER = -1.0 / tableau.ORDER
 # Attempts at a step that end where something was not felt.
 _MOST_AGAIN = 20
 
@@ -141,13 +142,14 @@ def _stages(step, G, problem, progress, room):
     s, blocks = problem.system, problem.blocks
     size = len(progress.state)
     m = len(room.load)
-    last = step.t
+    last, rise = step.t, 1.0 / step.h
+    tableau.begin_stages(progress.state, room.sums)
     for i in range(tableau.STAGES):
         if i == 0:
             for k in range(size):
                 room.right[k] = progress.rate[k]
         else:
-            tableau.combined(tableau.A[i], 1.0, progress.state, room.stages, room.stage)
+            tableau.next_stage(i, rise, room.stages[i - 1], room.sums, room.stage, room.right)
             now = min(step.t + tableau.NODES[i] * step.h, step.latest)
             if now != last:
                 dynamics.set_given(now, s, room.given, room.load)
@@ -155,7 +157,8 @@ def _stages(step, G, problem, progress, room):
             extend_near(room.stage, problem, progress, room)
             dynamics.set_rate(room.stage, s, room.near, room.given, room.load, room.nodes,
                               room.scratch, room.base)
-            tableau.combined(tableau.C[i], 1.0 / step.h, room.base, room.stages, room.right)
+            for k in range(size):
+                room.right[k] += room.base[k]
         factor = tableau.TIME[i] * step.h
         if factor != 0.0:
             for k in range(m, size):
@@ -222,14 +225,6 @@ def _switch_part(step, smallest, problem, progress, room, watch):
     if part * step.h > near and (1.0 - part) * step.h > near:
         return part * (1.0 + 1e-9)
     return 1.0
-
-
-@helper
-def _growth(error):
-    """Factor of the length of the next step, by the error of this one."""
-    if error > 1e-6:
-        return min(_LARGEST_FACTOR, max(_SMALLEST_FACTOR, _SAFETY * error**_POWER))
-    return _LARGEST_FACTOR
 
 
 @helper
@@ -309,22 +304,6 @@ def _go_on(step, problem, progress, room, output):
 
 
 @helper
-def _next_length(step, error, factor, longest, numbers):
-    """Length of the step after an accepted one."""
-    h = step.h
-    if numbers[LAST_STEP] > 0.0:
-        # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
-        factor = max(_SMALLEST_FACTOR, min(factor, factor * (h / numbers[LAST_STEP]) * (
-            max(error, 1e-6) / numbers[LAST_ERROR]) ** _POWER))
-    if numbers[REJECTED_LAST] != 0.0:
-        factor = min(factor, 1.0)
-    numbers[LAST_STEP], numbers[LAST_ERROR], numbers[REJECTED_LAST] = h, max(error, 1e-2), 0.0
-    if step.caution > 0.0:
-        numbers[CAUTIOUS] = step.caution
-    return min(h * factor, longest)
-
-
-@helper
 def advance_by(problem, progress, room, output, vary, watch, most):
     """As :func:`advance`, by references."""
     s, control, numbers, counts = (problem.system, problem.control, progress.numbers,
@@ -370,10 +349,10 @@ def advance_by(problem, progress, room, output, vary, watch, most):
             set_scale(control, progress, room)
             error = max(error, propagate_at(vary.propagate)(step, problem, progress, room, vary)
                         / vary.variation.tolerance)
-        factor = _growth(error)
+        root = root_of(error)
         if not error <= 1.0:
             _reject(step, error, progress, room)
-            h = step.h * factor
+            h = step.h * growth(root)
             if not h >= smallest:
                 numbers[TIME], numbers[STEP] = t, h
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
@@ -390,7 +369,9 @@ def advance_by(problem, progress, room, output, vary, watch, most):
             return STOPPED
         _go_on(step, problem, progress, room, output)
         t, new, again = step.target, True, 0
-        h = _next_length(step, error, factor, control.longest, numbers)
+        h = next_length(step.h, root, control.longest, numbers)
+        if step.caution > 0.0:
+            numbers[CAUTIOUS] = step.caution
     numbers[TIME], numbers[STEP] = t, h
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
 

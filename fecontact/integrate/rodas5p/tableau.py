@@ -16,6 +16,7 @@ numerical benchmarks within the Julia Differential Equations package, BIT 63 (20
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.lanes.vectors import fused, read, spread, write
 
 STAGES = 8
 ORDER = 5
@@ -68,6 +69,11 @@ DENSE = np.array([
 ])
 
 
+# By stages that add something, and what the stage just before adds.
+_A_COLUMNS, _C_COLUMNS = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
+_A_LAST, _C_LAST = (np.array([0.0, *np.diagonal(table, -1)]) for table in (A, C))
+
+
 @helper
 def combined(row, factor, base, stages, out):
     """Out = base + factor * sum_j row_j stages_j over the seven stages that may precede one."""
@@ -76,6 +82,30 @@ def combined(row, factor, base, stages, out):
     for i in range(len(out)):
         out[i] = (base[i] + a0 * stages[0, i] + a1 * stages[1, i] + a2 * stages[2, i]
                   + a3 * stages[3, i] + a4 * stages[4, i] + a5 * stages[5, i] + a6 * stages[6, i])
+
+
+@helper
+def begin_stages(base, sums):
+    """Fill ``sums`` (2, size, 8) for steps from the state ``base``; see :func:`next_stage`."""
+    for k in range(len(base)):
+        write(sums[0, k], spread(base[k]))
+        write(sums[1, k], spread(0.0))
+
+
+@helper
+def next_stage(i, rise, last, sums, place, right):
+    """Fill place = base + sum_j A_ij u_j and right = rise * sum_j C_ij u_j of stage i > 0.
+
+    ``last`` is u_{i-1}. ``sums`` hold what the stages before it add, for all stages to come, so
+    that it is one product away from what it is needed for.
+    """
+    a, c = read(_A_COLUMNS[i - 1]), read(_C_COLUMNS[i - 1])
+    for k in range(len(last)):
+        u = last[k]
+        place[k] = sums[0, k, i] + _A_LAST[i] * u
+        right[k] = rise * (sums[1, k, i] + _C_LAST[i] * u)
+        write(sums[0, k], fused(a, spread(u), read(sums[0, k])))
+        write(sums[1, k], fused(c, spread(u), read(sums[1, k])))
 
 
 @helper

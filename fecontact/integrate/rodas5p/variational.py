@@ -31,7 +31,7 @@ from fecontact.core.compiled import (
 )
 from fecontact.core.references import Reference
 from fecontact.core.types import Array
-from fecontact.integrate.rodas5p import dynamics, tableau
+from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
@@ -256,7 +256,7 @@ def propagate(step, problem, progress, room, vary):
     varies = vary.width != 0.0
     G = 1.0 / (step.h * tableau.GAMMA)
     if size == 2 * m:
-        columns.set_solver(G, blocks, reduced, v)
+        stage_solver.set_solver(G, blocks, reduced, v.solver)
     acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), step.moved, s)
     columns.learn(gradients, v.usual)
     columns.set_paths(step, acceleration, s, blocks, stages, v)

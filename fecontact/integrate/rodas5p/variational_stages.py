@@ -12,7 +12,6 @@ there; this is found once a step, by differences.
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.dense_lu import solve_within
 from fecontact.integrate.courses import STEEPEST
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.system.kernels import node_gradients
@@ -272,26 +271,6 @@ def set_between(above, here, below, width, central, usual, out):
                 out.rates[j, row, k] = _between(
                     above.rates[j, row, k], here.rates[j, row, k], below.rates[j, row, k], width,
                     central, usual.rates[j, row, k])
-
-
-@helper
-def set_solver(G, blocks, reduced, v):
-    """Fill v.solver (m, 2 m), which makes u_v of a right side: the factors' F^-1 [Jq, G I]."""
-    m = len(reduced.pivots)
-    x = reduced.room
-    for c in range(m):
-        x[:] = 0.0
-        x[blocks.position[c]] = G
-        solve_within(reduced.factors, blocks.reach, reduced.starts, reduced.pivots, x)
-        for i in range(m):
-            v.solver[i, m + c] = x[blocks.position[i]]
-    for i in range(m):
-        for k in range(m):
-            v.solver[i, k] = 0.0
-        for c in range(m):
-            part = v.solver[i, m + c] / G
-            for k in range(m):
-                v.solver[i, k] += part * reduced.J[c, k]
 
 
 @helper

@@ -30,11 +30,10 @@ from fecontact.integrate.rodas5p.state import (
     REJECTIONS,
     SPEED_SCALE,
     STARTED,
-    STEP,
     STEPS,
-    TIME,
     WORST_NODE,
 )
+from fecontact.integrate.rodas5p.step_length import STEP, TIME
 from fecontact.integrate.rodas5p.step_loop import (
     FINISHED,
     MINIMUM_STEP,

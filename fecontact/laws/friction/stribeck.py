@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.core.compiled import helper
 from fecontact.core.units import Unit
 from fecontact.laws.base import NotNegative, PerNode, Positive
+from fecontact.laws.elementary import arctangent
 from fecontact.laws.friction.base import (
     MemorylessFriction,
     SmoothedFriction,
@@ -24,7 +25,7 @@ def _smoothed_sign(v, slope, smoothing):
     rise = 2.0 / math.pi * slope
     if smoothing == 0.0:
         x = slope * v
-        return 2.0 / math.pi * math.atan(x), rise / (1.0 + x * x)
+        return 2.0 / math.pi * arctangent(x), rise / (1.0 + x * x)
     x = rise * v
     if smoothing == 1.0:
         s = math.tanh(x)
@@ -102,7 +103,7 @@ def product(v, F, p):
     fall = excess * math.exp(-decay * abs(v))
     sign = 1.0 if v >= 0.0 else -1.0
     x = slope * v
-    bend = math.atan(x)
+    bend = arctangent(x)
     ratio = factor * (1.0 + fall) * bend
     rate = factor * ((1.0 + fall) * slope / (1.0 + x * x) - sign * decay * fall * bend)
     return ratio * F, rate * F, ratio

@@ -10,6 +10,7 @@ from fecontact.core.errors import InputError, require_finite, require_not_negati
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
 from fecontact.laws.data_columns import numbers
+from fecontact.laws.elementary import sine_and_cosine
 from fecontact.laws.signals.base import Signal, between, require_one_of
 from fecontact.laws.signals.transient import Pulse, Step, Tabulated
 from fecontact.laws.signatures import signal
@@ -53,8 +54,8 @@ class Constant(Signal):
 @signal
 def _harmonic(t, p):
     amplitude, w, phase = p[0], p[1], p[2]
-    angle = w * t + phase
-    return amplitude * math.sin(angle), amplitude * w * math.cos(angle)
+    sine, cosine = sine_and_cosine(w * t + phase)
+    return amplitude * sine, amplitude * w * cosine
 
 
 @dataclass(frozen=True)

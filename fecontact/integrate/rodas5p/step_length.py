@@ -1,0 +1,47 @@
+"""Lengths of steps by the errors of those before: predictive control (Gustafsson).
+
+An error counts by its root e^(-1/5), the factor by which a step would have to change for the
+error that is allowed.
+"""
+
+from fecontact.core.compiled import helper
+from fecontact.integrate.rodas5p.tableau import ORDER
+
+# First entries of the numbers that a run goes on from: time reached, length of the next step,
+# whether the last one was rejected, length and root of the last one that was accepted.
+TIME, STEP, REJECTED_LAST, LAST_STEP, LAST_ROOT = range(5)
+
+SMALLEST_FACTOR = 0.1
+_SAFETY, _LARGEST_FACTOR = 0.9, 8.0
+_POWER = -1.0 / ORDER
+# Errors count as this at least.
+_LEAST = 1e-6
+# The last error counted as a hundredth at least.
+_LARGEST_LAST_ROOT = 1e-2**_POWER
+
+
+@helper
+def root_of(error):
+    """The root of an error, given as a multiple of what is allowed; not for NaN."""
+    return max(error, _LEAST) ** _POWER
+
+
+@helper
+def growth(root):
+    """Factor of the length of the next step, by the error of this one alone."""
+    return min(_LARGEST_FACTOR, max(SMALLEST_FACTOR, _SAFETY * root))
+
+
+@helper
+def next_length(h, root, longest, numbers):
+    """Length of the step after an accepted one of the length h, which ``numbers`` take note of."""
+    factor = growth(root)
+    if numbers[LAST_STEP] > 0.0:
+        # Steps that had to shrink will have to shrink on.
+        trend = h / numbers[LAST_STEP] * (root / numbers[LAST_ROOT])
+        factor = max(SMALLEST_FACTOR, min(factor, factor * trend))
+    if numbers[REJECTED_LAST] != 0.0:
+        factor = min(factor, 1.0)
+    numbers[LAST_STEP], numbers[LAST_ROOT] = h, min(root, _LARGEST_LAST_ROOT)
+    numbers[REJECTED_LAST] = 0.0
+    return min(h * factor, longest)
