@@ -153,7 +153,8 @@ def ensemble(
                          f"out.")
     done, leave = [0], [False]
 
-    series = solver.series if isinstance(solver, Rodas5P) else "never"
+    series, collocation = (solver.series, solver.collocation) if isinstance(
+        solver, Rodas5P) else ("never", "never")
 
     def compiled(index: int, state: Array, before: "_Before") -> None:
         system = members[index]
@@ -162,7 +163,7 @@ def ensemble(
             run: Any = again(before.run, before.system, state)
         else:
             run = start_any(system, state, instants[index], rtol=float(rtol), max_step=max_step,
-                            events=watched, series=series)
+                            events=watched, series=series, collocation=collocation)
         before.keep(system, run)
         result = step_loop.RUNNING
         while result == step_loop.RUNNING:
@@ -193,7 +194,7 @@ def ensemble(
 
     run_one = compiled if isinstance(solver, Rodas5P) else other
     together: list[SideBySide] = []
-    if isinstance(solver, Rodas5P) and not watched:
+    if isinstance(solver, Rodas5P) and collocation != "always" and not watched:
         together = side_by_side(members, starts, instants, float(rtol), max_step, series,
                                 int(chain))
     apart = set(range(count)).difference(*(one.numbers for one in together))
