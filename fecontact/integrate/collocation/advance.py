@@ -50,6 +50,10 @@ _POWER = -1.0 / ERROR_POWER
 _EASY, _HARD = (3, 5), 1.5
 # Length of a step after one whose stages could not be solved.
 _UNSOLVED = 0.3
+# Parts of a step after a switch that are left in it, if its error allows.
+_AT_END = 1e-3
+# Accuracy of the place of a switch in a step, and how far beyond it the step ends.
+_LOCATED, _PAST = 1e-9, 1e-11
 # Attempts at a step that end at a switch.
 _MOST_AGAIN = 6
 
@@ -183,6 +187,20 @@ def _next_length(h, error, numbers, iterations):
 
 
 @helper
+def _switch(h, near, solved, error, problem, progress, c):
+    """First part of a step at which forces switch, as far as it is known, 2 if none.
+
+    If the step has failed, that may have been why: its course is wrong then, and the switch is
+    where the motion before would meet it. Unless that is not known either.
+    """
+    if error > 1.0 and c.flags[BEGINS] == 0:
+        foretell(h, progress, c)
+        set_courses(h, progress, c)
+        return first_switch(near, problem, c)
+    return first_switch(near, problem, c) if solved else 2.0
+
+
+@helper
 def _fail(progress):
     progress.counts[REJECTIONS] += 1
     progress.numbers[REJECTED_LAST] = 1.0
@@ -197,7 +215,7 @@ def _advance_by(problem, progress, room, output, c, most):
         for k in range(len(progress.state)):
             output.states[0, k] = progress.state[k]
         counts[STARTED], counts[OUTPUTS] = 1, 1
-    new, attempts, exactly, again, whole = True, 0, False, 0, 0.0
+    new, attempts, exactly, again, whole, past = True, 0, False, 0, 0.0, 0.0
     while counts[OUTPUTS] < len(output.times):
         if new:
             if attempts >= most:
@@ -210,12 +228,25 @@ def _advance_by(problem, progress, room, output, c, most):
         step = _span(t, h, exactly, control.breaks, end)
         _set_given(step, np.nextafter(t, end), problem.system, c)
         foretell(step.h, progress, c)
-        solved, error = solve_stages(step.h, problem, progress, room, c), np.inf
+        solved = solve_stages(step.h, 2.0 * past if exactly else 0.0, problem, progress, room, c)
+        error = np.inf
         if solved:
             set_courses(step.h, progress, c)
             error = step_error(step, problem, progress, room, c)
             if error <= 1.0 and control.work:
                 error = max(error, work_error(step, problem, progress, room, c))
+        # A switch nearer to an end is there, as far as the time can tell.
+        near, part = 100.0 * smallest / step.h, 2.0
+        if again < _MOST_AGAIN:
+            part = _switch(step.h, near, solved, error, problem, progress, c)
+        if part < 1.0 - max(near, _AT_END if error <= 1.0 else _LOCATED):
+            counts[REJECTIONS] += 1
+            whole = max(whole, step.h)
+            h, exactly = step.h * part, True
+            past = max(_PAST, 0.05 * smallest / h)
+            h *= 1.0 + past
+            again += 1
+            continue
         if not error <= 1.0:
             _fail(progress)
             h = step.h * (_growth(error) if error < np.inf else _UNSOLVED)
@@ -224,21 +255,11 @@ def _advance_by(problem, progress, room, output, c, most):
                 numbers[TIME], numbers[STEP] = t, h
                 return MINIMUM_STEP if np.isfinite(c.accelerations[0, 0]) else NOT_FINITE
             continue
-        if again < _MOST_AGAIN:
-            # Nearer to an end it is at that end, as far as the time can tell.
-            near = max(1e-6, 100.0 * smallest / step.h)
-            part = first_switch(near, problem, c)
-            if part < 1.0 - near:
-                counts[REJECTIONS] += 1
-                whole = max(whole, step.h)
-                h, exactly = step.h * part * (1.0 + 1e-9), True
-                again += 1
-                continue
         _write(step, problem, progress, output, c)
         _go_on(step, exactly, problem, progress, output, c)
-        t, new, exactly = step.target, True, False
+        t, new, ends, exactly = step.target, True, exactly, False
         h = _next_length(step.h, error, numbers, c.flags[ITERATIONS])
-        if again > 0:
+        if ends:
             # A step cut short says little of the length of the next one.
             h = max(h, min(whole, whole * _growth(error)))
         h = min(h, control.longest)

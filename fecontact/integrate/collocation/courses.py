@@ -22,6 +22,7 @@ from fecontact.integrate.collocation.tableau import (
 )
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p.state import ENERGY, RATES
+from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import ground_motion, node_motion
 from fecontact.system.powers import (
     POWER_COUNT,
@@ -29,6 +30,9 @@ from fecontact.system.powers import (
     given_powers,
     matrix_powers,
 )
+
+# Resolution of 2 s - 1 where a force begins or ends.
+_RESOLVED = 1e-14
 
 
 @helper
@@ -198,6 +202,32 @@ def _first_change(after, c):
     return 2.0
 
 
+@helper
+def _presses(x, j, s, c):
+    """Whether node j has a normal force at x = 2 s - 1."""
+    u, v = -s.gap[j], 0.0
+    for k in range(c.accelerations.shape[1]):
+        u -= s.Ty[j, k] * value_at(c.places, k, x)
+        v -= s.Ty[j, k] * value_at(c.rates, k, x)
+    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0] != 0.0
+
+
+@routine
+def _release(j, s, c):
+    """Part of the step at which a normal force that is there at one end begins or ends, else 2."""
+    presses = _presses(-1.0, j, s, c)
+    if presses == _presses(1.0, j, s, c):
+        return 2.0
+    low, high = -1.0, 1.0
+    while high - low > _RESOLVED:
+        middle = 0.5 * (low + high)
+        if _presses(middle, j, s, c) == presses:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (high + 1.0)
+
+
 @routine
 def first_switch(after, problem, c):
     """First part of a step beyond ``after`` where the force of a node may have a kink, 2 if none.
@@ -222,6 +252,9 @@ def first_switch(after, problem, c):
             line[0] += passed - here
             passed = here
             first = min(first, _first_change(after, c))
+        release = _release(j, s, c)
+        if after < release < first:
+            first = release
         if not reached > control.untouched[j]:
             continue
         for power in range(PLACE_TERMS):

@@ -64,7 +64,7 @@ def foretell(h, progress, c):
 
 
 @routine
-def _improve(h, anew, problem, progress, room, c):
+def _improve(h, before, anew, problem, progress, room, c):
     """One iteration of Newton's method; how much it changes, in units of the tolerance.
 
     Each stage has a Jacobian of its own, as stiffness changes a thousandfold where slip ends.
@@ -73,6 +73,10 @@ def _improve(h, anew, problem, progress, room, c):
     m = c.accelerations.shape[1]
     for i in range(STAGES):
         set_stage(i, h, progress, c)
+        if i == STAGES - 1 and before > 0.0:
+            for k in range(m):
+                c.y[k] -= before * h * c.y[m + k]
+                c.y[m + k] -= before * h * c.accelerations[STAGES, k]
         dynamics.set_rate_and_gradients(c.y, s, blocks, c.given[i], c.load[i], room.nodes,
                                         room.scratch, c.rate)
         if anew:
@@ -112,12 +116,16 @@ def _improve(h, anew, problem, progress, room, c):
 
 
 @helper
-def solve_stages(h, problem, progress, room, c):
-    """Solve for the accelerations at the stages; whether that has succeeded."""
+def solve_stages(h, before, problem, progress, room, c):
+    """Solve for the accelerations at the stages; whether that has succeeded.
+
+    The last stage is that part of the step ``before`` its end: a step that ends at a switch of
+    forces does not feel what comes after.
+    """
     last, anew = np.inf, True
     for iteration in range(_MOST_ITERATIONS):
         c.flags[ITERATIONS] = iteration
-        size = _improve(h, anew, problem, progress, room, c)
+        size = _improve(h, before, anew, problem, progress, room, c)
         if not size < np.inf:
             return False
         if size < _AT_ONCE:
