@@ -54,6 +54,8 @@ _UNSOLVED = 0.3
 _AT_END = 1e-3
 # Accuracy of the place of a switch in a step, and how far beyond it the step ends.
 _LOCATED, _PAST = 1e-9, 1e-11
+# Parts of the time that rounding does not blur.
+_TIME = 1e-12
 # Attempts at a step that end at a switch.
 _MOST_AGAIN = 6
 
@@ -236,14 +238,14 @@ def _advance_by(problem, progress, room, output, c, most):
             if error <= 1.0 and control.work:
                 error = max(error, work_error(step, problem, progress, room, c))
         # A switch nearer to an end is there, as far as the time can tell.
-        near, part = 100.0 * smallest / step.h, 2.0
+        near, part = max(_LOCATED, _TIME * abs(t) / step.h), 2.0
         if again < _MOST_AGAIN:
             part = _switch(step.h, near, solved, error, problem, progress, c)
-        if part < 1.0 - max(near, _AT_END if error <= 1.0 else _LOCATED):
+        if part < 1.0 - max(near, _AT_END if error <= 1.0 else 0.0):
             counts[REJECTIONS] += 1
             whole = max(whole, step.h)
             h, exactly = step.h * part, True
-            past = max(_PAST, 0.05 * smallest / h)
+            past = max(_PAST, 1e-3 * _TIME * abs(t) / h)
             h *= 1.0 + past
             again += 1
             continue
