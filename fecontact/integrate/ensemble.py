@@ -96,8 +96,7 @@ def ensemble(
     powers, which do not limit its steps. Threads share the cores. On each, eight runs of plane
     systems of one node and up to three modes, or two of each, go side by side: on level and even
     ground, with common laws without memory, constant or harmonic excitation, and no events. They
-    differ from single runs by rounding, whatever the workers and the other runs. Where fewer than
-    eight are left the gain is less; one alone takes 1.2 to 2 times as long as a single run.
+    differ by rounding from single runs without collocation; one alone takes up to twice as long.
 
     Parameters
     ----------
