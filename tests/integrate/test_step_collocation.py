@@ -24,6 +24,7 @@ from fecontact.laws import (
     RoughSurface,
     Step,
 )
+from fecontact.study.sections import SimulationSettings
 
 LONG, STEPS = Rodas5P(collocation="always"), Rodas5P(series="never", collocation="never")
 
@@ -316,6 +317,13 @@ def test_when_it_is_taken():
         Rodas5P(collocation="no")
     with pytest.raises(InputError, match="exclude each other"):
         Rodas5P(series="always", collocation="always")
+
+
+def test_the_key_in_files():
+    settings = SimulationSettings(t_end=1.0, collocation="never")
+    assert settings.chosen_solver() == Rodas5P(collocation="never")
+    with pytest.raises(InputError, match="collocation = 'never' is only for solver = 'rodas5p'"):
+        SimulationSettings(t_end=1.0, solver="cvode", collocation="never")
 
 
 def test_ensembles():
