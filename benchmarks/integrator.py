@@ -1,12 +1,14 @@
 """Work and precision of time integrators: fecontact's own against scipy, numbalsoda and CVODE.
 
-Usage: python benchmarks/integrator.py [a b b2 c d e ...] [--quick]
-With --quick the first part of each problem, at two tolerances, against odeint alone.
+Usage: python benchmarks/integrator.py [a b b2 c d e ...] [--quick] [--tight]
+With --quick the first part of each problem, at two tolerances, against odeint alone; with --tight
+errors from 1e-6 to 1e-9, against LSODA in its two forms.
 
 Errors are relative to a reference that is kept in the temporary directory; it is run by the
-package's integrator at rtol = 1e-11, and its distance from LSODA at rtol = 1e-12 is printed. All
+package's integrator at rtol = 1e-12, and its distance from LSODA at rtol = 1e-12 is printed. All
 solvers run in this process on one thread, in turns, with the same compiled right-hand side and
-Jacobian; times are medians. numbalsoda and scikit-sundae take part where they can be imported.
+Jacobian; times are those of the processor, medians. numbalsoda and scikit-sundae take part where
+they can be imported.
 """
 
 import hashlib
@@ -27,8 +29,11 @@ from fecontact.integrate.rodas5p import driver
 
 Array = NDArray[np.float64]
 
-LEVELS = (1e-3, 1e-4, 1e-5, 1e-6)
+LEVELS, TIGHT = (1e-3, 1e-4, 1e-5, 1e-6), (1e-6, 1e-7, 1e-8, 1e-9)
 TOLERANCES = [10.0**-k for k in np.arange(3.5, 9.01, 0.5)]
+TIGHT_TOLERANCES = [10.0**-k for k in np.arange(6.0, 13.01, 0.5)]
+# What can be asked for at most.
+LEAST = {"odeint": 1e-12, "numbalsoda": 1e-13}
 QUICK_PART = 0.05
 SLOW = ("solve_ivp LSODA", "solve_ivp Radau", "solve_ivp BDF")
 
@@ -58,12 +63,12 @@ def prepared(solve: Callable[[float], Array]) -> Prepared:
 
 def reference(problem: Problem) -> Array:
     """Reference states (N, 2 m) at the output times."""
-    mark = hashlib.sha256()
+    mark = hashlib.sha256(b"1e-12")
     for item in (*problem.system.arrays[:18], problem.state, problem.times):
         mark.update(np.ascontiguousarray(item).tobytes())
     file = Path(tempfile.gettempdir()) / f"fecontact_reference_{mark.hexdigest()[:16]}.npz"
     if not file.exists():
-        states = own(problem)(1e-11)()
+        states = own(problem)(1e-12)()
         distance = problem.error(PEERS["odeint"](problem)(1e-12), states)
         np.savez(file, states=states, distance=distance)
     stored = np.load(file)
@@ -71,12 +76,12 @@ def reference(problem: Problem) -> Array:
     return np.asarray(stored["states"])
 
 
-def measure(problem: Problem, quick: bool) -> None:
+def measure(problem: Problem, quick: bool, tight: bool) -> None:
     """Print the table of a problem."""
     wanted = reference(problem)
     solvers: dict[str, Prepared] = {"fecontact": own(problem)}
     for name, of in PEERS.items():
-        if quick and name != "odeint":
+        if (quick and name != "odeint") or (tight and name not in LEAST):
             continue
         try:
             solvers[name] = prepared(of(problem))
@@ -85,17 +90,18 @@ def measure(problem: Problem, quick: bool) -> None:
             print(f"{name}: not installed ({missing.name})")
             solvers.pop(name, None)
     points: dict[str, list[tuple[float, float, float]]] = {name: [] for name in solvers}
-    for rtol in TOLERANCES[3:8:4] if quick else TOLERANCES:
+    levels, tolerances = (TIGHT, TIGHT_TOLERANCES) if tight else (LEVELS, TOLERANCES)
+    for rtol in tolerances[3:8:4] if quick else tolerances:
         times: dict[str, list[float]] = {name: [] for name in solvers}
         errors = {}
         for repeat in range(1 if quick else 7):
             for name, solve in solvers.items():
                 if repeat and (sum(times[name]) > 2.0 or (name in SLOW and rtol < 1e-6)):
                     continue
-                run = solve(rtol)
-                begin = time.perf_counter()
+                run = solve(max(rtol, LEAST.get(name, 0.0)))
+                begin = time.process_time()
                 states = run()
-                times[name].append(time.perf_counter() - begin)
+                times[name].append(time.process_time() - begin)
                 errors[name] = problem.error(states, wanted)
         for name in solvers:
             points[name].append((rtol, float(np.median(times[name])), errors[name]))
@@ -103,11 +109,11 @@ def measure(problem: Problem, quick: bool) -> None:
         for rtol, seconds, error in rows:
             print(f"{problem.name:3s} {name:16s} rtol {rtol:7.1e}  {seconds * 1e3:10.2f} ms  "
                   f"error {error:.1e}")
-    print(f"{problem.name:3s} ms at error of   " + "".join(f"{level:>22.0e}" for level in LEVELS))
-    ours = [time_at(points["fecontact"], level) for level in LEVELS]
+    print(f"{problem.name:3s} ms at error of   " + "".join(f"{level:>22.0e}" for level in levels))
+    ours = [time_at(points["fecontact"], level) for level in levels]
     for name, rows in points.items():
         cells = []
-        for level, best in zip(LEVELS, ours, strict=True):
+        for level, best in zip(levels, ours, strict=True):
             seconds = time_at(rows, level)
             cells.append(f"{seconds * 1e3:12.2f} ({seconds / best:6.1f} x)")
         print(f"{problem.name:3s} {name:16s} " + "".join(cells), flush=True)
@@ -131,10 +137,10 @@ def main() -> None:
         os.execve(sys.executable, [sys.executable, *sys.argv],
                   {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"})
     names = [name for name in sys.argv[1:] if not name.startswith("-")] or list(PROBLEMS)
-    quick = "--quick" in sys.argv
+    quick, tight = "--quick" in sys.argv, "--tight" in sys.argv
     for name in names:
         problem = PROBLEMS[name]()
-        measure(shortened(problem, QUICK_PART) if quick else problem, quick)
+        measure(shortened(problem, QUICK_PART) if quick else problem, quick, tight)
 
 
 if __name__ == "__main__":

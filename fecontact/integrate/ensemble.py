@@ -96,8 +96,7 @@ def ensemble(
     powers, which do not limit its steps. Threads share the cores. On each, eight runs of plane
     systems of one node and up to three modes, or two of each, go side by side: on level and even
     ground, with common laws without memory, constant or harmonic excitation, and no events. They
-    differ from single runs by rounding, whatever the workers and the other runs. Where fewer than
-    eight are left the gain is less; one alone takes 1.2 to 2 times as long as a single run.
+    differ by rounding from single runs without collocation; one alone takes up to twice as long.
 
     Parameters
     ----------
@@ -153,7 +152,8 @@ def ensemble(
                          f"out.")
     done, leave = [0], [False]
 
-    series = solver.series if isinstance(solver, Rodas5P) else "never"
+    series, collocation = (solver.series, solver.collocation) if isinstance(
+        solver, Rodas5P) else ("never", "never")
 
     def compiled(index: int, state: Array, before: "_Before") -> None:
         system = members[index]
@@ -162,7 +162,7 @@ def ensemble(
             run: Any = again(before.run, before.system, state)
         else:
             run = start_any(system, state, instants[index], rtol=float(rtol), max_step=max_step,
-                            events=watched, series=series)
+                            events=watched, series=series, collocation=collocation)
         before.keep(system, run)
         result = step_loop.RUNNING
         while result == step_loop.RUNNING:
@@ -193,7 +193,7 @@ def ensemble(
 
     run_one = compiled if isinstance(solver, Rodas5P) else other
     together: list[SideBySide] = []
-    if isinstance(solver, Rodas5P) and not watched:
+    if isinstance(solver, Rodas5P) and collocation != "always" and not watched:
         together = side_by_side(members, starts, instants, float(rtol), max_step, series,
                                 int(chain))
     apart = set(range(count)).difference(*(one.numbers for one in together))

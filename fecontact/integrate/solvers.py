@@ -89,6 +89,10 @@ class Rodas5P(Solver):
         :class:`~fecontact.laws.LinearContact`, or :class:`~fecontact.laws.PowerContact` or
         :class:`~fecontact.laws.TwoSidedStop` with exponents 1 or 2, constant or harmonic drives
         and loads, and no events other than ContactEvents. Sensitivities are those of Rodas5P.
+    collocation : 'auto', 'always' or 'never'
+        Whether to take steps of order 9 instead, which are longer where little error is allowed: by
+        default if ``rtol`` is 1e-7 or less, for plane systems of up to four modes and two nodes
+        on flat ground, of laws without memory, without events. A run by series stays one.
     checkpoint : path, optional
         File to which the run is saved every minute and on interruption. If it exists, the run is
         resumed from it with bit-for-bit the same results; it is removed at the end.
@@ -98,8 +102,8 @@ class Rodas5P(Solver):
     Raises
     ------
     InputError
-        If the checkpoint is not a path, or for another value of ``series``; in a run, if series are
-        'always' to be used and cannot be.
+        If the checkpoint is not a path, or for other values; in a run, if series or collocation
+        are 'always' to be used and cannot be.
 
     References
     ----------
@@ -109,14 +113,20 @@ class Rodas5P(Solver):
     checkpoint: str | Path | None = None
     keep_checkpoint: bool = False
     series: str = "auto"
+    collocation: str = "auto"
 
     locates_events: ClassVar[bool] = True
     uses: ClassVar[tuple[str, ...]] = ("auto", "always", "never")
 
     def __post_init__(self) -> None:
-        if self.series not in self.uses:
-            raise InputError(f"Rodas5P: series = {self.series!r} must be one of "
-                             f"{choices(self.uses)}{nearest(str(self.series), self.uses)}.")
+        for name in ("series", "collocation"):
+            use = getattr(self, name)
+            if use not in self.uses:
+                raise InputError(f"Rodas5P: {name} = {use!r} must be one of "
+                                 f"{choices(self.uses)}{nearest(str(use), self.uses)}.")
+        if self.series == self.collocation == "always":
+            raise InputError("Rodas5P: series and collocation = 'always' exclude each other; leave "
+                             "one of them out.")
         if self.checkpoint is not None:
             as_path(self.checkpoint, "a checkpoint")
         require_kind("Rodas5P", bool, keep_checkpoint=self.keep_checkpoint)
@@ -136,7 +146,8 @@ class Rodas5P(Solver):
                              f"{path.parent}.")
         found = integrate(task.system, task.state, task.times, rtol=task.rtol,
                           max_step=task.max_step, progress=task.progress, checkpoint=path,
-                          events=task.events, series=self.series)
+                          events=task.events, series=self.series,
+                          collocation=self.collocation)
         if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
             path.unlink(missing_ok=True)
         return found

@@ -225,6 +225,9 @@ class SimulationSettings:
     series : str, optional
         For 'rodas5p': 'auto', 'always' or 'never'; whether the motion is expanded in power series
         where forces are polynomials between switches of contacts.
+    collocation : str, optional
+        For 'rodas5p': 'auto', 'always' or 'never'; whether steps are of order 9, which are longer
+        where little error is allowed.
     events : bool
         For 'rodas5p' and 'set-valued': locate touch-down, lift-off, stick and slip of every
         contact node and store them with the run.
@@ -248,6 +251,7 @@ class SimulationSettings:
     static_coefficient: float | None = None
     scheme: str | None = None
     series: str | None = None
+    collocation: str | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding", "preload"] | RigidStart = "rest"
@@ -275,7 +279,7 @@ class SimulationSettings:
             "restitution": self.restitution, "impact_law": self.impact_law,
             "tangential_restitution": self.tangential_restitution,
             "static_coefficient": self.static_coefficient, "scheme": self.scheme,
-            "series": self.series})
+            "series": self.series, "collocation": self.collocation})
 
 
 @dataclass(frozen=True)

@@ -150,7 +150,7 @@ class SideBySide:
             np.array(follows, dtype=np.int64), np.zeros((count, 4), dtype=np.int64),
             np.zeros(0, dtype=np.int64), np.zeros(4, dtype=np.int64))
         self._spare = start(members[0], rest, times[0], rtol=rtol, max_step=max_step, work=False,
-                            series="never")
+                            series="never", collocation="never")
         self._waiting = np.flatnonzero(self.runs.follows == 0).tolist()
         self._lock, self.attempts = Lock(), 0
 

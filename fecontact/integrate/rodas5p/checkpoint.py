@@ -38,7 +38,8 @@ class Checkpoint:
             # Addresses of laws are integers, and differ from process to process.
             if np.asarray(item).dtype.kind == "f":
                 mark.update(np.ascontiguousarray(item).tobytes())
-        mark.update(b"steps" if run.series is None else b"series")
+        kind = b"steps" if run.collocation is None else b"collocation"
+        mark.update(kind if run.series is None else b"series")
         return cls(path, run, mark.hexdigest())
 
     def read(self) -> None:
@@ -92,7 +93,10 @@ class Checkpoint:
         return [*_leaves(self.run.progress), watch.zones, watch.own_values, *self._contacts()]
 
     def _contacts(self) -> list[Any]:
-        """States of the contacts of a run by power series."""
+        """States of the contacts of a run by power series, or what collocation hands on."""
+        if self.run.collocation is not None:
+            c = self.run.collocation
+            return [c.flags, c.accelerations, c.before]
         return [] if self.run.series is None else [self.run.series.states]
 
     def keep(self) -> None:

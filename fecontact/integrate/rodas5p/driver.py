@@ -9,6 +9,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
+from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.reference.scipy import energy_scale
@@ -57,6 +58,7 @@ def start(
     vary_rtol: float | None = None,
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
+    collocation: str = "auto",
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -90,6 +92,8 @@ def start(
         What to watch for.
     series : 'auto', 'always' or 'never'
         Whether to expand the motion in power series; see :class:`fecontact.integrate.Rodas5P`.
+    collocation : 'auto', 'always' or 'never'
+        Whether to take steps by collocation; see there.
     """
     _require_finite(state)
     basis = system.basis
@@ -107,6 +111,8 @@ def start(
             columns += 1
     blocks = blocks_of(basis, system.arrays)
     problem = Problem(system.arrays, blocks, control)
+    expanded = None if vary or collocation == "always" else chosen_series(
+        system, state, times, rtol, max_step, events, work, series)
     return Run(
         problem,
         _progress(system, control, float(times[0]), state),
@@ -119,8 +125,8 @@ def start(
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate_for(problem) if vary else 0),
         watch_for(system, events, bool(vary)),
-        None if vary else chosen_series(
-            system, state, times, rtol, max_step, events, work, series))
+        expanded,
+        None if vary or expanded else chosen_collocation(system, rtol, events, collocation))
 
 
 def again(run: Run, system: ContactSystem, state: Array) -> Run:
@@ -140,7 +146,9 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
         run.problem, _progress(system, control, float(run.times[0]), state), run.room,
         Output(output.times, np.zeros_like(output.states), np.zeros_like(output.work)),
         run.variation, run.watch,
-        None if run.series is None else from_state(run.series, system, state))
+        None if run.series is None else from_state(run.series, system, state),
+        None if run.collocation is None else collocation_for(
+            system.basis.modes, system.basis.contact_nodes, control.rtol))
 
 
 def _require_finite(state: Array) -> None:
@@ -284,10 +292,12 @@ def integrate(
     checkpoint: Path | None = None,
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
+    collocation: str = "auto",
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series)
+    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series,
+                collocation=collocation)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()

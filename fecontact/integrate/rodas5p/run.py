@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.integrate.collocation.room import JACOBIANS, Collocation
 from fecontact.integrate.event_arrays import take_events
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import state
@@ -40,7 +41,9 @@ class Run:
     watch : Watch
         What is watched for; what was found is in ``events``.
     series : Series or None
-        Tables of a system whose motion is expanded in power series; None for Rodas5P.
+        Tables of a system whose motion is expanded in power series; else None.
+    collocation : Collocation or None
+        What steps by collocation hand on, and their room; None for steps of Rodas5P.
     """
 
     problem: Problem
@@ -50,6 +53,7 @@ class Run:
     variation: Vary
     watch: Watch
     series: Series | None = None
+    collocation: Collocation | None = None
     found: list[tuple[Array, Array]] = field(default_factory=list)
 
     @property
@@ -97,10 +101,13 @@ class Run:
         if self.series is not None:
             return {"steps": int(counts[state.STEPS]), "rejected": int(counts[state.REJECTIONS]),
                     "expansions": int(counts[state.RATES])}
+        jacobians = int(counts[state.STEPS]) + 1
+        if self.collocation is not None:
+            jacobians = int(self.collocation.flags[JACOBIANS])
         return {"steps": int(counts[state.STEPS]),
                 "rejected": int(counts[state.REJECTIONS]),
                 "right_hand_sides": int(counts[state.RATES]),
-                "jacobians": int(counts[state.STEPS]) + 1}
+                "jacobians": jacobians}
 
     @property
     def transitions(self) -> Array:
@@ -117,6 +124,12 @@ class Run:
             expand = advance_series(self.problem)
             return lambda steps: expand(self.problem, self.progress, self.output, self.watch,
                                         self.series, steps)
+        if self.collocation is not None:
+            from fecontact.integrate.collocation.small_systems import advance_for as advance_by
+
+            collocate = advance_by(self.problem)
+            return lambda steps: collocate(self.problem, self.progress, self.room, self.output,
+                                           self.collocation, steps)
         step = advance_for(self.problem, self.variation)
         return lambda steps: step(self.problem, self.progress, self.room, self.output,
                                   self.variation, self.watch, steps)

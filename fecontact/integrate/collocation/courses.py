@@ -1,0 +1,273 @@
+"""The course of a step by collocation: its error, its work, and where forces switch."""
+
+from fecontact.core.compiled import helper, routine
+from fecontact.core.dense_lu import backward, factorise, forward
+from fecontact.integrate import bernstein
+from fecontact.integrate.collocation.stages import place_scale, set_stage, speed_scale
+from fecontact.integrate.collocation.tableau import (
+    AT_PLACES,
+    LOOKS,
+    PLACE_PART,
+    PLACE_POWERS,
+    PLACE_TERMS,
+    PLACES,
+    POINTS,
+    RATE_POWERS,
+    RATE_TERMS,
+    SPEED_PART,
+    SPEED_POWERS,
+    SPEED_TERMS,
+    STAGES,
+    TO_BERNSTEIN,
+)
+from fecontact.integrate.rodas5p import dynamics, stage_solver
+from fecontact.integrate.rodas5p.state import ENERGY, RATES
+from fecontact.laws.signatures import normal_at
+from fecontact.system.nodes import ground_motion, node_motion
+from fecontact.system.powers import (
+    POWER_COUNT,
+    add_node_powers,
+    given_powers,
+    matrix_powers,
+)
+
+# Resolution of 2 s - 1 where a force begins or ends.
+_RESOLVED = 1e-14
+
+
+@helper
+def value_at(c, k, x):
+    """Value at x = 2 s - 1 of the polynomial whose coefficients are column k of c."""
+    total = 0.0
+    for power in range(len(c) - 1, -1, -1):
+        total = total * x + c[power, k]
+    return total
+
+
+@routine
+def set_courses(h, progress, c):
+    """Fill the coefficients of displacements and velocities over a step, and its end."""
+    m = c.accelerations.shape[1]
+    for k in range(m):
+        for power in range(PLACE_TERMS):
+            total = 0.0
+            for i in range(RATE_TERMS):
+                total += PLACE_POWERS[power, i] * c.accelerations[i, k]
+            c.places[power, k] = h * h * total
+        for power in range(SPEED_TERMS):
+            total = 0.0
+            for i in range(RATE_TERMS):
+                total += SPEED_POWERS[power, i] * c.accelerations[i, k]
+            c.rates[power, k] = h * total
+        c.rates[0, k] += progress.state[m + k]
+        # The begin is at x = -1.
+        c.places[0, k] += progress.state[k] + 0.5 * h * progress.state[m + k]
+        c.places[1, k] += 0.5 * h * progress.state[m + k]
+    set_stage(STAGES - 1, h, progress, c)
+    for k in range(2 * m):
+        c.after[k] = c.y[k]
+
+
+@helper
+def keep_rates(c):
+    """Keep the coefficients of the accelerations for the next step, which begins at the end."""
+    for k in range(c.accelerations.shape[1]):
+        for power in range(RATE_TERMS):
+            total = 0.0
+            for i in range(RATE_TERMS):
+                total += RATE_POWERS[power, i] * c.accelerations[i, k]
+            c.before[power, k] = total
+        c.accelerations[0, k] = c.accelerations[STAGES, k]
+
+
+@helper
+def look(place, c):
+    """Put the state at one of the places into ``c.y``."""
+    m, x = c.accelerations.shape[1], 2.0 * PLACES[place] - 1.0
+    for k in range(m):
+        c.y[k] = value_at(c.places, k, x)
+        c.y[m + k] = value_at(c.rates, k, x)
+
+
+@routine
+def step_error(step, problem, progress, room, c):
+    """Error of a step in units of what is allowed, by how far its course is from the equations.
+
+    The acceleration that is missing at a place in the step is a velocity over the time in which it
+    decays, or over the step where that is shorter.
+    """
+    s, control, blocks = problem.system, problem.control, problem.blocks
+    m, n, h = c.accelerations.shape[1], len(s.gap), step.h
+    speeds, error = speed_scale(problem, progress), 0.0
+    for at in range(LOOKS):
+        look(at, c)
+        dynamics.set_given(min(step.t + PLACES[at] * h, step.latest), s, room.given, room.load)
+        dynamics.set_rate_and_gradients(c.y, s, blocks, room.given, room.load, room.nodes,
+                                        room.scratch, c.rate)
+        stage_solver.assemble(s, blocks, room.scratch, room.reduced)
+        J, g, to_place = room.reduced.J, SPEED_PART[at] * h, PLACE_PART[at] * h * h
+        for k in range(m):
+            missing = c.rate[m + k]
+            for i in range(RATE_TERMS):
+                missing -= AT_PLACES[at, i] * c.accelerations[i, k]
+            c.small_right[k] = missing
+            for l in range(m):
+                c.small[k, l] = -g * J[k, m + l] - to_place * J[k, l]
+            c.small[k, k] += 1.0
+        factorise(c.small, m, c.small_pivots)
+        forward(c.small, m, c.small_pivots, c.small_right)
+        backward(c.small, m, c.small_right, c.small_right)
+        for k in range(m):
+            missing = abs(c.small_right[k])
+            error = max(error, missing * g * control.largest[k] / (speeds * c.tolerance))
+            scale = max(place_scale(k, problem, progress), abs(c.after[k])) * c.tolerance
+            error = max(error, missing * to_place / scale)
+        for j in range(n):
+            if room.nodes[2, n + j] != 0.0:
+                slip = 0.0
+                for k in range(m):
+                    slip += s.Tx[j, k] * c.small_right[k]
+                distance = abs(room.nodes[1, j] - s.sliding[j] * room.given[dynamics.SPEED])
+                error = max(error, abs(slip) * g / (control.slip_part * (control.slip_scale[j]
+                                                                         + distance)))
+    progress.counts[RATES] += LOOKS
+    return error
+
+
+@routine
+def powers_at(t, y, problem, room, out):
+    """Fill ``out`` (P,) with the powers of the system and of its nodes."""
+    s = problem.system
+    m = s.Tx.shape[1]
+    given_powers(t, y, s, out)
+    matrix_powers((0, m, 0, m), y, s, out)
+    moved = ground_motion(t, s)
+    for j in range(len(s.gap)):
+        add_node_powers(j, node_motion(j, y, s), moved, y[2 * m :], problem.control.stick_speed[j],
+                        s, room.scratch.force[0], room.scratch.rates[0], out, out[POWER_COUNT:])
+
+
+@routine
+def work_error(step, problem, progress, room, c):
+    """Error of the work of a step in units of what is allowed; fills the powers and their works."""
+    h, m, count = step.h, c.accelerations.shape[1], len(c.looked)
+    for k in range(count):
+        c.powers[0, k] = progress.power[k]
+    for i in range(STAGES):
+        set_stage(i, h, progress, c)
+        powers_at(min(step.t + POINTS[i] * h, step.latest), c.y, problem, room, c.powers[i + 1])
+    kinetic = 0.0
+    for k in range(m):
+        kinetic += 0.5 * c.after[m + k] ** 2
+    energy = max(max(progress.numbers[ENERGY], kinetic), problem.control.energy_scale)
+    for k in range(POWER_COUNT):
+        energy = max(energy, abs(progress.work[k]))
+    progress.numbers[ENERGY] = energy
+    missing = 0.0
+    for at in range(LOOKS):
+        look(at, c)
+        powers_at(min(step.t + PLACES[at] * h, step.latest), c.y, problem, room, c.looked)
+        for k in range(POWER_COUNT):
+            power = c.looked[k]
+            for i in range(RATE_TERMS):
+                power -= AT_PLACES[at, i] * c.powers[i, k]
+            missing = max(missing, abs(power) * SPEED_PART[at])
+    for k in range(count):
+        for power in range(SPEED_TERMS):
+            total = 0.0
+            for i in range(RATE_TERMS):
+                total += SPEED_POWERS[power, i] * c.powers[i, k]
+            c.work[power, k] = h * total
+        c.work[0, k] += progress.work[k]
+    return h * missing / (c.tolerance * energy)
+
+
+@routine
+def _first_change(after, c):
+    """First part of the step beyond ``after`` at which a course changes its sign, 2 if none.
+
+    Its coefficients are in ``c.line[0]``, by powers of x.
+    """
+    b = c.line[1]
+    for i in range(PLACE_TERMS):
+        total = 0.0
+        for power in range(PLACE_TERMS):
+            total += TO_BERNSTEIN[i, power] * c.line[0, power]
+        b[i] = total
+    if bernstein.smallest(b) > 0.0 or bernstein.largest(b) < 0.0:
+        return 2.0
+    for k in range(bernstein.sign_changes(b, c.halves, c.line[2], c.found)):
+        if c.found[k] > after:
+            return c.found[k]
+    return 2.0
+
+
+@helper
+def _presses(x, j, s, c):
+    """Whether node j has a normal force at x = 2 s - 1."""
+    u, v = -s.gap[j], 0.0
+    for k in range(c.accelerations.shape[1]):
+        u -= s.Ty[j, k] * value_at(c.places, k, x)
+        v -= s.Ty[j, k] * value_at(c.rates, k, x)
+    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0] != 0.0
+
+
+@routine
+def _release(j, s, c):
+    """Part of the step at which a normal force that is there at one end begins or ends, else 2."""
+    presses = _presses(-1.0, j, s, c)
+    if presses == _presses(1.0, j, s, c):
+        return 2.0
+    low, high = -1.0, 1.0
+    while high - low > _RESOLVED:
+        middle = 0.5 * (low + high)
+        if _presses(middle, j, s, c) == presses:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (high + 1.0)
+
+
+@routine
+def first_switch(after, problem, c):
+    """First part of a step beyond ``after`` where the force of a node may have a kink, 2 if none.
+
+    Where normal forces begin or end, where penetrations pass the depth of their law, where slip of
+    a node that is pressed changes its direction, and where it becomes creep or ceases to be.
+    """
+    s, control, line = problem.system, problem.control, c.line[0]
+    m, first, levels = c.accelerations.shape[1], 2.0, control.levels.shape[0]
+    for j in range(len(s.gap)):
+        for power in range(PLACE_TERMS):
+            line[power] = 0.0
+            for k in range(m):
+                line[power] -= s.Ty[j, k] * c.places[power, k]
+        line[0] -= s.gap[j]
+        reached = abs(line[0])
+        for power in range(1, PLACE_TERMS):
+            reached += abs(line[power])
+        passed = 0.0
+        for level in range(levels + 1):
+            here = control.levels[level, j] if level < levels else control.depth[j]
+            line[0] += passed - here
+            passed = here
+            first = min(first, _first_change(after, c))
+        release = _release(j, s, c)
+        if after < release < first:
+            first = release
+        if not reached > control.untouched[j]:
+            continue
+        for power in range(PLACE_TERMS):
+            line[power] = 0.0
+        for power in range(SPEED_TERMS):
+            for k in range(m):
+                line[power] += s.Tx[j, k] * c.rates[power, k]
+        for power in range(RATE_TERMS):
+            for i in range(RATE_TERMS):
+                line[power] -= s.sliding[j] * RATE_POWERS[power, i] * c.speeds[i]
+        creep = control.stick_speed[j]
+        line[0] += creep
+        for _ in range(3 if creep > 0.0 else 1):
+            first = min(first, _first_change(after, c))
+            line[0] -= creep
+    return first

@@ -1,0 +1,146 @@
+"""What steps by collocation work on, and the systems that take them."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import f8, integers, matrix, vector
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, Integers
+from fecontact.integrate import bernstein
+from fecontact.integrate.collocation.tableau import (
+    PLACE_TERMS,
+    RATE_TERMS,
+    SPEED_TERMS,
+    STAGES,
+)
+from fecontact.integrate.events import AnyEvent
+from fecontact.integrate.rodas5p import dynamics
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.powers import NODE_POWERS, POWER_COUNT
+
+# Systems up to these sizes have step loops.
+MOST_MODES, MOST_NODES = 4, 2
+# Largest rtol at which it is taken unasked: steps of Rodas5P do not become much longer above.
+ACCURATE = 1e-7
+# Errors of a step, in parts of the tolerance of the run, and at least.
+_PART, _ROUNDING = 0.1, 1e-13
+# Entries of `Collocation.flags`.
+BEGINS, JACOBIANS, ITERATIONS = range(3)
+
+
+class Collocation(NamedTuple):
+    """A step by collocation: what it hands on to the next one, and room to work in.
+
+    P is the number of powers of the system and its nodes, s that of the stages.
+
+    Attributes
+    ----------
+    tolerance : float
+        Error of a step as a part of the scales of the run.
+    flags : (3,) integer array
+        Whether the equations may change here, so that nothing is foretold from the step before;
+        Jacobians so far; iterations of the last step.
+    accelerations : (s + 1, m) array
+        At the begin of the step and at its stages.
+    before : (s + 1, m) array
+        Coefficients of those of the step before.
+    matrix, right, pivots : (s m, s m), (s m,), (s m,) arrays
+        The linear system of Newton's method.
+    small, small_right, small_pivots : (m, m), (m,), (m,) arrays
+        That of a defect.
+    given, load, speeds : (s, 10), (s, m), (s + 1,) arrays
+        What is given in time at the stages, and the speed of the ground at the begin too.
+    y, after, rate : (2 m,) arrays
+        States of a stage and at the end, and a rate.
+    places, rates : (s + 3, m), (s + 2, m) arrays
+        Coefficients of displacements and velocities over the step.
+    powers, work : (s + 1, P), (s + 2, P) arrays
+        Powers at the begin and at the stages, and coefficients of their integrals.
+    looked : (P,) array
+        Powers within the step.
+    line, halves, found : (3, s + 3), (d, s + 4), (s + 3,) arrays
+        Room to look for changes of sign.
+    """
+
+    tolerance: float
+    flags: Integers
+    accelerations: Array
+    before: Array
+    matrix: Array
+    right: Array
+    pivots: Integers
+    small: Array
+    small_right: Array
+    small_pivots: Integers
+    given: Array
+    load: Array
+    speeds: Array
+    y: Array
+    after: Array
+    rate: Array
+    places: Array
+    rates: Array
+    powers: Array
+    work: Array
+    looked: Array
+    line: Array
+    halves: Array
+    found: Array
+
+
+COLLOCATION = types.NamedTuple(
+    [f8, integers, matrix, matrix, matrix, vector, integers, matrix, vector, integers, matrix,
+     matrix, *[vector] * 4, *[matrix] * 4, vector, matrix, matrix, vector], Collocation)
+
+
+def collocation_for(modes: int, nodes: int, rtol: float) -> Collocation:
+    """Room for a system of so many modes and nodes, before its first step."""
+    m, many = modes, STAGES * modes
+    powers = POWER_COUNT + NODE_POWERS * nodes
+    y, after, rate = np.zeros((3, 2 * m))
+    return Collocation(
+        max(_PART * rtol, _ROUNDING), np.array([1, 0, 0]),
+        np.zeros((RATE_TERMS, m)), np.zeros((RATE_TERMS, m)),
+        np.zeros((many, many)), np.zeros(many), np.zeros(many, dtype=np.int64),
+        np.zeros((m, m)), np.zeros(m), np.zeros(m, dtype=np.int64),
+        np.zeros((STAGES, dynamics.GIVEN)), np.zeros((STAGES, m)), np.zeros(RATE_TERMS),
+        y, after, rate, np.zeros((PLACE_TERMS, m)), np.zeros((SPEED_TERMS, m)),
+        np.zeros((RATE_TERMS, powers)), np.zeros((SPEED_TERMS, powers)), np.zeros(powers),
+        np.zeros((3, PLACE_TERMS)), np.zeros((bernstein.DEPTH, PLACE_TERMS + 1)),
+        np.zeros(PLACE_TERMS))
+
+
+def chosen_collocation(
+    system: ContactSystem, rtol: float, events: Sequence[AnyEvent], use: str,
+) -> Collocation | None:
+    """Room for a run by collocation; InputError where it cannot 'always' be used."""
+    if use == "never" or (use == "auto" and rtol > ACCURATE):
+        return None
+    found = obstacle(system, events)
+    if found is not None:
+        if use == "always":
+            raise InputError(f"Rodas5P: collocation = 'always' is for small plane systems on flat "
+                             f"ground, but {found}; leave it out.")
+        return None
+    return collocation_for(system.basis.modes, system.basis.contact_nodes, rtol)
+
+
+def obstacle(system: ContactSystem, events: Sequence[AnyEvent]) -> str | None:
+    """Why a run of a system with such events cannot be by collocation, or None."""
+    basis, arrays = system.basis, system.arrays
+    if basis.dimension == 3:
+        return "bodies in space are not among them"
+    if basis.modes > MOST_MODES or basis.contact_nodes > MOST_NODES:
+        return f"{basis.modes} modes and {basis.contact_nodes} nodes are not among them"
+    if system.memory:
+        return "there is friction with memory"
+    if arrays.second_motion != 0:
+        return "two motions are prescribed"
+    if system.ground.wavy and basis.ground_nodes.any():
+        return "the ground is wavy"
+    if events:
+        return "events are not located in its steps"
+    return None

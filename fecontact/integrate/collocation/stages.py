@@ -1,0 +1,148 @@
+"""The stages of a step by collocation, by Newton's method."""
+
+import numpy as np
+
+from fecontact.core.compiled import helper, routine
+from fecontact.core.dense_lu import backward, factorise, forward
+from fecontact.integrate.collocation.room import BEGINS, ITERATIONS, JACOBIANS
+from fecontact.integrate.collocation.tableau import ONCE, POINTS, RATE_TERMS, STAGES, TWICE
+from fecontact.integrate.rodas5p import dynamics, stage_solver
+from fecontact.integrate.rodas5p.state import RATES, SPEED_SCALE
+from fecontact.integrate.rodas5p.step_length import LAST_STEP
+
+# Part of the tolerance to which the stages are solved, and the change after which one iteration is
+# enough.
+_SOLVED, _AT_ONCE = 0.03, 3e-5
+_MOST_ITERATIONS = 8
+# Changes that shrink less from one iteration to the next ask for a new matrix.
+_SLOW = 0.02
+# The acceleration is foretold over steps up to so many times as long as the one before.
+_FARTHEST = 3.0
+
+
+@routine
+def set_stage(i, h, progress, c):
+    """Put the state at stage i into ``c.y``."""
+    m = c.accelerations.shape[1]
+    for k in range(m):
+        speed, place = 0.0, 0.0
+        for other in range(STAGES):
+            speed += ONCE[i, other] * c.accelerations[other + 1, k]
+            place += TWICE[i, other] * c.accelerations[other + 1, k]
+        c.y[m + k] = progress.state[m + k] + h * speed
+        c.y[k] = progress.state[k] + h * (POINTS[i] * progress.state[m + k] + h * place)
+
+
+@helper
+def place_scale(k, problem, progress):
+    """Size of the displacement of mode k, relative to which its errors count."""
+    return max(max(progress.extremes[k], abs(progress.state[k])),
+               problem.control.displacement_scale[k])
+
+
+@helper
+def speed_scale(problem, progress):
+    """Size of the velocities, relative to which their errors count."""
+    return max(progress.numbers[SPEED_SCALE], problem.control.speed_scale)
+
+
+@routine
+def foretell(h, progress, c):
+    """First guess of the accelerations at the stages: what those of the step before go on to."""
+    m = c.accelerations.shape[1]
+    ratio = 0.0
+    if progress.numbers[LAST_STEP] > 0.0:
+        ratio = h / progress.numbers[LAST_STEP]
+    for i in range(STAGES):
+        x = 1.0 + 2.0 * ratio * POINTS[i]
+        for k in range(m):
+            value = c.accelerations[0, k]
+            if c.flags[BEGINS] == 0 and ratio <= _FARTHEST:
+                value = 0.0
+                for power in range(RATE_TERMS - 1, -1, -1):
+                    value = value * x + c.before[power, k]
+            c.accelerations[i + 1, k] = value
+
+
+@routine
+def _improve(h, before, anew, problem, progress, room, c):
+    """One iteration of Newton's method; how much it changes, in units of the tolerance.
+
+    Each stage has a Jacobian of its own, as stiffness changes a thousandfold where slip ends.
+    """
+    s, blocks = problem.system, problem.blocks
+    m = c.accelerations.shape[1]
+    for i in range(STAGES):
+        set_stage(i, h, progress, c)
+        if i == STAGES - 1 and before > 0.0:
+            for k in range(m):
+                c.y[k] -= before * h * c.y[m + k]
+                c.y[m + k] -= before * h * c.accelerations[STAGES, k]
+        dynamics.set_rate_and_gradients(c.y, s, blocks, c.given[i], c.load[i], room.nodes,
+                                        room.scratch, c.rate)
+        if anew:
+            stage_solver.assemble(s, blocks, room.scratch, room.reduced)
+            J = room.reduced.J
+            for k in range(m):
+                row = i * m + k
+                for other in range(STAGES):
+                    by_speed, by_place = h * ONCE[i, other], h * h * TWICE[i, other]
+                    for l in range(m):
+                        c.matrix[row, other * m + l] = -by_speed * J[k, m + l] - by_place * J[k, l]
+                c.matrix[row, row] += 1.0
+        for k in range(m):
+            c.right[i * m + k] = c.rate[m + k] - c.accelerations[i + 1, k]
+    if anew:
+        factorise(c.matrix, STAGES * m, c.pivots)
+        c.flags[JACOBIANS] += 1
+    forward(c.matrix, STAGES * m, c.pivots, c.right)
+    backward(c.matrix, STAGES * m, c.right, c.right)
+    progress.counts[RATES] += STAGES
+    size, speeds = 0.0, speed_scale(problem, progress)
+    for k in range(m):
+        to_speed = h * problem.control.largest[k] / speeds
+        to_place = h * h / place_scale(k, problem, progress)
+        for i in range(STAGES):
+            speed, place = 0.0, 0.0
+            for other in range(STAGES):
+                speed += ONCE[i, other] * c.right[other * m + k]
+                place += TWICE[i, other] * c.right[other * m + k]
+            size = max(size, max(abs(speed) * to_speed, abs(place) * to_place))
+            # Comparisons with NaN are false.
+            if not abs(speed) < np.inf:
+                size = np.inf
+        for i in range(STAGES):
+            c.accelerations[i + 1, k] += c.right[i * m + k]
+    return size / c.tolerance
+
+
+@helper
+def solve_stages(h, before, problem, progress, room, c):
+    """Solve for the accelerations at the stages; whether that has succeeded.
+
+    The last stage is that part of the step ``before`` its end: a step that ends at a switch of
+    forces does not feel what comes after.
+    """
+    last, anew = np.inf, True
+    for iteration in range(_MOST_ITERATIONS):
+        c.flags[ITERATIONS] = iteration
+        size = _improve(h, before, anew, problem, progress, room, c)
+        if not size < np.inf:
+            return False
+        if size < _AT_ONCE:
+            return True
+        if iteration > 0:
+            rate = size / last
+            if rate < 1.0 and size * rate < _SOLVED * (1.0 - rate):
+                return True
+            # What no longer shrinks is rounding, or no convergence.
+            if iteration > 2 and rate > 0.5:
+                if size < _SOLVED:
+                    return True
+                if rate > 2.0:
+                    return False
+            anew = rate > _SLOW
+        else:
+            anew = False
+        last = size
+    return False
