@@ -13,8 +13,6 @@ References
 E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., section IV.5.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.polynomial import polynomial
 
@@ -24,7 +22,7 @@ from fecontact.core.dense_lu import factorise, solve_rows
 STAGES = 4
 
 
-def _nodes() -> Any:
+def _nodes() -> np.ndarray:
     """Roots of the third derivative of t^3 (t - 1)^4."""
     given = polynomial.polymul(polynomial.polypow([0.0, 1.0], STAGES - 1),
                                polynomial.polypow([-1.0, 1.0], STAGES))
