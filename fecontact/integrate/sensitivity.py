@@ -115,7 +115,7 @@ def sensitivity(
         Relative tolerance of the run.
     derivative_rtol : float, optional
         Tolerance of the derivatives per step, relative to their largest values since the last
-        output time; by default ten times ``rtol`` where steps are differentiated, a hundred times
+        output time; by default ten times ``rtol`` where steps are differentiated, 200 times
         along the motion, relative to their current values or a tenth of the largest. 1e-2 saves
         work that only fast disturbances require. Where steps are differentiated, derivatives of
         small motions take steps that the run, whose tolerance is then absolute, does not need.

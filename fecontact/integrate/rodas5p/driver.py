@@ -41,7 +41,7 @@ _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
 # or of this part of the largest that it has been. In parts of steps the error is that of what is
 # kept, else that of a solution of lower order.
-_LOOSER, _IN_PARTS, _FADED = 10.0, 100.0, 0.1
+_LOOSER, _IN_PARTS, _FADED = 10.0, 200.0, 0.1
 # Steps of a piece of a run: at first, at least and at most.
 _FEWEST, _MOST_STEPS = 200, 10_000_000
 
