@@ -95,8 +95,9 @@ def sensitivity(
     """Integrate a motion and its derivatives with respect to initial state and a parameter.
 
     The computed steps themselves are differentiated (discrete sensitivities), at fixed step sizes;
-    second derivatives of laws are found by finite differences, of relative accuracy 1e-8. Forces
-    are continuous, so that contact and stick need no jump conditions.
+    second derivatives of laws are found by finite differences, of relative accuracy 1e-8. With more
+    than four modes or two nodes, and no memory, the linear equation of the derivatives is solved
+    along the computed motion instead. Forces are continuous: contact and stick need no jumps.
 
     With SetValued, forces and velocities jump. Its runs locate the jumps, so that the end of a run
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives
@@ -116,10 +117,10 @@ def sensitivity(
         Relative tolerance of the run.
     derivative_rtol : float, optional
         Tolerance of the derivatives per step, relative to their largest values since the last
-        output time; by default ten times ``rtol``, relative to their current values or a tenth of
-        the largest. They are exact for the steps taken at any value; 1e-2 saves steps that only
-        fast disturbances require. Derivatives of small motions are not small: where the run's own
-        tolerance is absolute, they take steps that the run does not need.
+        output time; by default ten times ``rtol`` where steps are differentiated, 200 times
+        along the motion, relative to their current values or a tenth of the largest. 1e-2 saves
+        work that only fast disturbances require. Where steps are differentiated, derivatives of
+        small motions take steps that the run, whose tolerance is then absolute, does not need.
     max_step : float, optional
         Longest step [s]; see :func:`fecontact.simulate`.
 

@@ -111,15 +111,19 @@ def test_same_derivatives_as_by_the_code_of_all_systems(modes, monkeypatch):
     vary = above, below, 2e-8
     # Steps of one length, as above; those of the run alone.
     found = []
-    for small in (True, False):
+    for small, parts in ((True, False), (False, False), (False, True)):
         if not small:
             monkeypatch.setattr(small_systems, "_small", lambda problem: False)
+            monkeypatch.setattr(small_systems, "in_parts", lambda problem, parts=parts: parts)
         run = run_of(block, vary=vary, vary_rtol=1e9, max_step=2e-5)
         run.advance(300)
         found.append((run.time, run.variation.variation.columns))
-    assert found[0][0] == pytest.approx(found[1][0], rel=1e-12)
-    sizes = np.abs(found[1][1]).max(axis=0)
-    assert (np.abs(found[0][1] - found[1][1]) <= 1e-7 * sizes).all()
+    (end, own), (end_of_all, of_all), (end_of_parts, of_parts) = found
+    assert [end, end_of_parts] == pytest.approx([end_of_all, end_of_all], rel=1e-12)
+    sizes = np.abs(of_all).max(axis=0)
+    assert (np.abs(own - of_all) <= 1e-7 * sizes).all()
+    # Along the motion, instead of those of the steps.
+    assert (np.abs(of_parts - of_all) <= 1e-6 * sizes).all()
 
 
 def test_systems_with_more_to_them_have_the_step_loop_of_all():

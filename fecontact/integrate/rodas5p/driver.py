@@ -18,7 +18,7 @@ from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.run import Run
-from fecontact.integrate.rodas5p.small_systems import propagate_for
+from fecontact.integrate.rodas5p.small_systems import in_parts, propagate_for
 from fecontact.integrate.rodas5p.state import (
     Control,
     Output,
@@ -40,8 +40,9 @@ SLIP_PART = 0.01
 # Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
 _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
-# or of this part of the largest that it has been.
-_LOOSER, _FADED = 10.0, 0.1
+# or of this part of the largest that it has been. In parts of steps the error is that of what is
+# kept, else that of a solution of lower order.
+_LOOSER, _IN_PARTS, _FADED = 10.0, 200.0, 0.1
 # Steps of a piece of a run: at first, at least and at most.
 _FEWEST, _MOST_STEPS = 200, 10_000_000
 
@@ -113,6 +114,7 @@ def start(
     problem = Problem(system.arrays, blocks, control)
     expanded = None if vary or collocation == "always" else chosen_series(
         system, state, times, rtol, max_step, events, work, series)
+    looser = _IN_PARTS if in_parts(problem) else _LOOSER
     return Run(
         problem,
         _progress(system, control, float(times[0]), state),
@@ -121,7 +123,7 @@ def start(
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(above.arrays, below.arrays, width, _moved_both_ways(system, above, below),
              variation_for(columns, m, n, states, basis.dimension, width,
-                           float(vary_rtol or _LOOSER * rtol), 1.0 if vary_rtol else _FADED),
+                           float(vary_rtol or looser * rtol), 1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate_for(problem) if vary else 0),
         watch_for(system, events, bool(vary)),

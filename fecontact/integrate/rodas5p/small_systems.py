@@ -20,6 +20,7 @@ from fecontact.integrate.rodas5p.variational import (
     VARIATION,
     Vary,
     propagate,
+    propagate_in_parts,
     variation_for,
 )
 from fecontact.system.nodes import SYSTEM
@@ -44,10 +45,16 @@ def advance_for(problem: state.Problem, vary: Vary) -> Any:
 def propagate_for(problem: state.Problem) -> int:
     """Address of what carries derivatives over a step: that of the size of the system, or of all.
 
-    For the same systems as the step loops, with any number of columns.
+    For the same systems as the step loops, with any number of columns; other systems without
+    internal variables go in parts of steps.
     """
     n, m = problem.system.Tx.shape
-    return _propagate((m, n) if _small(problem) else None)
+    return _propagate((m, n) if _small(problem) else None, in_parts(problem))
+
+
+def in_parts(problem: state.Problem) -> bool:
+    """Whether derivatives go over a step in parts, which leaves the steps to the motion."""
+    return not (_small(problem) or problem.system.memory.any())
 
 
 def _small(problem: state.Problem) -> bool:
@@ -64,10 +71,11 @@ def _advance(modes: int, nodes: int) -> Any:
 
 
 @cache
-def _propagate(size: tuple[int, int] | None) -> int:
+def _propagate(size: tuple[int, int] | None, parts: bool = False) -> int:
     """Address of what carries derivatives over a step, of modes and nodes of a size or of all."""
     known = "" if size is None else constants(values_of_derivatives(*size))
-    compiled = kernel(PROPAGATE, constants=known, no_cpython_wrapper=True)(propagate)
+    compiled = kernel(PROPAGATE, constants=known, no_cpython_wrapper=True)(
+        propagate_in_parts if parts else propagate)
     found = compiled.overloads[PROPAGATE.args]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
 
@@ -76,6 +84,7 @@ def compile_usual() -> None:
     """Compile the derivatives of steps of all systems, and of those of the usual sizes."""
     for size in (None, (1, 1), (2, 1), (3, 1)):
         _propagate(size)
+    _propagate(None, True)
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:

@@ -31,6 +31,7 @@ from fecontact.core.compiled import (
 )
 from fecontact.core.references import Reference
 from fecontact.core.types import Array
+from fecontact.integrate import collocated_columns as collocation
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
@@ -39,6 +40,8 @@ from fecontact.system.nodes import SYSTEM, ground_motion
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5
+# Parts of a step, at most, and tries to find their number.
+_MOST_PARTS, _MOST_TRIES = 12, 6
 
 
 class Variation(NamedTuple):
@@ -190,16 +193,29 @@ def _begin_parameter(step, progress, blocks, vary):
                         v.usual, v.between)
 
 
+@helper
+def _add_matrices(x, blocks, vary, out):
+    """Add to out what the parameter makes of the matrices' accelerations at a state x."""
+    above, below, m = vary.above, vary.below, len(vary.variation.none)
+    for own in range(len(blocks.own)):
+        top, bottom, left, right = block_at(blocks.own, own)
+        for i in range(top, bottom):
+            total = 0.0
+            for k in range(left, right):
+                total += ((above.stiffness[i, k] - below.stiffness[i, k]) * x[k]
+                          + (above.damping[i, k] - below.damping[i, k]) * x[m + k])
+            out[m + i] -= total / vary.width
+
+
 @routine
-def _set_forced(part, Y, u, blocks, vary, out):
-    """Fill ``out`` with df/dp at Y, and dJ/dp u + ``part`` d2f/dt dp at the begin of the step.
+def _set_pushes(Y, blocks, vary, out):
+    """Fill ``out`` with df/dp at Y, whose nodes move as v.nodes says.
 
     By what is given in the systems above and below at the time of Y.
     """
     v, above, below = vary.variation, vary.above, vary.below
     w, forces, rate = v.nodes, v.forces, v.vectors[4]
     m = len(v.none)
-    dynamics.project(blocks, Y, w[0], w[1])
     dynamics.set_forces(Y, below, blocks, dynamics.motion_given(v.given[1]), w, v.behind, rate)
     for k in range(len(forces)):
         forces[k] = w[2, k]
@@ -207,20 +223,30 @@ def _set_forced(part, Y, u, blocks, vary, out):
     for k in range(len(forces)):
         w[2, k] = (w[2, k] - forces[k]) / vary.width
     for k in range(2 * m, len(out)):
-        out[k] = (out[k] - rate[k]) / vary.width + part * v.vectors[6, k]
+        out[k] = (out[k] - rate[k]) / vary.width
     for i in range(m):
         out[i] = 0.0
-        out[m + i] = (v.load[0, i] - v.load[1, i]) / vary.width + part * v.vectors[6, m + i]
-    columns.push(v.between, above, blocks, u, w, out)
+        out[m + i] = (v.load[0, i] - v.load[1, i]) / vary.width
     dynamics.push(blocks, w[2], out[m : 2 * m])
-    for own in range(len(blocks.own)):
-        top, bottom, left, right = block_at(blocks.own, own)
-        for i in range(top, bottom):
-            total = 0.0
-            for k in range(left, right):
-                total += ((above.stiffness[i, k] - below.stiffness[i, k]) * (Y[k] + u[k])
-                          + (above.damping[i, k] - below.damping[i, k]) * (Y[m + k] + u[m + k]))
-            out[m + i] -= total / vary.width
+    _add_matrices(Y, blocks, vary, out)
+
+
+@routine
+def _set_forced(part, Y, u, blocks, vary, out):
+    """Fill ``out`` with df/dp at Y, and dJ/dp u + ``part`` d2f/dt dp at the begin of the step.
+
+    By what is given in the systems above and below at the time of Y.
+    """
+    v = vary.variation
+    w, m = v.nodes, len(v.none)
+    dynamics.project(blocks, Y, w[0], w[1])
+    _set_pushes(Y, blocks, vary, out)
+    w[2, :] = 0.0
+    for k in range(m, len(out)):
+        out[k] += part * v.vectors[6, k]
+    columns.push(v.between, vary.above, blocks, u, w, out)
+    dynamics.push(blocks, w[2], out[m : 2 * m])
+    _add_matrices(u, blocks, vary, out)
 
 
 @helper
@@ -286,6 +312,95 @@ def propagate(step, problem, progress, room, vary):
         else:
             columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
     return _largest_error(room.right, v)
+
+
+@helper
+def _parts(step, scale, x, forced, J, v):
+    """In how many parts the columns x go over the step, and the error that is expected of them.
+
+    As :func:`propagate` gives it, in one of the parts times their number. ``forced`` (4, m) acts
+    on the last column at its begin, or (0, m) nothing does.
+    """
+    m, error, rate, ahead = len(v.none), np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    np.dot(J, x, rate[m:])
+    for i in range(m):
+        if len(forced) > 0:
+            rate[m + i, len(v.columns) - 1] += forced[0, i]
+        for c in range(len(v.columns)):
+            rate[i, c] = x[m + i, c]
+    parts, expected = 1, 0.0
+    for _ in range(_MOST_TRIES):
+        collocation.expected_error(step.h / parts, J, x, rate, ahead, error)
+        expected = 0.0
+        for c in range(len(v.columns)):
+            size, off = 0.0, 0.0
+            for k in range(2 * m):
+                size = max(size, max(abs(x[k, c]), abs(ahead[k, c])) / scale[k])
+                off = max(off, abs(error[k, c]) / scale[k])
+            if off > 0.0:
+                expected = max(expected, parts * off / max(
+                    size, v.faded * max(v.norms[0, c], size)))
+        if not expected > v.tolerance or parts >= _MOST_PARTS:
+            break
+        parts = min(_MOST_PARTS, max(parts + 1, int(np.ceil(
+            parts * (expected / v.tolerance) ** (1.0 / 7.0)))))
+    return parts, expected
+
+
+@helper
+def _set_accelerations(t, Y, blocks, vary, out):
+    """Fill out (m,) with the derivatives of the accelerations to the parameter, at Y and time t.
+
+    For a system without memory, whose nodes move as v.nodes says.
+    """
+    v, m = vary.variation, len(out)
+    dynamics.set_given(t, vary.above, v.given[0], v.load[0])
+    dynamics.set_given(t, vary.below, v.given[1], v.load[1])
+    _set_pushes(Y, blocks, vary, v.vectors[3])
+    for i in range(m):
+        out[i] = v.vectors[3, m + i]
+
+
+def propagate_in_parts(step, problem, progress, room, vary):
+    """As :func:`propagate`, but by collocation in parts of the step, for systems without memory.
+
+    The derivatives are those along the interpolant of the step. Returns zero where they are within
+    their tolerance: the steps are then left to the motion.
+    """
+    s, blocks, v = problem.system, problem.blocks, vary.variation
+    count, size = v.columns.shape
+    m, scale, varies = len(v.none), room.right, vary.width != 0.0
+    Y = v.vectors[0]
+    x = np.empty((size, count))
+    for c in range(count):
+        for k in range(size):
+            x[k, c] = v.columns[c, k]
+    J = np.empty((collocation.STAGES, m, size))
+    forced = np.zeros((collocation.STAGES if varies else 0, m))
+    if varies:
+        dynamics.project(blocks, progress.state, v.nodes[0], v.nodes[1])
+        _set_accelerations(np.nextafter(step.t, np.inf), progress.state, blocks, vary, forced[0])
+    parts, expected = _parts(step, scale, x, forced, room.reduced.J, v)
+    if expected > v.tolerance:
+        return expected
+    answers = v.answers[: 2 * m]
+    for part in range(parts):
+        for i in range(collocation.STAGES):
+            place = (part + collocation.NODES[i]) / parts
+            now = min(step.t + place * step.h, step.latest)
+            tableau.interpolated(place, progress.state, room.after, room.dense, Y)
+            dynamics.set_gradients(Y, s, blocks, ground_motion(now, s), v.nodes, v.inside)
+            columns.set_derivatives(s, blocks, v.inside, room.reduced, answers, J[i])
+            if varies:
+                _set_accelerations(now, Y, blocks, vary, forced[i])
+        collocation.collocate(step.h / parts, J, forced, x)
+    for c in range(count):
+        largest = v.norms[0, c]
+        for k in range(size):
+            largest = max(largest, max(abs(v.columns[c, k]), abs(x[k, c])) / scale[k])
+            v.after[c, k] = x[k, c]
+        v.norms[1, c] = largest
+    return 0.0
 
 
 @helper

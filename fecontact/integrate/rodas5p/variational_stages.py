@@ -283,6 +283,21 @@ def _products(a, b, out):
 
 
 @helper
+def set_derivatives(s, blocks, g, reduced, answers, out):
+    """Fill out (m, 2 m) with [Jq, Jv], the derivatives of the accelerations, by gradients g.
+
+    For systems without internal variables; ``answers`` (2 m, d n) is room.
+    """
+    m = len(out)
+    stage_solver.set_answers(blocks, g, reduced, answers)
+    _products(blocks.shapes, answers, out)
+    for row in range(m):
+        for k in range(m):
+            out[row, k] -= s.stiffness[row, k]
+            out[row, m + k] -= s.damping[row, k]
+
+
+@helper
 def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
     """Solve stage i of all columns; systems without internal variables."""
     count, size = v.columns.shape
