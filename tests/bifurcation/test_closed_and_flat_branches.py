@@ -160,7 +160,8 @@ def test_folds_of_a_mesh_too_coarse_for_a_canard_are_left_out(bounds, largest, p
 def test_special_points_of_a_mesh_too_coarse_for_a_pendulum_are_marked(intervals, tmp_path):
     field = vector_field(pendulum, {"a": 0.1}, 2)
     rest = equilibrium_branch(field, parameter="a", bounds=(-0.5, 0.5), direction=-1.0)
-    orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=intervals),
+    orbits = orbit_branch(field, rest.of_kind("Hopf")[0],
+                          method=Collocation(intervals=intervals, state_tolerance=None),
                           bounds=(-0.5, 0.5),
                           options=ContinuationOptions(points=90, largest_step=0.1))
     assert_none_unmarked(orbits, tmp_path)

@@ -68,12 +68,12 @@ def counts(branch):
     return [len(point.values["mesh"]) - 1 for point in branch]
 
 
-def true_error(point, function, *values, periods=1):
+def true_error(point, function, *values, periods=1, samples=4001):
     """Period, and the largest error of the states in their ranges, beside a run from the orbit.
 
     The run takes some periods more, in which it settles to a strongly attracting cycle.
     """
-    orbit, compiled, given = point.orbit(samples=4001), njit(function), np.array(values)
+    orbit, compiled, given = point.orbit(samples=samples), njit(function), np.array(values)
     T = float(point.values["period"])
     at, out = np.argmax(orbit.states[:, 0]), np.empty(orbit.states.shape[1])
 
@@ -168,18 +168,32 @@ def test_errors_of_stick_slip(slope, tolerance):
     for point in sticking(branch)[5::15]:
         period, error = true_error(point, belt, point.parameter, slope, periods=3)
         assert error <= 2.0 * tolerance
-        assert 0.25 * error - 1e-9 <= point.values["state_error"] <= 5.0 * error
+        assert 0.5 * error - 1e-9 <= point.values["state_error"] <= 4.0 * error
         assert point.values["period"] == pytest.approx(period, rel=max(1e-3 * tolerance, 3e-8))
 
 
-def test_steep_friction():
-    """Friction of slope 5e4, whose layers of a millionth of the period are hardly resolved."""
-    branch = stick_slip(5e4, state_tolerance=1e-6)
+@pytest.mark.parametrize("slope", [1e4, 5e4])
+def test_steep_friction(slope):
+    """Friction of slope 5e4, whose layers of a millionth of the period lie within intervals."""
+    branch = stick_slip(slope)
     assert branch.message == ""
-    assert branch.column("state_error").max() <= 1e-6
-    assert max(counts(branch)) > min(counts(branch)) == 50
-    for point in sticking(branch)[5::20]:
-        assert true_error(point, belt, point.parameter, 5e4, periods=3)[1] <= 1e-5
+    assert branch.column("state_error").max() <= 1e-5
+    assert slope == 1e4 or max(counts(branch)) > 100
+    assert min(counts(branch)) == 50
+    for point in sticking(branch)[5::40]:
+        error = true_error(point, belt, point.parameter, slope, periods=3, samples=40001)[1]
+        assert error <= 1e-5
+        assert 0.5 * error - 3e-9 <= point.values["state_error"] <= 3.0 * error
+
+
+def test_layers_between_the_points_of_an_interval_are_seen():
+    """Friction of slope 5e4 on fixed intervals, beside runs at tolerances of 1e-12."""
+    branch = stick_slip(5e4, state_tolerance=None)
+    errors = []
+    for point in sticking(branch)[5::16]:
+        errors.append(true_error(point, belt, point.parameter, 5e4, periods=3, samples=40001)[1])
+        assert 0.5 * errors[-1] <= point.values["state_error"] <= 3.0 * errors[-1]
+    assert max(errors) > 1e-6
 
 
 def driven_branch(method):
@@ -480,7 +494,7 @@ def masses_branch(method):
 
 
 @pytest.mark.parametrize(("followed", "doubling", "shown"), [
-    (masses_branch, 8.0921923844629, 6.3e-6), (chaos_branch, 2.83244502786, 4.2e-8)])
+    (masses_branch, 8.0921923844629, 7.8e-6), (chaos_branch, 2.83244502786, 3.7e-8)])
 def test_default_settings_reach_what_is_stated(followed, doubling, shown):
     """A hundred-thousandth of the ranges, a ten-millionth of the diagram: table of the docs."""
     field, branch = followed(Collocation())

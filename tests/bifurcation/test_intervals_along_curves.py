@@ -71,7 +71,7 @@ def test_a_closed_curve_of_folds_on_changing_meshes(tolerance, tmp_path):
         states, closed = on_the_circle(point)
         error = np.max(np.abs(states - closed)) / 2.0
         assert error <= tolerance
-        assert 0.97 * error <= point.values["state_error"] <= 1.4 * error
+        assert 0.9 * error <= point.values["state_error"] <= 1.4 * error
     turning = sorted(point.parameter for point in curve.special)
     assert turning == pytest.approx([-0.5, 0.5], abs=1e-9)
     # A file keeps the meshes, and a curve goes on from any of its points.
@@ -138,7 +138,7 @@ def test_doublings_of_stick_slip_on_finer_meshes():
     assert curve.status is fine.status is BranchStatus.BOUND
     assert curve.message == ""
     assert curve.column("state_error").max() <= 1e-7
-    assert counts(curve)[0] > intervals[0]
+    assert max(counts(curve)) > intervals[0] == min(counts(curve))
     assert set(counts(fine)) == {400}
     ends = [each.points[-1] for each in curves]
     assert [end.values["slope"] for end in ends] == pytest.approx(2 * [1000.0], rel=1e-11)

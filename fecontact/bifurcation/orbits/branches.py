@@ -30,7 +30,7 @@ from fecontact.bifurcation.orbits.curves.resonant import (
     is_single,
     of_several,
 )
-from fecontact.bifurcation.orbits.mesh import state_error
+from fecontact.bifurcation.orbits.discretisation import state_error
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
@@ -371,7 +371,7 @@ def _on_own_intervals(start: starts.Start, method: Collocation) -> starts.Start:
     problem, u, _ = start
     count, sizes = method.intervals, _sizes(method)
     if sizes is not None:
-        error = state_error(problem.mesh, problem.nodes(u), problem.degree, problem.scales)
+        error = state_error(problem, u)
         count = sizes.at_start(problem.intervals, error, problem.degree)
     return starts.on_intervals(start, count)
 

@@ -9,14 +9,13 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
-from fecontact.bifurcation.orbits.floquet import FloquetTests
-from fecontact.bifurcation.orbits.mesh import (
-    carry_over,
-    equidistributed,
-    extremes,
+from fecontact.bifurcation.orbits.discretisation import (
+    CollocationLinearisation,
+    Discretisation,
     state_error,
 )
+from fecontact.bifurcation.orbits.floquet import FloquetTests
+from fecontact.bifurcation.orbits.mesh import carry_over, equidistributed, extremes
 from fecontact.bifurcation.orbits.normal_forms import examined
 from fecontact.bifurcation.orbits.same_orbit import (
     HALVING,
@@ -55,7 +54,8 @@ class Intervals:
     least, most : int
         Limits of their number.
     tolerance : float
-        Largest error of the states, see :func:`fecontact.bifurcation.orbits.mesh.state_error`.
+        Largest error of the states, see
+        :func:`fecontact.bifurcation.orbits.discretisation.state_error`.
     """
 
     least: int
@@ -171,10 +171,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
-                "maximum": high, "state_error": self._error(u)}
-
-    def _error(self, u: Array) -> float:
-        return state_error(self.mesh, self.nodes(u), self.degree, self.scales)
+                "maximum": high, "state_error": state_error(self, u)}
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -240,7 +237,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         vectors = [u, tangent] if bend is None else [u, tangent, bend]
         mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
-            fewer = min(count, self.sizes.after(count, self._error(u), self.degree))
+            fewer = min(count, self.sizes.after(count, state_error(self, u), self.degree))
             calm = self.calm + 1 if fewer < count else 0
             if calm >= _CALM:
                 count, calm = fewer, 0

@@ -4,10 +4,17 @@ Nodes are (N m, d): the last node of an interval is the first one of the next. B
 slopes are (m, m + 1).
 """
 
+import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, kernel, matrix, vector
+from fecontact.core.compiled import f8, helper, kernel, matrix, vector
 from fecontact.core.references import borrowed
+
+# Smallest range of a state to which an error of it is related: in its scale (Newton's method leaves
+# errors of 1e-8 of that), in its largest value, and in the largest range of all states.
+_LEAST_OF_SCALE, _LEAST_OF_VALUE, _LEAST_OF_ALL = 1e-2, 1e-6, 1e-11
+# Part of an interval, in widths of a neighbour, in which the derivative between both counts.
+_MOST_REACH = 2.0
 
 
 @kernel(types.void(vector, vector, vector, vector, vector, vector))
@@ -54,13 +61,16 @@ def fill_phase_row(nodes, gauss_weights, values, slopes, row):
 
 @kernel(types.void(matrix, matrix, matrix, matrix, matrix))
 def at_points(nodes, values, slopes, x, rates):
-    """Fill x and rates (N m, d), values and interval-scaled slopes, from nodes (N m, d)."""
+    """Fill x and rates (N k, d), values and interval-scaled slopes, from nodes (N m, d).
+
+    Basis values and slopes (k, m + 1) are those at k points of an interval.
+    """
     nodes, x, rates = borrowed(nodes), borrowed(x), borrowed(rates)
-    m = len(values)
+    points, m = len(values), values.shape[1] - 1
     total, d = nodes.shape
     for j in range(total // m):
-        for point in range(m):
-            row = j * m + point
+        for point in range(points):
+            row = j * points + point
             for i in range(d):
                 x[row, i] = 0.0
                 rates[row, i] = 0.0
@@ -155,3 +165,79 @@ def compare_halves(weights, nodes, nodes_later, before, before_later, out):
             out[0] += weight * apart * (nodes[row, i] - nodes_later[row, i])
             out[1] += weight * apart * apart
             out[2] += weight * (before[row, i] - mean) ** 2
+
+
+@helper
+def _power(x, m):
+    result = x
+    for _ in range(1, m):
+        result *= x
+    return result
+
+
+@kernel(types.void(matrix, vector, vector))
+def fill_ranges(nodes, scales, sizes):
+    """Fill sizes (d,) with the range of each state, to which its errors are related."""
+    nodes, scales, sizes = borrowed(nodes), borrowed(scales), borrowed(sizes)
+    most = 0.0
+    for i in range(len(sizes)):
+        low, high = nodes[0, i], nodes[0, i]
+        for node in range(len(nodes)):
+            low, high = min(low, nodes[node, i]), max(high, nodes[node, i])
+        sizes[i] = max(high - low, _LEAST_OF_VALUE * max(abs(low), abs(high)),
+                       _LEAST_OF_SCALE * scales[i])
+        most = max(most, high - low)
+    for i in range(len(sizes)):
+        sizes[i] = max(sizes[i], _LEAST_OF_ALL * most)
+        if sizes[i] == 0.0:
+            sizes[i] = np.inf
+
+
+@kernel(types.void(matrix, matrix, vector, f8, matrix, vector, vector))
+def integrate_defect(slopes, f, widths, T, integrals, sizes, errors):
+    """Fill errors (N,) with the largest |int (x' - h T f)| / size of all states."""
+    slopes, f, widths = borrowed(slopes), borrowed(f), borrowed(widths)
+    integrals, sizes, errors = borrowed(integrals), borrowed(sizes), borrowed(errors)
+    rows, per = integrals.shape
+    defect = np.empty(per)
+    errors[:] = 0.0
+    for j in range(len(widths)):
+        for i in range(len(sizes)):
+            for c in range(per):
+                defect[c] = slopes[j * per + c, i] - widths[j] * T * f[j * per + c, i]
+            for row in range(rows):
+                value = 0.0
+                for c in range(per):
+                    value += integrals[row, c] * defect[c]
+                errors[j] = max(errors[j], abs(value) / sizes[i])
+
+
+@kernel(types.void(vector, matrix, vector, vector, vector))
+def fill_smooth_errors(widths, nodes, top, sizes, errors):
+    """Fill errors (N,) with the largest h^(m+1) |x^(m+1)| / size of all states.
+
+    The derivative is the larger one of those between an interval and its neighbours, each from the
+    jump of that of order m.
+    """
+    widths, nodes, sizes = borrowed(widths), borrowed(nodes), borrowed(sizes)
+    errors = borrowed(errors)
+    total, d = nodes.shape
+    N, m = len(widths), len(top) - 1
+    slopes = np.empty(N)
+    errors[:] = 0.0
+    for i in range(d):
+        for j in range(N):
+            value = 0.0
+            for k in range(m + 1):
+                node = j * m + k
+                value += top[k] * nodes[node if node < total else 0, i]
+            slopes[j] = value / _power(widths[j], m)
+        for j in range(N):
+            after = j + 1 if j + 1 < N else 0
+            jump = abs(slopes[after] - slopes[j]) / sizes[i]
+            rate = 2.0 * jump / (widths[j] + widths[after])
+            # What a much narrower neighbour resolves does not go on through an interval.
+            one = min(widths[j], _MOST_REACH * widths[after])
+            other = min(widths[after], _MOST_REACH * widths[j])
+            errors[j] = max(errors[j], rate * _power(one, m + 1))
+            errors[after] = max(errors[after], rate * _power(other, m + 1))

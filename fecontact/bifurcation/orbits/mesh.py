@@ -11,7 +11,7 @@ from math import factorial
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, i8, kernel, matrix, vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -245,79 +245,6 @@ def _monitor(mesh, nodes, top, share):
     for j in range(N):
         mean = (steep[j - 1] + 2.0 * steep[j] + steep[j + 1 if j + 1 < N else 0]) / 4.0
         share[j] = mean * (mesh[j + 1] - mesh[j])
-
-
-# Smallest range of a state to which an error of it is related: in its scale (Newton's method leaves
-# errors of 1e-8 of that), in its largest value, and in the largest range of all states.
-_LEAST_OF_SCALE, _LEAST_OF_VALUE, _LEAST_OF_ALL = 1e-2, 1e-6, 1e-11
-
-# Part of an interval, in widths of a neighbour, in which the derivative between both counts.
-_MOST_REACH = 2.0
-
-
-@helper
-def _power(x, m):
-    result = x
-    for _ in range(1, m):
-        result *= x
-    return result
-
-
-@kernel(f8(vector, matrix, vector, vector))
-def _largest_error(mesh, nodes, top, scales):
-    """Largest h^(m+1) |x^(m+1)| / range of all intervals and states."""
-    mesh, nodes, scales = borrowed(mesh), borrowed(nodes), borrowed(scales)
-    N = len(mesh) - 1
-    total, d = nodes.shape
-    m = total // N
-    ranges, slopes, powers, reaches = np.empty(d), np.empty(N), np.empty(N), np.empty(N)
-    for j in range(N):
-        after = j + 1 if j + 1 < N else 0
-        one, other = mesh[j + 1] - mesh[j], mesh[after + 1] - mesh[after]
-        powers[j] = 1.0 / _power(one, m)
-        # What a much narrower neighbour resolves does not go on through an interval.
-        reach = min(max(one, other), _MOST_REACH * min(one, other))
-        reaches[j] = 2.0 * _power(reach, m + 1) / (one + other)
-    most = 0.0
-    for i in range(d):
-        low, high = nodes[0, i], nodes[0, i]
-        for node in range(total):
-            low, high = min(low, nodes[node, i]), max(high, nodes[node, i])
-        ranges[i] = max(high - low, _LEAST_OF_VALUE * max(abs(low), abs(high)),
-                        _LEAST_OF_SCALE * scales[i])
-        most = max(most, high - low)
-    worst = 0.0
-    for i in range(d):
-        size = max(ranges[i], _LEAST_OF_ALL * most)
-        if size == 0.0:
-            continue
-        for j in range(N):
-            value = 0.0
-            for k in range(m + 1):
-                node = j * m + k
-                value += top[k] * nodes[node if node < total else 0, i]
-            slopes[j] = value * powers[j]
-        for j in range(N):
-            jump = abs(slopes[j + 1 if j + 1 < N else 0] - slopes[j])
-            worst = max(worst, jump * reaches[j] / size)
-    return worst
-
-
-def state_error(mesh: Array, nodes: Array, degree: int, scales: Array) -> float:
-    r"""Largest error of a state between the ends of intervals, in its range over the orbit.
-
-    The range counts as a hundredth of the state's scale at least; the first d scales are those.
-
-    There the collocation polynomials err most, by
-
-    .. math:: x - x_h = h^{m+1} x^{(m+1)} \frac{1}{m!} \int_0^s \prod_k (r - c_k) \, dr
-
-    with the Gauss points c_k and s from 0 to 1 over an interval; at its ends the error is of the
-    order 2 m. The derivative of order m + 1 is the larger one of those between an interval and its
-    neighbours, each from the jump of that of order m.
-    """
-    found = rule(degree)
-    return found.bump * float(_largest_error(mesh, nodes, found.top, scales))
 
 
 @kernel(types.void(vector, matrix, vector, vector))
