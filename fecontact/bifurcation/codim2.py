@@ -28,7 +28,7 @@ from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium
 from fecontact.bifurcation.equilibria.problem import equilibrium_at
 from fecontact.bifurcation.events.curves import border_curve
 from fecontact.bifurcation.homoclinic.starts import homoclinic_curve
-from fecontact.bifurcation.orbits.codim2 import OrbitCurve, orbit_curve
+from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve, orbit_curve
 from fecontact.bifurcation.orbits.curves.errors import with_errors
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_finite

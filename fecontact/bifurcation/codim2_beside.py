@@ -38,7 +38,7 @@ from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_sc
 from fecontact.bifurcation.equilibria.normal_forms import hopf
 from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.branches import orbit_branch
-from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.restored import over_first
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
 from fecontact.core.types import Array

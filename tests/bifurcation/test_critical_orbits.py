@@ -12,7 +12,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.orbits.codim2 import orbit_curve
+from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
 
 
 def duffing(t, x, p, out):

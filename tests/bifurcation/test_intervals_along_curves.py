@@ -16,8 +16,8 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.orbits.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
+from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.curves.singularity import ContinuedSign, Singularity, of_fold
 from fecontact.io import read_branch, write_branch
 

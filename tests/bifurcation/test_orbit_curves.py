@@ -17,7 +17,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.orbits.codim2 import OrbitCurve
+from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 
 

@@ -32,8 +32,8 @@ def homoclinic_curve(
 ) -> tuple[HomoclinicProblem, Array, dict[str, Any]]:
     """Problem, unknowns and attributes of the curve of homoclinic orbits near an orbit.
 
-    Arguments are those of :func:`fecontact.bifurcation.orbits.codim2.orbit_curve`; the point is an
-    orbit by any method, or a point of such a curve.
+    Arguments are those of :func:`fecontact.bifurcation.orbits.curves.codim2.orbit_curve`; the
+    point is an orbit by any method, or a point of such a curve.
 
     Raises
     ------

@@ -30,10 +30,10 @@ from fecontact.bifurcation.orbits.curves.resonant import (
     is_single,
     of_several,
 )
-from fecontact.bifurcation.orbits.discretisation import state_error
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
 from fecontact.core.types import Array, ArrayLike

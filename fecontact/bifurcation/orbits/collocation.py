@@ -9,11 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
-from fecontact.bifurcation.orbits.discretisation import (
-    CollocationLinearisation,
-    Discretisation,
-    state_error,
-)
+from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.mesh import carry_over, equidistributed, extremes
 from fecontact.bifurcation.orbits.normal_forms import examined
@@ -26,6 +22,7 @@ from fecontact.bifurcation.orbits.same_orbit import (
     same_place,
     vanishing,
 )
+from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
@@ -55,7 +52,7 @@ class Intervals:
         Limits of their number.
     tolerance : float
         Largest error of the states, see
-        :func:`fecontact.bifurcation.orbits.discretisation.state_error`.
+        :func:`fecontact.bifurcation.orbits.state_error.state_error`.
     """
 
     least: int

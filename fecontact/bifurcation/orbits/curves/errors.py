@@ -11,7 +11,7 @@ from fecontact.bifurcation.continuation.newton import norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import details_of, with_details
 from fecontact.bifurcation.continuation.sharpening import LEAST_FALL, found_near, reach
-from fecontact.bifurcation.orbits.codim2 import OrbitCurve
+from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.curves.singularity import ContinuedSign
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.same_orbit import HALVING
