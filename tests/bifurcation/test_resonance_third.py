@@ -196,7 +196,8 @@ def test_forced_van_der_pol():
     assert symmetric.normal_form["b"] < 1e-9
     with pytest.raises(AnalysisError, match="no orbit of 3 periods to this side"):
         orbit_branch(field, symmetric, bounds=box["F"])
-    saddles = orbit_branch(field, point, bounds=box["F"])
+    saddles = orbit_branch(field, point, bounds=box["F"],
+                           method=Collocation(state_tolerance=1e-7))
     for at in saddles.points[:20:5]:
         F, start = at.parameter, at.orbit(field).states[0]
         end = run(F, point.values["w"], start, 6.0 * np.pi / point.values["w"]).y[:, -1]

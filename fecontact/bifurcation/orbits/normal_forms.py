@@ -203,9 +203,7 @@ class Expansion:
         """The h with h' - A h = T bend at the points and h(1) = closing h(0), complex."""
         side = (self._T * self._h * bend).reshape(-1)
         shaped = solve_turned(self._linearised.factors, side, closing).reshape(bend.shape)
-        end = closing * shaped[0]
-        return (at_points(self._problem, np.ascontiguousarray(shaped.real), end.real)
-                + 1j * at_points(self._problem, np.ascontiguousarray(shaped.imag), end.imag))
+        return at_points(self._problem, shaped, closing * shaped[0])
 
 
 def _complex(real: Array, imaginary: Array, vectors: Array, sign: float = 1.0) -> Array:

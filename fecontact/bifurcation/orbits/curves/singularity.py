@@ -237,7 +237,13 @@ def _term(at: CollocationLinearisation, left: Array, start: Array, end: Array) -
 
 
 def at_points(problem: Discretisation, nodes: Array, end: Array) -> Array:
-    """Values (N m, d) at the Gauss points of v with these nodes (N m, d) and this end (d,)."""
+    """Values (N m, d) at the Gauss points of v with these nodes (N m, d) and this end (d,).
+
+    Vectors may be complex.
+    """
+    if np.iscomplexobj(nodes) or np.iscomplexobj(end):
+        real = at_points(problem, np.ascontiguousarray(nodes.real), end.real)
+        return real + 1j * at_points(problem, np.ascontiguousarray(nodes.imag), end.imag)
     out = np.empty_like(nodes)
     open_values(nodes, np.ascontiguousarray(end), problem.rule.values, out)
     return out
