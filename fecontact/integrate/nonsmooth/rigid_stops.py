@@ -61,6 +61,7 @@ from fecontact.integrate.nonsmooth.problem import (
     STICK,
     WORKSPACE,
 )
+from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
@@ -75,6 +76,8 @@ from fecontact.system.powers import (
 NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 # Slip velocities below this part of the largest are none, energies gained rounding.
 _NEAR, _GAIN = 1e-9, 1e-10
+# Rounding of penetration rates relative to the largest slip velocity or rate.
+_RATE_ROUNDING = 1e-14
 
 CHANGE = f8(f8, Reference(PROBLEM), Reference(PROGRESS), Reference(ROOM), Reference(WORKSPACE), f8,
             f8, f8, vector)
@@ -305,6 +308,14 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
         room.fresh[c] = room.fresh[c] and (status[c] == 1 or status[c] == -1)
     settle(t, p, status, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)
+    noise = _RATE_ROUNDING / _NEAR * near
+    for j in range(n):
+        if closed[j]:
+            room.flights[j, YOUNG] = 0.0
+        elif touching[j]:
+            begin_flight(j, w.nodes[j, RATE], noise, p, room)
+        elif struck and abs(w.nodes[j, RATE]) > noise:
+            room.flights[j, CLIMB] = -w.nodes[j, RATE]
     return flight
 
 
@@ -326,18 +337,20 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
     near = max(largest[SLIP_SIZE], largest[RATE_SIZE])
     for c in range(len(p.rows)):
         near = max(near, abs(w.slip[c]))
+    struck = room.touched.any()
     for j in range(n):
         touching[j] = room.touched[j] or closed[j] or room.parting[j]
         if room.touched[j]:
             near = max(near, abs(w.nodes[j, RATE]))
+        if room.touched[j] or room.parting[j]:
             w.indices[count], w.right[count] = j, w.nodes[j, PENETRATION]
             count += 1
     if count > 0:
         _push(count, 0, p, w, Y)
         derivative(t, Y, p, status, closed, w, out)
-        if not _strike(t, touching, p, progress, w):
-            return NO_IMPULSES
-    return _decide(t, touching, count > 0, slow, height, brief, _NEAR * near, p, progress, room, w,
+    if struck and not _strike(t, touching, p, progress, w):
+        return NO_IMPULSES
+    return _decide(t, touching, struck, slow, height, brief, _NEAR * near, p, progress, room, w,
                    out)
 
 
