@@ -112,3 +112,26 @@ def test_many_lift_offs_open_the_stop_once():
         assert "lift-off" in kinds
         briefest = min(briefest, np.diff(times).min(initial=period))
     assert briefest > 1e-6 * period
+
+
+def test_slip_that_begins_on_stops():
+    """A mass on a belt, whose motion along it leans on that across: no run is stuck or has gained.
+
+    What all nodes rub off is the work of friction, and none of it is negative.
+    """
+    random = np.random.default_rng(3)
+    for _ in range(150):
+        mu, speed, lean, amplitude, w = random.uniform(
+            [0.1, 0.05, -0.6, 1.0, 0.5], [0.5, 0.5, 0.6, 6.0, 2.0])
+        rows = [[1.0, lean], [0.0, 1.0], [0.0, 0.0]]
+        basis = fc.basis_from_matrices(np.eye(2), np.diag([2.0, 0.5]), {
+            "contact": [rows], "B": rows, "C": rows}, damping=0.2 * np.eye(2))
+        system = fc.ContactSystem(
+            basis, normal=LinearContact(1e6), friction=ConstantFriction(mu), load=fc.Load(1.0),
+            ground=fc.Ground(speed=speed),
+            drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=w))
+        solver = SetValued(restitution=float(random.choice([0.0, 0.3, 0.6])))
+        run = fc.simulate(system, 60.0, initial=[0.0, 0.5, 0.0, 0.0], rtol=1e-9, solver=solver,
+                          outputs=31)
+        assert run.status is Status.FINISHED
+        assert np.diff(run.node_friction_work[:, 0]).min() >= -1e-9

@@ -306,14 +306,16 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
             if closed[j] and p.cluster[j] == c:
                 status[c] = case.mode[c]
         room.fresh[c] = room.fresh[c] and (status[c] == 1 or status[c] == -1)
-    settle(t, p, status, closed, w, out, Y)
+        # What begins to slip does so from no slip velocity.
+        before[c] = STICK if room.fresh[c] else status[c]
+    settle(t, p, before, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)
     noise = _RATE_ROUNDING / _NEAR * near
     for j in range(n):
         if closed[j]:
             room.flights[j, YOUNG] = 0.0
         elif touching[j]:
-            begin_flight(j, w.nodes[j, RATE], noise, p, room)
+            begin_flight(j, noise, p, w, room)
         elif struck and abs(w.nodes[j, RATE]) > noise:
             room.flights[j, CLIMB] = -w.nodes[j, RATE]
     return flight
@@ -337,20 +339,18 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
     near = max(largest[SLIP_SIZE], largest[RATE_SIZE])
     for c in range(len(p.rows)):
         near = max(near, abs(w.slip[c]))
-    struck = room.touched.any()
     for j in range(n):
         touching[j] = room.touched[j] or closed[j] or room.parting[j]
         if room.touched[j]:
             near = max(near, abs(w.nodes[j, RATE]))
-        if room.touched[j] or room.parting[j]:
             w.indices[count], w.right[count] = j, w.nodes[j, PENETRATION]
             count += 1
     if count > 0:
         _push(count, 0, p, w, Y)
         derivative(t, Y, p, status, closed, w, out)
-    if struck and not _strike(t, touching, p, progress, w):
-        return NO_IMPULSES
-    return _decide(t, touching, struck, slow, height, brief, _NEAR * near, p, progress, room, w,
+        if not _strike(t, touching, p, progress, w):
+            return NO_IMPULSES
+    return _decide(t, touching, count > 0, slow, height, brief, _NEAR * near, p, progress, room, w,
                    out)
 
 

@@ -15,12 +15,16 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.bernstein import NOWHERE, first_below, from_nested, value
 from fecontact.integrate.nonsmooth.dop853 import DENSE, PARTS, SLOPES, STAGES, B
+from fecontact.integrate.nonsmooth.problem import PENETRATION, RATE
 
-# Columns of ``room.flights``: whether a flight has just begun, its height and the rate of that.
-YOUNG, HEIGHT, CLIMB, FLIGHT_FIELDS = 0, 1, 2, 3
+# Columns of ``room.flights``: whether a flight has just begun, its height and the rate of that, and
+# how far places were from the stop where it began.
+YOUNG, HEIGHT, CLIMB, SUNK, FLIGHT_FIELDS = 0, 1, 2, 3, 4
 # Rounding of an acceleration relative to its terms, and heights that places tell from zero,
 # relative to the places.
 _ROUNDING, _CLEAR = 1e-15, 2e-12
+# The same relative to errors of places at the begin of a flight.
+_ABOVE = 10.0
 # Looks before a landing at which the height may be above zero, and halvings between these.
 _LOOKS, _HALVINGS = 64, 50
 # The tick of a problem in longest steps.
@@ -28,12 +32,16 @@ _TICK = 1e-4
 
 
 @helper
-def begin_flight(j, rate, noise, p, room):
-    """Begin a flight at a stop that has just opened, at a penetration rate or one below noise."""
-    level = p.relief[2] == np.inf or not p.system.on_ground[j]
+def begin_flight(j, noise, p, w, room):
+    """Begin a flight at a stop that has just opened, as w sees it; rates below ``noise`` are none.
+
+    Its height is counted from where it is, up to rounding and the errors of the steps at rest.
+    """
+    level, rate = p.relief[2] == np.inf or not p.system.on_ground[j], w.nodes[j, RATE]
     room.flights[j, YOUNG] = 1.0 if level else 0.0
     room.flights[j, HEIGHT] = 0.0
     room.flights[j, CLIMB] = -rate if -rate > noise else 0.0
+    room.flights[j, SUNK] = abs(w.nodes[j, PENETRATION])
 
 
 @helper
@@ -119,5 +127,5 @@ def advance(part, step, p, progress, room):
             size += abs(s.Ty[j, i]) * (abs(Y[i]) + abs(room.parts[0, i]))
         room.flights[j, HEIGHT] = max(value(room.heights, part, room.halves[0]), 0.0)
         room.flights[j, CLIMB] = value(room.along, part, room.halves[0])
-        if room.flights[j, HEIGHT] > _CLEAR * size:
+        if room.flights[j, HEIGHT] > _CLEAR * size + _ABOVE * room.flights[j, SUNK]:
             room.flights[j, YOUNG] = 0.0
