@@ -15,7 +15,7 @@ from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
-from fecontact.integrate.nonsmooth.event_search import ROOM, first_changes, holding, set_left
+from fecontact.integrate.nonsmooth.event_search import ROOM, first_changes
 from fecontact.integrate.nonsmooth.problem import (
     DEPTH_SIZE,
     DIVERGED,
@@ -54,7 +54,9 @@ from fecontact.integrate.nonsmooth.rigid_stops import (
     change_contacts_at,
     settle,
 )
+from fecontact.integrate.nonsmooth.steps.flights import YOUNG, advance
 from fecontact.integrate.nonsmooth.steps.rates import set_rates, set_slips, share
+from fecontact.integrate.nonsmooth.steps.releases import holding, set_left
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
 from fecontact.integrate.rodas5p.event_kernels import WATCH
 from fecontact.system.powers import DRIVE, drive_jump
@@ -65,6 +67,9 @@ EARLY = 0.25
 _DAMPED, _SMALLEST_ERROR = 0.03, 1e-4
 # Events in a row without any time between them after which a run is stuck.
 _MOST_IDLE = 200
+# Repeated steps in a row, without any time between them, in which what lets go may still hold;
+# after these rounding alone holds it.
+_MOST_HELD = 3
 
 
 @helper
@@ -195,7 +200,10 @@ def _accept(step, t, passing, p, progress, output, w, room):
         last = counts[OUTPUTS] - 1
         if last >= 0 and output.times[last] == t:
             output.states[last, 2 * m + DRIVE] += work
-    room.fresh[:] = False
+    for c in range(len(status)):
+        room.fresh[c] = False
+    for j in range(len(closed)):
+        room.fresh[len(status) + j] = room.flights[j, YOUNG] != 0.0
     any_held = False
     for c in range(len(p.rows)):
         room.held[c] = status[c] == STICK
@@ -363,6 +371,8 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
             if part <= 1.0:
                 _stop_within(step, part, p, progress, output, w, room)
                 return STOPPED
+        if p.restitution >= 0.0:
+            advance(high, step, p, progress, room)
         reached = goal if reaching and not found else t + high * length
         _write_within(step, reached, not found, p, progress, output, w, room)
         if not found:
@@ -389,7 +399,7 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
             t = reached
         derivative(t, Y, p, status, closed, w, room.rate)
         h = min(max(0.1 * length, 1e3 * tiny), longest)
-        if not again and _holds_on(p, progress, w, room):
+        if not again and idle < _MOST_HELD and _holds_on(p, progress, w, room):
             for i in range(len(Y)):
                 room.slopes[0, i] = room.rate[i]
         else:

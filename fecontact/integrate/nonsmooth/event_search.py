@@ -5,9 +5,9 @@ bound them: what stays clear of its margin needs no further look, and a crossing
 halving, however short. Waves under a node and the speed of the ground go in as polynomials of the
 same degree, through places so close that nothing is lost between them.
 
-Forces of sticking clusters and of closed stops are evaluated at a few places; the polynomial
-through these, less its last part, which tells how far it can be trusted, bounds them in the same
-way. A part of the step that this leaves open is halved and looked at again.
+Flights that have just begun, and forces of what holds, are looked at in
+:mod:`fecontact.integrate.nonsmooth.steps.flights` and
+:mod:`fecontact.integrate.nonsmooth.steps.releases`.
 """
 
 from typing import NamedTuple
@@ -30,15 +30,16 @@ from fecontact.integrate.bernstein import (
     split,
     value,
 )
-from fecontact.integrate.nonsmooth.dop853 import PARTS, SLOPES, interpolate
-from fecontact.integrate.nonsmooth.equations import set_limits
-from fecontact.integrate.nonsmooth.problem import FORCE, OPEN, STICK, NonsmoothProblem
-from fecontact.integrate.nonsmooth.steps.rates import nothing_given, set_rates
+from fecontact.integrate.nonsmooth.dop853 import PARTS, SLOPES
+from fecontact.integrate.nonsmooth.problem import OPEN, STICK, NonsmoothProblem
+from fecontact.integrate.nonsmooth.steps.flights import FLIGHT_FIELDS, YOUNG, first_landing
+from fecontact.integrate.nonsmooth.steps.rates import nothing_given
+from fecontact.integrate.nonsmooth.steps.releases import QUARTERS, first_let_go
 from fecontact.laws.signatures import ground_at, normal_at
 from fecontact.system.nodes import ground_motion
 
-# Rounding of a sum, and of forces that come from a system of equations, relative to their parts.
-_ROUNDING, _FORCE_ROUNDING = 2e-15, 1e-13
+# Rounding of a sum, relative to its parts.
+_ROUNDING = 2e-15
 # Part of the shortest wave that a node may pass in a step, for the polynomial through the places.
 _WAVE = 0.25
 _PLACES = 0.5 - 0.5 * np.cos(np.pi * np.arange(PARTS + 1) / PARTS)
@@ -46,12 +47,6 @@ _PLACES[-1] = 1.0
 _FIT = fit(_PLACES)
 
 _NESTED = of_nested(PARTS)
-# Forces are looked at in quarters of a part of the step.
-_QUARTERS = 4
-_FIT_QUARTERS = fit(np.arange(_QUARTERS + 1) / _QUARTERS)
-# Size of the part of degree four over its fourth difference, 1 / (128 * 4! / 4^4).
-_LAST = 1.0 / 12.0
-_SHORTEST = 2.0**-8
 # A contact whose force grows so much between the ends of a step was not felt by its stages.
 UNFELT = 10.0
 ROUGHLY = 2.0**-12
@@ -70,9 +65,9 @@ class Room(NamedTuple):
         Where each cluster and stop first changes.
     nested, bound, along, values : (PARTS + 1,) arrays
         Polynomials of one node over the step.
-    halves : (DEPTH, PARTS + 2) array
+    halves : (DEPTH, PARTS + 3) array
         Parts of the step that are left to look at.
-    left, scale : (_QUARTERS + 1, 2 k + n), (2 k + n,) arrays
+    left, scale : (QUARTERS + 2, 2 k + n), (2 k + n,) arrays
         What forces have left at some places, and their sizes.
     ends : (2, 2 k + n) array
         What they have left at both ends of the step.
@@ -87,6 +82,9 @@ class Room(NamedTuple):
         Stops that are struck, and that open.
     given, loads, pushes : (GIVEN,), (m,), (m,) arrays
         What is given in time, see :mod:`fecontact.integrate.nonsmooth.steps.rates`.
+    flights, pull, heights : (n, FLIGHT_FIELDS), (SLOPES,), (PARTS + 2,) arrays
+        Flights that have just begun, see :mod:`fecontact.integrate.nonsmooth.steps.flights`, and
+        the acceleration and the height of one of them over the step.
     """
 
     slopes: Array
@@ -114,11 +112,14 @@ class Room(NamedTuple):
     given: Array
     loads: Array
     pushes: Array
+    flights: Array
+    pull: Array
+    heights: Array
 
 
 _flags = types.Array(types.boolean, 1, "C")
 ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix, matrix]
-                        + [_flags] * 7 + [vector] * 3, Room)
+                        + [_flags] * 7 + [vector] * 3 + [matrix] + [vector] * 2, Room)
 
 
 def room_for(problem: NonsmoothProblem, size: int) -> Room:
@@ -127,11 +128,12 @@ def room_for(problem: NonsmoothProblem, size: int) -> Room:
     new, state, rate = np.zeros((3, size))
     nested, bound, along, values = np.zeros((4, PARTS + 1))
     return Room(np.zeros((SLOPES, size)), np.zeros((PARTS, size)), new, state, rate,
-                np.zeros(k + n), nested, bound, along, values, np.zeros((DEPTH, PARTS + 2)),
-                np.zeros((_QUARTERS + 1, 2 * k + n)), np.zeros(2 * k + n), np.zeros((2, 2 * k + n)),
+                np.zeros(k + n), nested, bound, along, values, np.zeros((DEPTH, PARTS + 3)),
+                np.zeros((QUARTERS + 2, 2 * k + n)), np.zeros(2 * k + n), np.zeros((2, 2 * k + n)),
                 np.zeros((DEPTH, 2)),
                 *(np.zeros(count, dtype=bool) for count in (k + n, k + n, k, k, k, n, n)),
-                *(nothing_given(), *np.zeros((2, m))))
+                *(nothing_given(), *np.zeros((2, m)), np.zeros((n, FLIGHT_FIELDS)),
+                  np.zeros(SLOPES), np.zeros(PARTS + 2)))
 
 
 @helper
@@ -235,120 +237,6 @@ def first_pressed(b, above, finest, j, s, room):
 
 
 @helper
-def holding(progress):
-    """Whether any cluster sticks or any stop is closed."""
-    held = False
-    for c in range(len(progress.status)):
-        held = held or progress.status[c] == STICK
-    for j in range(len(progress.closed)):
-        held = held or progress.closed[j] != 0
-    return held
-
-
-@routine
-def set_left(p, progress, w, out):
-    """Fill out (2 k + n,) with what sticking clusters and closed stops have left, both ways.
-
-    Forces are those in w.
-    """
-    status, closed, clusters = progress.status, progress.closed, len(p.rows)
-    set_limits(p, w)
-    out[:] = 1.0
-    for k in range(clusters):
-        if status[k] == STICK:
-            inside = w.pressing[k] > 0.0
-            out[k] = w.limit[k] - w.total[k] if inside else -1.0
-            out[clusters + k] = w.limit[k] + w.total[k] if inside else -1.0
-        elif status[k] == OPEN:
-            out[k] = -1.0 if w.pressing[k] > 0.0 else 1.0
-    for j in range(len(closed)):
-        if closed[j]:
-            out[2 * clusters + j] = w.nodes[j, FORCE]
-
-
-@routine
-def _forces(part, step, p, progress, w, room, out):
-    """Fill out (2 k + n,) with what is left at a part of the step."""
-    interpolate(part, progress.state, room.parts, room.state[: 2 * p.rows.shape[1]])
-    set_rates(min(step.t + part * step.h, step.latest), room.state, p, progress, w, room,
-              room.rate)
-    set_left(p, progress, w, out)
-
-
-@helper
-def _past(out, size):
-    past = False
-    for r in range(len(out)):
-        past = past or out[r] < -_FORCE_ROUNDING * size[r]
-    return past
-
-
-@helper
-def _narrow(low, high, step, p, progress, w, room):
-    """Note what lets go first between two parts of the step, at the earliest moment."""
-    clusters, left, size = len(p.rows), room.left, room.scale
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if middle <= low or middle >= high:
-            break
-        _forces(middle, step, p, progress, w, room, left[0])
-        if _past(left[0], size):
-            high = middle
-        else:
-            low = middle
-    _forces(high, step, p, progress, w, room, left[0])
-    for r in range(len(size)):
-        if left[0, r] < -_FORCE_ROUNDING * size[r]:
-            room.place[r if r < clusters else r - clusters] = high
-
-
-@helper
-def _clear(left, size):
-    """Whether nothing lets go between the quarters of a part, as far as they tell."""
-    clear = True
-    for r in range(len(size)):
-        last = _LAST * abs(left[0, r] - 4.0 * left[1, r] + 6.0 * left[2, r]
-                           - 4.0 * left[3, r] + left[4, r])
-        for k in range(_QUARTERS + 1):
-            bound = -last
-            for i in range(_QUARTERS + 1):
-                bound += _FIT_QUARTERS[k, i] * left[i, r]
-            clear = clear and bound >= -_FORCE_ROUNDING * size[r]
-    return clear
-
-
-@helper
-def _first_let_go(end, step, p, progress, w, room):
-    """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
-    left, size, known = room.left, room.scale, holding(progress)
-    size[:] = 0.0
-    room.waiting[0, 0], room.waiting[0, 1], waiting = 0.0, end, 1
-    while waiting > 0:
-        begin, width = room.waiting[waiting - 1, 0], room.waiting[waiting - 1, 1]
-        low, high = 0.0, NOWHERE
-        for i in range(_QUARTERS + 1):
-            here = begin + width * i / _QUARTERS
-            if known and (here == 0.0 or here == 1.0):
-                left[i, :] = room.ends[int(here)]
-            else:
-                _forces(here, step, p, progress, w, room, left[i])
-            for r in range(len(size)):
-                size[r] = max(size[r], abs(left[i, r]))
-            if i > 0 and _past(left[i], size):
-                low, high = begin + width * (i - 1) / _QUARTERS, here
-                break
-        if high <= 1.0:
-            _narrow(low, high, step, p, progress, w, room)
-            return
-        if not _clear(left, size) and width > _SHORTEST * end:
-            room.waiting[waiting, 0], room.waiting[waiting - 1, 0] = begin, begin + 0.5 * width
-            room.waiting[waiting, 1] = room.waiting[waiting - 1, 1] = 0.5 * width
-            waiting += 1
-        else:
-            waiting -= 1
-
-
-@helper
 def _search_stops(step, p, progress, room):
     """Note where open stops close.
 
@@ -361,6 +249,10 @@ def _search_stops(step, p, progress, room):
     for j in range(len(s.gap)):
         if progress.closed[j]:
             forces = True
+            continue
+        if room.flights[j, YOUNG] != 0.0:
+            room.place[clusters + j] = first_landing(j, step, p, progress, room)
+            first = min(first, room.place[clusters + j])
             continue
         size = _along(s.Ty[j], 0, Y, room, b)
         size += s.gap[j] + max(abs(p.relief[0]), abs(p.relief[1]))
@@ -446,5 +338,5 @@ def first_changes(step, p, limits, progress, w, room):
         first, forces = _search_clusters(step, p, progress, room)
         first, shorter, forces = _search_nodes(first, forces, step, p, limits, progress, room)
     if forces:
-        _first_let_go(first, step, p, progress, w, room)
+        first_let_go(first, step, p, progress, w, room)
     return shorter

@@ -61,6 +61,7 @@ from fecontact.integrate.nonsmooth.problem import (
     STICK,
     WORKSPACE,
 )
+from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
@@ -75,6 +76,8 @@ from fecontact.system.powers import (
 NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 # Slip velocities below this part of the largest are none, energies gained rounding.
 _NEAR, _GAIN = 1e-9, 1e-10
+# Rounding of penetration rates relative to the largest slip velocity or rate.
+_RATE_ROUNDING = 1e-14
 
 CHANGE = f8(f8, Reference(PROBLEM), Reference(PROGRESS), Reference(ROOM), Reference(WORKSPACE), f8,
             f8, f8, vector)
@@ -303,8 +306,18 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
             if closed[j] and p.cluster[j] == c:
                 status[c] = case.mode[c]
         room.fresh[c] = room.fresh[c] and (status[c] == 1 or status[c] == -1)
-    settle(t, p, status, closed, w, out, Y)
+        # What begins to slip does so from no slip velocity.
+        before[c] = STICK if room.fresh[c] else status[c]
+    settle(t, p, before, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)
+    noise = _RATE_ROUNDING / _NEAR * near
+    for j in range(n):
+        if closed[j]:
+            room.flights[j, YOUNG] = 0.0
+        elif touching[j]:
+            begin_flight(j, noise, p, w, room)
+        elif struck and abs(w.nodes[j, RATE]) > noise:
+            room.flights[j, CLIMB] = -w.nodes[j, RATE]
     return flight
 
 

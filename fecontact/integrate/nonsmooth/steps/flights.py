@@ -1,0 +1,131 @@
+r"""Compiled heights of flights that have just begun at stops on level ground.
+
+A brief flight may rise less than the rounding of places, or even of velocities. Its height g is
+therefore the double integral of its acceleration from the moment at which the stop opened:
+
+.. math::
+
+    g(t) = g_0 + g'_0 (t - t_0) + \int_{t_0}^t (t - \tau)\, g''(\tau)\, d\tau
+
+over each step, until places tell it from zero.
+"""
+
+import numpy as np
+
+from fecontact.core.compiled import helper, routine
+from fecontact.integrate.bernstein import NOWHERE, first_below, from_nested, value
+from fecontact.integrate.nonsmooth.dop853 import DENSE, PARTS, SLOPES, STAGES, B
+from fecontact.integrate.nonsmooth.problem import PENETRATION, RATE
+
+# Columns of ``room.flights``: whether a flight has just begun, its height and the rate of that, and
+# how far places were from the stop where it began.
+YOUNG, HEIGHT, CLIMB, SUNK, FLIGHT_FIELDS = 0, 1, 2, 3, 4
+# Rounding of an acceleration relative to its terms, and heights that places tell from zero,
+# relative to the places.
+_ROUNDING, _CLEAR = 1e-15, 2e-12
+# The same relative to errors of places at the begin of a flight.
+_ABOVE = 10.0
+# Looks before a landing at which the height may be above zero, and halvings between these.
+_LOOKS, _HALVINGS = 64, 50
+# The tick of a problem in longest steps.
+_TICK = 1e-4
+
+
+@helper
+def begin_flight(j, noise, p, w, room):
+    """Begin a flight at a stop that has just opened, as w sees it; rates below ``noise`` are none.
+
+    Its height is counted from where it is, up to rounding and the errors of the steps at rest.
+    """
+    level, rate = p.relief[2] == np.inf or not p.system.on_ground[j], w.nodes[j, RATE]
+    room.flights[j, YOUNG] = 1.0 if level else 0.0
+    room.flights[j, HEIGHT] = 0.0
+    room.flights[j, CLIMB] = -rate if -rate > noise else 0.0
+    room.flights[j, SUNK] = abs(w.nodes[j, PENETRATION])
+
+
+@helper
+def _acceleration_size(j, p, progress, room):
+    """Size of the terms of the acceleration of the height of stop j."""
+    s, Y = p.system, progress.state
+    m, total = s.Ty.shape[1], 0.0
+    for i in range(m):
+        size = abs(room.pushes[i]) + abs(room.slopes[0, m + i])
+        for k in range(m):
+            size += abs(s.stiffness[i, k] * Y[k]) + abs(s.damping[i, k] * Y[m + k])
+        total += abs(s.Ty[j, i]) * size
+    return total
+
+
+@routine
+def _rise(j, step, p, progress, room):
+    """Put the height of a young flight over the step into ``room.heights``, Bernstein coefficients.
+
+    Those of its rate are put into ``room.along``. Returns the rounding of the height at the end.
+    """
+    row, pull, c, h = p.system.Ty[j], room.pull, room.nested, step.h
+    rate, heights, m = room.along, room.heights, p.rows.shape[1]
+    for k in range(SLOPES):
+        pull[k] = 0.0
+        for i in range(m):
+            pull[k] += row[i] * room.slopes[k, m + i]
+    change = 0.0
+    for k in range(STAGES):
+        change += h * B[k] * pull[k]
+    c[0], c[1] = room.flights[j, CLIMB], change
+    c[2] = h * pull[0] - change
+    c[3] = 2.0 * change - h * (pull[STAGES] + pull[0])
+    for q in range(len(DENSE)):
+        c[4 + q] = 0.0
+        for k in range(SLOPES):
+            c[4 + q] += h * DENSE[q, k] * pull[k]
+    from_nested(c, rate)
+    heights[0] = room.flights[j, HEIGHT]
+    for k in range(PARTS + 1):
+        heights[k + 1] = heights[k] + h / (PARTS + 1) * rate[k]
+    # What is given at a time has the rounding of the time.
+    return (_ROUNDING * (1.0 + _TICK * abs(step.t) / p.tick)
+            * _acceleration_size(j, p, progress, room) * h * h)
+
+
+@routine
+def first_landing(j, step, p, progress, room):
+    """First part of the step at which a young flight is at its end; NOWHERE if it is not.
+
+    A fall below the rounding of the height tells that it has ended, its height when.
+    """
+    rounding, heights, scratch = _rise(j, step, p, progress, room), room.heights, room.halves[0]
+    for i in range(len(heights)):
+        heights[i] += rounding
+    high = first_below(heights, room.halves)
+    if high > 1.0:
+        return NOWHERE
+    for look in range(_LOOKS):
+        low = high * (1.0 - (look + 1) / _LOOKS)
+        if value(heights, low, scratch) <= rounding:
+            continue
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if value(heights, middle, scratch) > rounding:
+                low = middle
+            else:
+                high = middle
+        break
+    return high
+
+
+@routine
+def advance(part, step, p, progress, room):
+    """Take young flights up to a part of the step, of which ``room`` knows."""
+    s, Y = p.system, progress.state
+    for j in range(len(room.flights)):
+        if room.flights[j, YOUNG] == 0.0:
+            continue
+        _rise(j, step, p, progress, room)
+        size = s.gap[j] + max(abs(p.relief[0]), abs(p.relief[1]))
+        for i in range(p.rows.shape[1]):
+            size += abs(s.Ty[j, i]) * (abs(Y[i]) + abs(room.parts[0, i]))
+        room.flights[j, HEIGHT] = max(value(room.heights, part, room.halves[0]), 0.0)
+        room.flights[j, CLIMB] = value(room.along, part, room.halves[0])
+        if room.flights[j, HEIGHT] > _CLEAR * size + _ABOVE * room.flights[j, SUNK]:
+            room.flights[j, YOUNG] = 0.0

@@ -1,0 +1,185 @@
+"""Compiled search of a step for the moment at which clusters that stick or stops that hold let go.
+
+Forces are evaluated at a few places; the polynomial through these, less its last part, which tells
+how far it can be trusted, bounds them. A part of the step that this leaves open is halved and
+looked at again, and at last where least is left.
+"""
+
+import numpy as np
+
+from fecontact.core.compiled import helper, routine
+from fecontact.integrate.bernstein import NOWHERE, fit
+from fecontact.integrate.nonsmooth.dop853 import interpolate
+from fecontact.integrate.nonsmooth.equations import set_limits
+from fecontact.integrate.nonsmooth.problem import FORCE, OPEN, STICK
+from fecontact.integrate.nonsmooth.steps.rates import set_rates
+
+# Rounding of forces that come from a system of equations, relative to their size.
+_FORCE_ROUNDING = 1e-13
+# Forces are looked at in quarters of a part of the step.
+QUARTERS = 4
+_FIT_QUARTERS = fit(np.arange(QUARTERS + 1) / QUARTERS)
+# Size of the part of degree four over its fourth difference, 1 / (128 * 4! / 4^4).
+_LAST = 1.0 / 12.0
+_SHORTEST = 2.0**-8
+# Parabolas by which the least of a force is found, and how much closer each is than the one before.
+_PARABOLAS, _CLOSER = 3, 1.0 / 32.0
+
+
+@helper
+def holding(progress):
+    """Whether any cluster sticks or any stop is closed."""
+    held = False
+    for c in range(len(progress.status)):
+        held = held or progress.status[c] == STICK
+    for j in range(len(progress.closed)):
+        held = held or progress.closed[j] != 0
+    return held
+
+
+@routine
+def set_left(p, progress, w, out):
+    """Fill out (2 k + n,) with what sticking clusters and closed stops have left, both ways.
+
+    Forces are those in w.
+    """
+    status, closed, clusters = progress.status, progress.closed, len(p.rows)
+    set_limits(p, w)
+    out[:] = 1.0
+    for k in range(clusters):
+        if status[k] == STICK:
+            inside = w.pressing[k] > 0.0
+            out[k] = w.limit[k] - w.total[k] if inside else -1.0
+            out[clusters + k] = w.limit[k] + w.total[k] if inside else -1.0
+        elif status[k] == OPEN:
+            out[k] = -1.0 if w.pressing[k] > 0.0 else 1.0
+    for j in range(len(closed)):
+        if closed[j]:
+            out[2 * clusters + j] = w.nodes[j, FORCE]
+
+
+@routine
+def _forces(part, step, p, progress, w, room, out):
+    """Fill out (2 k + n,) with what is left at a part of the step."""
+    interpolate(part, progress.state, room.parts, room.state[: 2 * p.rows.shape[1]])
+    set_rates(min(step.t + part * step.h, step.latest), room.state, p, progress, w, room,
+              room.rate)
+    set_left(p, progress, w, out)
+
+
+@helper
+def _past(out, size):
+    past = False
+    for r in range(len(out)):
+        past = past or out[r] < -_FORCE_ROUNDING * size[r]
+    return past
+
+
+@helper
+def _narrow(low, high, step, p, progress, w, room):
+    """Note what lets go first between two parts of the step, at the earliest moment."""
+    clusters, left, size = len(p.rows), room.left, room.scale
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        _forces(middle, step, p, progress, w, room, left[0])
+        if _past(left[0], size):
+            high = middle
+        else:
+            low = middle
+    _forces(high, step, p, progress, w, room, left[0])
+    for r in range(len(size)):
+        if left[0, r] < -_FORCE_ROUNDING * size[r]:
+            room.place[r if r < clusters else r - clusters] = high
+
+
+@helper
+def _bound(r, left):
+    """Lower bound of what r has left between the quarters of a part, as far as they tell."""
+    last = _LAST * abs(left[0, r] - 4.0 * left[1, r] + 6.0 * left[2, r]
+                       - 4.0 * left[3, r] + left[4, r])
+    least = np.inf
+    for k in range(QUARTERS + 1):
+        bound = -last
+        for i in range(QUARTERS + 1):
+            bound += _FIT_QUARTERS[k, i] * left[i, r]
+        least = min(least, bound)
+    return least
+
+
+@helper
+def _clear(left, size):
+    """Whether nothing lets go between the quarters of a part, as far as they tell."""
+    clear = True
+    for r in range(len(size)):
+        clear = clear and _bound(r, left) >= -_FORCE_ROUNDING * size[r]
+    return clear
+
+
+@helper
+def _lowest(begin, width, step, p, progress, w, room):
+    """Where in a part of the step something lets go for a moment between the quarters.
+
+    NOWHERE if it does not. The vertices of parabolas lead to where least is left.
+    """
+    left, size, scratch = room.left, room.scale, room.left[QUARTERS + 1]
+    for r in range(len(size)):
+        if _bound(r, left) >= -_FORCE_ROUNDING * size[r]:
+            continue
+        least, apart = 0, width / QUARTERS
+        for i in range(1, QUARTERS + 1):
+            least = i if left[i, r] < left[least, r] else least
+        middle = begin + apart * least
+        for _ in range(_PARABOLAS):
+            middle = min(max(middle, begin + apart), begin + width - apart)
+            _forces(middle - apart, step, p, progress, w, room, scratch)
+            before = scratch[r]
+            _forces(middle + apart, step, p, progress, w, room, scratch)
+            after = scratch[r]
+            _forces(middle, step, p, progress, w, room, scratch)
+            curved = before - 2.0 * scratch[r] + after
+            if curved > 0.0:
+                middle += 0.5 * apart * (before - after) / curved
+            middle = min(max(middle, begin), begin + width)
+            _forces(middle, step, p, progress, w, room, scratch)
+            if _past(scratch, size):
+                return middle
+            apart *= _CLOSER
+    return NOWHERE
+
+
+@helper
+def first_let_go(end, step, p, progress, w, room):
+    """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
+    left, size, known = room.left, room.scale, holding(progress)
+    size[:] = 0.0
+    room.waiting[0, 0], room.waiting[0, 1], waiting = 0.0, end, 1
+    while waiting > 0:
+        begin, width = room.waiting[waiting - 1, 0], room.waiting[waiting - 1, 1]
+        low, high = 0.0, NOWHERE
+        for i in range(QUARTERS + 1):
+            here = begin + width * i / QUARTERS
+            if known and (here == 0.0 or here == 1.0):
+                left[i, :] = room.ends[int(here)]
+            else:
+                _forces(here, step, p, progress, w, room, left[i])
+            for r in range(len(size)):
+                size[r] = max(size[r], abs(left[i, r]))
+            if i > 0 and _past(left[i], size):
+                low, high = begin + width * (i - 1) / QUARTERS, here
+                break
+        if high <= 1.0:
+            _narrow(low, high, step, p, progress, w, room)
+            return
+        clear = _clear(left, size)
+        if not clear and width > _SHORTEST * end:
+            room.waiting[waiting, 0], room.waiting[waiting - 1, 0] = begin, begin + 0.5 * width
+            room.waiting[waiting, 1] = room.waiting[waiting - 1, 1] = 0.5 * width
+            waiting += 1
+            continue
+        high = NOWHERE if clear else _lowest(begin, width, step, p, progress, w, room)
+        if high <= 1.0:
+            _narrow(begin, high, step, p, progress, w, room)
+            return
+        waiting -= 1
