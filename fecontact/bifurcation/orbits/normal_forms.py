@@ -202,7 +202,8 @@ class Expansion:
     def _turned(self, bend: Array, closing: complex) -> Array:
         """The h with h' - A h = T bend at the points and h(1) = closing h(0), complex."""
         side = (self._T * self._h * bend).reshape(-1)
-        shaped = solve_turned(self._linearised.factors, side, closing).reshape(bend.shape)
+        shaped: Array = solve_turned(
+            self._linearised.factors, side, closing).reshape(bend.shape)
         return at_points(self._problem, shaped, closing * shaped[0])
 
 
