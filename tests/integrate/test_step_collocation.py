@@ -19,6 +19,7 @@ from fecontact.laws import (
     ConstantFriction,
     DahlFriction,
     ExponentialFriction,
+    Harmonics,
     LinearContact,
     PrescribedForce,
     RoughSurface,
@@ -149,6 +150,58 @@ def test_a_ball_that_bounces(damping):
     scale = np.abs(wanted).max(axis=0)
     assert (np.abs(run.states - wanted) / scale).max() < 5e-9
     assert run.attempts < 400
+
+
+def test_the_work_of_a_ball_that_bounces():
+    """What the dashpot takes is what motion and spring lose, though its force jumps."""
+    g, c, damping, height = 9.81, 1e4, 6.0, 0.05
+    system = mass_in_y(normal=LinearContact(c, damping), friction=ConstantFriction(0.0),
+                       load=Load(normal=g))
+    for rtol in (1e-8, 1e-10):
+        run = simulate(system, 1.6, initial=np.array([height, 0.0]), outputs=400, rtol=rtol,
+                       solver=LONG)
+        y, v = run.states.T
+        energy = 0.5 * v**2 + g * y + 0.5 * c * np.minimum(y, 0.0) ** 2
+        taken = run.energies.contact_damping
+        assert taken[-1] > 0.1 * energy[0]
+        assert np.abs(taken - (energy[0] - energy)).max() < 1e-9 * energy[0]
+        assert run.energies.growth < 1e-9
+
+
+def test_work_from_rest_without_loads():
+    """A brief touch of a dashpot, in a run that begins with no energy at all."""
+    c, damping = 2.7e5, 20.0
+    push = PointLoad("C", "y", signal=Harmonics((-5.0, -1.0), (30.0, 1000.0)))
+    system = mass_in_y(normal=LinearContact(c, damping), friction=ConstantFriction(0.0),
+                       gap=1e-3, load=Load(forces=(push,)))
+    for rtol in (1e-8, 1e-10):
+        run = simulate(system, 0.3, initial=np.zeros(2), outputs=301, rtol=rtol, solver=LONG)
+        balance = run.energies
+        assert balance.contact_damping[-1] > 1e-3 * np.abs(balance.stored).max()
+        missing = balance.stored - balance.work + balance.lost
+        assert np.abs(missing).max() < 1e-9 * np.abs(balance.stored).max()
+
+
+def test_work_of_creep():
+    """Friction's work at slip velocities of stick: between passages of them, in dense outputs."""
+    law, V, begin = ExponentialFriction(0.8, 0.55, 1000.0, 1.8e4), 1e-3, np.array([1e-3, 0.0])
+    system = mass_in_x(4.0, normal=PrescribedForce(10.0), ground=Ground(speed=V), friction=law,
+                       drive=Drive(stiffness_x=3000.0, damping_x=0.5, amplitude_x=2e-3,
+                                   angular_frequency=60.0))
+    times = np.linspace(0.0, 0.3, 300001)
+    tight = simulate(system, 0.3, initial=begin, outputs=times, solver=STEPS, rtol=1e-11)
+    work, beyond = tight.node_friction_work[:, 0], np.abs(tight.states[:, 1] - V)
+    beyond -= law.stick_velocity(1)[0]
+    last = np.flatnonzero(beyond[1:] * beyond[:-1] < 0.0)
+    part = beyond[last] / (beyond[last] - beyond[last + 1])
+    at = np.concatenate([work[:1], work[last] + part * np.diff(work)[last], work[-1:]])
+    creeps = np.append(beyond[last], beyond[-1]) < 0.0
+    wanted = np.diff(at)[creeps].sum()
+    assert len(last) == 5
+    assert wanted < 0.01 * work[-1]
+    for rtol in (1e-7, 1e-8, 1e-9, 1e-10):
+        run = simulate(system, 0.3, initial=begin, outputs=31, solver=LONG, rtol=rtol)
+        assert run.node_creep_work[-1, 0] == pytest.approx(wanted, rel=1e-6)
 
 
 def test_steps_end_where_slip_turns_round():

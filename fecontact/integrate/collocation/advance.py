@@ -233,17 +233,18 @@ def _advance_by(problem, progress, room, output, c, most):
         step = _span(t, h, exactly, control.breaks, end)
         _set_given(step, np.nextafter(t, end), problem.system, c)
         foretell(step.h, progress, c)
-        solved = solve_stages(step.h, 2.0 * past if exactly else 0.0, problem, progress, room, c)
-        error = np.inf
+        before = 2.0 * past if exactly else 0.0
+        solved = solve_stages(step.h, before, problem, progress, room, c)
+        error = moved = np.inf
         if solved:
             set_courses(step.h, progress, c)
-            error = step_error(step, problem, progress, room, c)
+            error = moved = step_error(step, problem, progress, room, c)
             if error <= 1.0 and control.work:
-                error = max(error, work_error(step, problem, progress, room, c))
+                error = max(error, work_error(step, before, problem, progress, room, c))
         # A switch nearer to an end is there, as far as the time can tell.
         near, part = max(_LOCATED, _TIME * abs(t) / step.h), 2.0
         if again < _MOST_AGAIN:
-            part = _switch(step.h, near, solved, error, problem, progress, c)
+            part = _switch(step.h, near, solved, moved, problem, progress, c)
         if part < 1.0 - max(near, _AT_END if error <= 1.0 else 0.0):
             counts[REJECTIONS] += 1
             whole = max(whole, step.h)

@@ -1,9 +1,11 @@
 """The course of a step by collocation: its error, its work, and where forces switch."""
 
+import numpy as np
+
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import backward, factorise, forward
 from fecontact.integrate import bernstein
-from fecontact.integrate.collocation.stages import place_scale, set_stage, speed_scale
+from fecontact.integrate.collocation.stages import move_back, place_scale, set_stage, speed_scale
 from fecontact.integrate.collocation.tableau import (
     AT_PLACES,
     LOOKS,
@@ -147,27 +149,41 @@ def powers_at(t, y, problem, room, out):
                         s, room.scratch.force[0], room.scratch.rates[0], out, out[POWER_COUNT:])
 
 
+@helper
+def _energy_scale(h, control, progress, c):
+    """Energy relative to which errors of work count: the largest so far, or of the step."""
+    m, kinetic, energy = c.accelerations.shape[1], 0.0, control.energy_scale
+    for k in range(m):
+        kinetic += 0.5 * c.after[m + k] ** 2
+        # A run from rest without loads begins with no energy: that at the scale of velocities.
+        if control.energy_scale == np.inf:
+            energy = min(energy, 0.5 * (control.speed_scale / control.largest[k]) ** 2)
+    energy = max(energy, max(progress.numbers[ENERGY], kinetic))
+    for k in range(POWER_COUNT):
+        energy = max(energy, max(abs(progress.work[k]), h * abs(c.powers[STAGES, k])))
+    progress.numbers[ENERGY] = energy
+    return energy
+
+
 @routine
-def work_error(step, problem, progress, room, c):
-    """Error of the work of a step in units of what is allowed; fills the powers and their works."""
-    h, m, count = step.h, c.accelerations.shape[1], len(c.looked)
+def work_error(step, before, problem, progress, room, c):
+    """Error of the work of a step in units of what is allowed; fills the powers and their works.
+
+    The last powers are taken that part of the step ``before`` its end, as the forces are.
+    """
+    h, count = step.h, len(c.looked)
     for k in range(count):
         c.powers[0, k] = progress.power[k]
     for i in range(STAGES):
         set_stage(i, h, progress, c)
+        if i == STAGES - 1 and before > 0.0:
+            move_back(before, h, c)
         powers_at(min(step.t + POINTS[i] * h, step.latest), c.y, problem, room, c.powers[i + 1])
-    kinetic = 0.0
-    for k in range(m):
-        kinetic += 0.5 * c.after[m + k] ** 2
-    energy = max(max(progress.numbers[ENERGY], kinetic), problem.control.energy_scale)
-    for k in range(POWER_COUNT):
-        energy = max(energy, abs(progress.work[k]))
-    progress.numbers[ENERGY] = energy
-    missing = 0.0
+    energy, missing = _energy_scale(h, problem.control, progress, c), 0.0
     for at in range(LOOKS):
         look(at, c)
         powers_at(min(step.t + PLACES[at] * h, step.latest), c.y, problem, room, c.looked)
-        for k in range(POWER_COUNT):
+        for k in range(count):
             power = c.looked[k]
             for i in range(RATE_TERMS):
                 power -= AT_PLACES[at, i] * c.powers[i, k]

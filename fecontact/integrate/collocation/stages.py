@@ -34,6 +34,18 @@ def set_stage(i, h, progress, c):
 
 
 @helper
+def move_back(before, h, c):
+    """Put the state that part of the step ``before`` the last stage, at which it is, into ``c.y``.
+
+    Towards the end of a step that ends at a switch of forces: its side of the switch.
+    """
+    m = c.accelerations.shape[1]
+    for k in range(m):
+        c.y[k] -= before * h * c.y[m + k]
+        c.y[m + k] -= before * h * c.accelerations[STAGES, k]
+
+
+@helper
 def place_scale(k, problem, progress):
     """Size of the displacement of mode k, relative to which its errors count."""
     return max(max(progress.extremes[k], abs(progress.state[k])),
@@ -75,9 +87,7 @@ def _improve(h, before, anew, problem, progress, room, c):
     for i in range(STAGES):
         set_stage(i, h, progress, c)
         if i == STAGES - 1 and before > 0.0:
-            for k in range(m):
-                c.y[k] -= before * h * c.y[m + k]
-                c.y[m + k] -= before * h * c.accelerations[STAGES, k]
+            move_back(before, h, c)
         dynamics.set_rate_and_gradients(c.y, s, blocks, c.given[i], c.load[i], room.nodes,
                                         room.scratch, c.rate)
         if anew:
