@@ -1,5 +1,9 @@
 """Steps by collocation that must not become short: breaks, bilateral laws, nodes at rest, NaN."""
 
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from systems import friction_oscillator, mass_in_y
@@ -7,6 +11,7 @@ from systems import friction_oscillator, mass_in_y
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, simulate
 from fecontact.integrate import Rodas5P
+from fecontact.integrate.collocation import tableau
 from fecontact.integrate.rodas5p import driver, step_loop
 from fecontact.integrate.rodas5p.state import REJECTIONS, WORST_NODE
 from fecontact.laws import (
@@ -15,10 +20,13 @@ from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,
     LinearContact,
+    NormalLaw,
+    PerNode,
     PrescribedForce,
     Pulse,
     RoughSurface,
     Step,
+    normal_law,
 )
 
 NEVER = Rodas5P(series="never", collocation="never")
@@ -179,3 +187,40 @@ def test_the_node_that_shortens_steps():
         assert status == step_loop.FINISHED
         assert run.progress.counts[REJECTIONS] > 0
         assert run.progress.counts[WORST_NODE] == (forces[0] == 0.0)
+
+
+@normal_law
+def _torn(u, v, p):
+    """No force, except that it is not a number in a gap between two stages of a step."""
+    if p[0] < u < p[1]:
+        return math.nan, 0.0, 0.0
+    return 0.0, 0.0, 0.0
+
+
+@dataclass(frozen=True)
+class Torn(NormalLaw):
+    kernel: ClassVar = _torn
+    low: PerNode = 0.0
+    high: PerNode = 0.0
+
+    @property
+    def penetration_scale(self):
+        return 100.0
+
+
+@pytest.mark.parametrize("work", [True, False])
+def test_what_is_not_a_number_is_an_error(work):
+    """A mass falls at 1 m/s; where the error of a step is looked for its force is NaN."""
+    h, place = 0.01, tableau.PLACES[0]
+    assert tableau.POINTS[0] < place - 0.01 < place + 0.01 < tableau.POINTS[1]
+    times, quiet = [0.0, 2.0], mass_in_y(normal=Torn(9.0, 9.0), friction=ConstantFriction(0.0))
+    run, _ = ended(quiet, [0.0, -1.0], times, work=work, max_step=h)
+    assert run.progress.counts[REJECTIONS] == 0
+    # Where a step in the middle of that run begins.
+    part = driver.start(quiet, np.array([0.0, -1.0]), np.array(times), rtol=1e-8, work=work,
+                        series="never", collocation="always", max_step=h)
+    part.advance(100)
+    begin = part.time
+    torn = quiet.with_(normal=Torn(begin + (place - 0.01) * h, begin + (place + 0.01) * h))
+    run, _ = ended(torn, [0.0, -1.0], times, work=work, max_step=h)
+    assert run.progress.counts[REJECTIONS] > 0

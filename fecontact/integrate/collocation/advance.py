@@ -225,8 +225,9 @@ def _advance_by(problem, progress, room, output, c, most):
         if new:
             if attempts >= most:
                 break
-            # What is predicted may be less: it is tried whether a step is possible at all.
-            h = max(h, smallest)
+            # What is predicted may be too short to move the time.
+            if not t + h > t:
+                h = smallest
             if c.flags[BEGINS] != 0:
                 _begin(t, end, problem, progress, room, c)
             _take_scales(control, progress)
