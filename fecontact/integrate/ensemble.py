@@ -96,7 +96,8 @@ def ensemble(
     powers, which do not limit its steps. Threads share the cores. On each, eight runs of plane
     systems of one node and up to three modes, or two of each, go side by side: on level and even
     ground, with common laws without memory, constant or harmonic excitation, and no events. They
-    differ by rounding from single runs without collocation; one alone takes up to twice as long.
+    are by steps of Rodas5P at any ``rtol``, by collocation only if the solver says 'always', and
+    differ by rounding from single runs without it; one alone takes up to twice as long.
 
     Parameters
     ----------

@@ -332,7 +332,7 @@ def test_runs_that_fail():
     system = mass_in_y(normal=LinearContact(1e10), friction=ConstantFriction(0.0))
     run = driver.start(system, np.array([-1e300, 0.0]), np.array([0.0, 1.0]), rtol=1e-8,
                        collocation="always")
-    assert run.advance(10**4) in (step_loop.MINIMUM_STEP, step_loop.NOT_FINITE)
+    assert run.advance(10**4) == step_loop.NOT_FINITE
 
 
 # Choice ------------------------------------------------------------------------------------------

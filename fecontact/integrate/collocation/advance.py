@@ -225,12 +225,15 @@ def _advance_by(problem, progress, room, output, c, most):
         if new:
             if attempts >= most:
                 break
+            # What is predicted may be too short to move the time.
+            if not t + h > t:
+                h = smallest
             if c.flags[BEGINS] != 0:
                 _begin(t, end, problem, progress, room, c)
             _take_scales(control, progress)
             new, again, whole = False, 0, 0.0
         attempts += 1
-        step = _span(t, h, exactly, control.breaks, end)
+        wanted, step = h, _span(t, h, exactly, control.breaks, end)
         _set_given(step, np.nextafter(t, end), problem.system, c)
         foretell(step.h, progress, c)
         before = 2.0 * past if exactly else 0.0
@@ -242,7 +245,7 @@ def _advance_by(problem, progress, room, output, c, most):
             if error <= 1.0 and control.work:
                 error = max(error, work_error(step, before, problem, progress, room, c))
         # A switch nearer to an end is there, as far as the time can tell.
-        near, part = max(_LOCATED, _TIME * abs(t) / step.h), 2.0
+        near, part = max(_LOCATED, max(_TIME * abs(t), smallest) / step.h), 2.0
         if again < _MOST_AGAIN:
             part = _switch(step.h, near, solved, moved, problem, progress, c)
         if part < 1.0 - max(near, _AT_END if error <= 1.0 else 0.0):
@@ -259,14 +262,16 @@ def _advance_by(problem, progress, room, output, c, most):
             exactly = False
             if not h >= smallest:
                 numbers[TIME], numbers[STEP] = t, h
-                return MINIMUM_STEP if np.isfinite(c.accelerations[0, 0]) else NOT_FINITE
+                return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
         _write(step, problem, progress, output, c)
         _go_on(step, exactly, problem, progress, output, c)
         t, new, ends, exactly = step.target, True, exactly, False
         h = _next_length(step.h, error, numbers, c.flags[ITERATIONS])
-        if ends:
-            # A step cut short says little of the length of the next one.
+        # A step cut short, at a switch or a break, says little of the length of the next one.
+        if step.at_break:
+            whole = max(whole, wanted)
+        if ends or step.at_break:
             h = max(h, min(whole, whole * _growth(error)))
         h = min(h, control.longest)
     numbers[TIME], numbers[STEP] = t, h

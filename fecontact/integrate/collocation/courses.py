@@ -23,7 +23,7 @@ from fecontact.integrate.collocation.tableau import (
     TO_BERNSTEIN,
 )
 from fecontact.integrate.rodas5p import dynamics, stage_solver
-from fecontact.integrate.rodas5p.state import ENERGY, RATES
+from fecontact.integrate.rodas5p.state import ENERGY, RATES, WORST_NODE
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import ground_motion, node_motion
 from fecontact.system.powers import (
@@ -35,6 +35,8 @@ from fecontact.system.powers import (
 
 # Resolution of 2 s - 1 where a force begins or ends.
 _RESOLVED = 1e-14
+# Parts of what a gap or a slip velocity is the sum of that are its rounding.
+_NOISE = 1e-14
 
 
 @helper
@@ -121,6 +123,9 @@ def step_error(step, problem, progress, room, c):
         backward(c.small, m, c.small_right, c.small_right)
         for k in range(m):
             missing = abs(c.small_right[k])
+            # Comparisons with NaN are false, and the larger of it and a number is the number.
+            if not missing < np.inf:
+                return np.inf
             error = max(error, missing * g * control.largest[k] / (speeds * c.tolerance))
             scale = max(place_scale(k, problem, progress), abs(c.after[k])) * c.tolerance
             error = max(error, missing * to_place / scale)
@@ -130,8 +135,10 @@ def step_error(step, problem, progress, room, c):
                 for k in range(m):
                     slip += s.Tx[j, k] * c.small_right[k]
                 distance = abs(room.nodes[1, j] - s.sliding[j] * room.given[dynamics.SPEED])
-                error = max(error, abs(slip) * g / (control.slip_part * (control.slip_scale[j]
-                                                                         + distance)))
+                part = abs(slip) * g / (control.slip_part * (control.slip_scale[j] + distance))
+                if part > error:
+                    error = part
+                    progress.counts[WORST_NODE] = j
     progress.counts[RATES] += LOOKS
     return error
 
@@ -188,6 +195,8 @@ def work_error(step, before, problem, progress, room, c):
             for i in range(RATE_TERMS):
                 power -= AT_PLACES[at, i] * c.powers[i, k]
             missing = max(missing, abs(power) * SPEED_PART[at])
+            if not abs(power) < np.inf:
+                missing = np.inf
     for k in range(count):
         for power in range(SPEED_TERMS):
             total = 0.0
@@ -199,10 +208,10 @@ def work_error(step, before, problem, progress, room, c):
 
 
 @routine
-def _first_change(after, c):
+def _first_change(after, noise, c):
     """First part of the step beyond ``after`` at which a course changes its sign, 2 if none.
 
-    Its coefficients are in ``c.line[0]``, by powers of x.
+    Its coefficients are in ``c.line[0]``, by powers of x. One below ``noise`` has no sign.
     """
     b = c.line[1]
     for i in range(PLACE_TERMS):
@@ -210,7 +219,8 @@ def _first_change(after, c):
         for power in range(PLACE_TERMS):
             total += TO_BERNSTEIN[i, power] * c.line[0, power]
         b[i] = total
-    if bernstein.smallest(b) > 0.0 or bernstein.largest(b) < 0.0:
+    low, high = bernstein.smallest(b), bernstein.largest(b)
+    if low > 0.0 or high < 0.0 or max(-low, high) <= noise:
         return 2.0
     for k in range(bernstein.sign_changes(b, c.halves, c.line[2], c.found)):
         if c.found[k] > after:
@@ -249,41 +259,54 @@ def first_switch(after, problem, c):
     """First part of a step beyond ``after`` where the force of a node may have a kink, 2 if none.
 
     Where normal forces begin or end, where penetrations pass the depth of their law, where slip of
-    a node that is pressed changes its direction, and where it becomes creep or ceases to be.
+    a node that is pressed changes its direction, and where it becomes creep or ceases to be. What
+    stays within rounding, or so near that the run does not resolve it, does not count: a node at
+    rest would switch without end.
     """
     s, control, line = problem.system, problem.control, c.line[0]
     m, first, levels = c.accelerations.shape[1], 2.0, control.levels.shape[0]
     for j in range(len(s.gap)):
+        size = abs(s.gap[j])
         for power in range(PLACE_TERMS):
             line[power] = 0.0
             for k in range(m):
-                line[power] -= s.Ty[j, k] * c.places[power, k]
+                term = s.Ty[j, k] * c.places[power, k]
+                line[power] -= term
+                size += abs(term)
         line[0] -= s.gap[j]
         reached = abs(line[0])
         for power in range(1, PLACE_TERMS):
             reached += abs(line[power])
-        passed = 0.0
+        # Levels are 1e100 where a force never ends: each is taken from the same number.
+        centre, noise = line[0], max(_NOISE * size, c.tolerance * control.depth[j])
         for level in range(levels + 1):
             here = control.levels[level, j] if level < levels else control.depth[j]
-            line[0] += passed - here
-            passed = here
-            first = min(first, _first_change(after, c))
-        release = _release(j, s, c)
-        if after < release < first:
-            first = release
+            line[0] = centre - here
+            first = min(first, _first_change(after, noise, c))
+        if reached > noise:
+            release = _release(j, s, c)
+            if after < release < first:
+                first = release
         if not reached > control.untouched[j]:
             continue
+        size = 0.0
         for power in range(PLACE_TERMS):
             line[power] = 0.0
         for power in range(SPEED_TERMS):
             for k in range(m):
-                line[power] += s.Tx[j, k] * c.rates[power, k]
+                term = s.Tx[j, k] * c.rates[power, k]
+                line[power] += term
+                size += abs(term)
         for power in range(RATE_TERMS):
+            ground = 0.0
             for i in range(RATE_TERMS):
-                line[power] -= s.sliding[j] * RATE_POWERS[power, i] * c.speeds[i]
-        creep = control.stick_speed[j]
+                ground += RATE_POWERS[power, i] * c.speeds[i]
+            line[power] -= s.sliding[j] * ground
+            size += abs(ground)
+        creep, noise = control.stick_speed[j], max(_NOISE * size,
+                                                   c.tolerance * control.slip_scale[j])
         line[0] += creep
         for _ in range(3 if creep > 0.0 else 1):
-            first = min(first, _first_change(after, c))
+            first = min(first, _first_change(after, noise, c))
             line[0] -= creep
     return first

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
@@ -87,8 +87,9 @@ def start(
         the system is given with the parameter moved up and down, ``width`` apart. Steps then end
         where normal forces begin, end or pass the depth of their law, at output times too.
     vary_rtol : float, optional
-        Error of one step of the derivatives, relative to the largest they have been; ten times
-        ``rtol`` of their size by default, or of a tenth of the largest.
+        Error of one step of the derivatives, relative to the largest they have been. By default
+        ten times ``rtol`` of their size, or of a tenth of the largest; 200 times ``rtol`` where
+        they go over a step in parts, which :func:`in_parts` says.
     events : sequence of ContactEvents, Crossing and Event
         What to watch for.
     series : 'auto', 'always' or 'never'
@@ -105,7 +106,8 @@ def start(
     if vary:
         # Derivatives are those of all nodes.
         control.untouched[:] = -np.inf
-        control = control._replace(breaks=np.union1d(control.breaks, times[1:-1]))
+        control = control._replace(breaks=np.union1d(
+            _apart(control.breaks, times, times), times[1:-1]))
         columns = len(state)
         if not isinstance(vary, bool):
             above, below, width = vary
@@ -198,11 +200,25 @@ def control_for(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
         largest=largest, untouched=untouched,
-        breaks=np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        breaks=_apart(system.breakpoints(float(times[0]), float(times[-1])), times[[0, -1]],
+                      times),
         levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), unfelt=first_unfelt.address)
+
+
+def _apart(breaks: ArrayLike, others: Array, times: Array) -> Array:
+    """The ascending breaks, without those that only rounding tells from one before or ``others``.
+
+    No step fits between such: 0.1 + 0.2 and 0.3 are meant to be one time.
+    """
+    close = 1e-14 * max(abs(float(times[0])), abs(float(times[-1])))
+    kept: list[float] = []
+    for one in np.asarray(breaks, dtype=float):
+        if np.abs(others - one).min() > close and not (kept and one - kept[-1] <= close):
+            kept.append(float(one))
+    return np.array(kept)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
