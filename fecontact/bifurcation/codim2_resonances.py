@@ -8,8 +8,7 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import FoldPoint, special_point
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.orbit_methods import Collocation
-from fecontact.bifurcation.orbits.branches import orbit_branch
+from fecontact.bifurcation.orbits.branches import method_of_several, orbit_branch
 from fecontact.bifurcation.orbits.curves.resonant import (
     AWAY,
     StrongResonance,
@@ -143,7 +142,6 @@ def _followed(
     assert motion.parameter_values is not None
     value = float(motion.parameter_values[orbit.field.index(name)])
     return orbit_branch(
-        orbit.field, motion, name,
-        method=Collocation(at.order * orbit.intervals, orbit.degree), options=options,
+        orbit.field, motion, name, method=method_of_several(at), options=options,
         scales=orbit.scales[: orbit.field.dimension], width=width,
         bounds=(value - _ABOUT * width, value + _ABOUT * width), both=True)

@@ -1,5 +1,7 @@
 """Orbits at rest on a stop that lift off, fly and come to rest again, against closed forms."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -30,6 +32,8 @@ from fecontact.bifurcation import (
     periodic_motion,
 )
 from fecontact.bifurcation.events.branches import orbit_from
+from fecontact.bifurcation.events.conditions import DURATION, RATE, Course, of_phase
+from fecontact.bifurcation.events.phases import Phase
 from fecontact.integrate import ContactEvents, SetValued
 from fecontact.laws import ConstantFriction, LinearContact
 
@@ -196,3 +200,16 @@ def test_multipliers_of_motions_that_rest_where_the_period_begins():
     assert branch.message == ("The runs of the orbit were differenced: The motion has events that "
                               "follow each other too closely.")
     assert np.abs(branch.points[0].values["multipliers"]).max() < 1e-6
+
+
+@pytest.mark.parametrize(("order", "left"), [(1, 3.0), (2, 0.75)])
+def test_rates_at_the_ends_of_brief_phases(order, left):
+    """What vanishes as c s^k (tau - s), s from the begin, has the rate -c tau^k at its end."""
+    phase = Phase((), (0,), 0, order=order)
+    for part in (2e-6, 9e-6, 1e-4):
+        course = Course(None, (phase,), np.zeros(1), np.zeros((1, 2)), np.array([part, 1.0 - part]),
+                        np.array([[4.0], [1.0]]))
+        rate = -12.0 / order**2 * part**order
+        (_, what, *_), found = islice(of_phase(course, 0, rate), 2)
+        assert [what, found.what] == [DURATION, RATE]
+        assert found.left == pytest.approx(left, rel=1e-12)

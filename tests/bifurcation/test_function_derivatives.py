@@ -14,6 +14,9 @@ import pytest
 from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import (
     Collocation,
+    ContinuationOptions,
+    PeriodicMotion,
+    codim2_curve,
     equilibrium_branch,
     find_equilibrium,
     orbit_branch,
@@ -205,6 +208,38 @@ def test_rough_derivatives_where_the_complex_step_fails():
         assert P[:, 0, 0] == pytest.approx(-J[:, 0, 0], abs=1e-8)
         with pytest.warns(UserWarning, match="complex step"):
             field.derivatives(np.zeros(2), x, field.values, (0,))
+
+
+def bounded(t, x, p, out):
+    # s' = p + q s - s^3 + tanh(s) / 10 with s = r - 1.
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    s = r - 1.0
+    radial = p[0] + p[1] * s - s * s * s + 0.1 * np.tanh(s)
+    out[0] = radial * x[0] / r - 2.0 * x[1]
+    out[1] = radial * x[1] / r + 2.0 * x[0]
+
+
+def test_curves_do_not_depend_on_what_a_field_was_asked_before():
+    """Where complex numbers overflow far away, a curve beside zero keeps the complex step."""
+    field = vector_field(bounded, {"p": 0.2, "q": 0.3}, 2)
+    assert field.differentiation == "complex"
+    t = np.linspace(0.0, np.pi, 400)
+    circle = 1.8 * np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "p", direction=-1.0,
+                          method=Collocation(intervals=16), bounds=(-0.3, 0.3), scales=np.ones(2))
+    fold = branch.of_kind("fold")[0]
+
+    def curve():
+        return codim2_curve(field, fold, "q", bounds={"p": (-0.3, 0.3), "q": (-0.5, 0.5)},
+                            options=ContinuationOptions(points=10))
+
+    before = curve()
+    with pytest.warns(UserWarning, match="complex step"):
+        field.derivatives(np.zeros(1), np.array([[-800.0, 1.0]]), field.values)
+    after = curve()
+    assert len(after) == len(before) > 5
+    for one, other in zip(before, after, strict=True):
+        assert other.u.tolist() == one.u.tolist()
 
 
 def test_rounding_is_no_derivative_of_zero():

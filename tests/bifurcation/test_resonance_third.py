@@ -207,6 +207,25 @@ def test_forced_van_der_pol():
     assert saddles.points[0].values["unstable"] == 1
 
 
+def test_orbits_of_three_periods_are_as_accurate_as_those_of_one():
+    """The tolerances and the limit of intervals, three of them for each, are those of the curve."""
+    field, t, circle = circle_field(third, e=-0.2, f=-0.1, B1=B.real, B2=B.imag)
+    method = Collocation(16, tolerance=1e-8, most_intervals=100, state_tolerance=1e-8)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "e", method=method,
+                          bounds=BOX["e"], scales=np.ones(3))
+    tori = codim2_curve(field, branch.of_kind("Neimark-Sacker")[0], "f", bounds=BOX)
+    point, = tori.of_kind("resonance 1:3")
+    saddles = orbit_branch(field, point, bounds=BOX["e"], options=ContinuationOptions(points=3))
+    folds = codim2_curve(field, point, "f", bounds=BOX, options=ContinuationOptions(points=3))
+    for found in (saddles, folds):
+        assert found.attributes["tolerance"] == 1e-8
+        assert found.attributes["state_tolerance"] == 1e-8
+        assert found.attributes["most_intervals"] == 300
+        assert found.attributes["intervals"] % 3 == 0
+        assert found.column("state_error").max() <= 1e-8
+        assert found.message == ""
+
+
 def test_what_is_not_there(strong):
     field, point = strong
     with pytest.raises(InputError, match="must be one of them"):

@@ -26,6 +26,9 @@ _PLACES, _ONCE_MORE = 9, 1.0 + 0.02 * np.arange(5)
 # Part of the period below which what vanishes at both ends of a phase has no minimum between them,
 # and part of a phase in which what vanishes at its begin with speed and acceleration is rounding.
 _SHORT, _FLAT = 1e-2, 0.02
+# Parts of the period below which a phase has no rate at its end, by order: those of orders one and
+# two are known at durations that are too short for the slopes of the equations.
+_NO_RATE = (0.0, 1e-6, 1e-6, BRIEF[3])
 # Minima below this part of the scale are looked at closely.
 _CLOSE = 0.3
 
@@ -76,7 +79,7 @@ def of_phase(course: Course, i: int, rate: float) -> Iterator[Condition]:
     phase, T, duration = course.phases[i], course.period, float(course.durations[i])
     yield Condition(duration / T, DURATION, i, phase.event, duration)
     # What vanishes at both ends of a phase has no rate where the phase has no duration.
-    if phase.event != PERIOD and not abs(duration) < BRIEF[phase.order] * T:
+    if phase.event != PERIOD and not abs(duration) < _NO_RATE[phase.order] * T:
         scale = scales_of(phase, course.margins)[phase.event] * (duration / T) ** phase.order
         yield Condition(float(-rate * T / scale), RATE, i, phase.event, duration)
     if duration > 0.0:

@@ -177,6 +177,14 @@ def _method_of(point: BranchPoint) -> Method:
                        known.get("state_tolerance"))
 
 
+def method_of_several(at: StrongResonance) -> Collocation:
+    """That of a curve of tori, with intervals for orbits of several periods beside a resonance."""
+    usual = _method_of(at.point)
+    assert isinstance(usual, Collocation)
+    return replace(usual, intervals=at.order * at.orbit.intervals,
+                   most_intervals=at.order * usual.most_intervals)
+
+
 def _keeps(point: BranchPoint, method: Method | None) -> bool:
     """Whether the unknowns of a point suit the method, apart from the number of intervals."""
     found = _method_of(point)
@@ -254,7 +262,7 @@ def _around(
                          f"{name!r} must be one of them.")
     at = StrongResonance(field, point, second, _STRONG[str(point.kind)])
     place = at.names.index(name)
-    chosen = method or Collocation(at.order * at.orbit.intervals, at.orbit.degree)
+    chosen = method or method_of_several(at)
 
     def beside(side: float, options: ContinuationOptions, away: float) -> Branch:
         branch = _from_motion(

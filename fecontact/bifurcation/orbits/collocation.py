@@ -82,7 +82,7 @@ class Intervals:
         on_least = error * (given / self.least) ** (degree + 1)
         if given <= self.least or not on_least > self.tolerance:
             return self.least
-        return min(_whole(self._wanted(given, error, degree)), given)
+        return min(_whole(min(self._wanted(given, error, degree), given)), given)
 
     def note(self, points: Sequence[BranchPoint]) -> str:
         """Where orbits of a branch are less accurate than the tolerance, and why."""
@@ -96,9 +96,12 @@ class Intervals:
         else:
             reason = f"take more than intervals = {self.least}"
         worst = max(poor, key=_error_of)
+        much = (f"off by up to {_error_of(worst):.1e} at the parameter {worst.parameter:.6g}"
+                if np.isfinite(_error_of(worst)) else
+                f"and at the parameter {worst.parameter:.6g} the field is not finite between the "
+                f"Gauss points")
         return (f"The states of {len(poor)} of {len(points)} orbits are less accurate than "
-                f"state_tolerance = {self.tolerance:g}, off by up to {_error_of(worst):.1e} at the "
-                f"parameter {worst.parameter:.6g}: {reason}.")
+                f"state_tolerance = {self.tolerance:g}, {much}: {reason}.")
 
     def newton(self, given: float) -> float:
         """Tolerance of Newton's method: the given one, or a hundredth of that of the states."""

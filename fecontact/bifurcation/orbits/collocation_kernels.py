@@ -195,7 +195,10 @@ def fill_ranges(nodes, scales, sizes):
 
 @kernel(types.void(matrix, matrix, vector, f8, matrix, vector, vector))
 def integrate_defect(slopes, f, widths, T, integrals, sizes, errors):
-    """Fill errors (N,) with the largest |int (x' - h T f)| / size of all states."""
+    """Fill errors (N,) with the largest |int (x' - h T f)| / size of all states.
+
+    Infinite where rates are not finite.
+    """
     slopes, f, widths = borrowed(slopes), borrowed(f), borrowed(widths)
     integrals, sizes, errors = borrowed(integrals), borrowed(sizes), borrowed(errors)
     rows, per = integrals.shape
@@ -209,7 +212,10 @@ def integrate_defect(slopes, f, widths, T, integrals, sizes, errors):
                 value = 0.0
                 for c in range(per):
                     value += integrals[row, c] * defect[c]
-                errors[j] = max(errors[j], abs(value) / sizes[i])
+                # No comparison with NaN is true.
+                value = abs(value) / sizes[i]
+                if not value <= errors[j]:
+                    errors[j] = value if value < np.inf else np.inf
 
 
 @kernel(types.void(vector, matrix, vector, vector, vector))

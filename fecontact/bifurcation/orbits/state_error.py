@@ -72,7 +72,7 @@ def state_error(problem: Discretisation, u: Array) -> float:
     the former shows there. Where motion is smooth this is the leading term of the error,
     h^(m+1) x^(m+1); at the ends of intervals it is of the order 2 m. Where it is much more, a layer
     begins or errors decay as in stick: the linear equations of e are then solved on both halves,
-    on the intervals with the largest errors.
+    on the intervals with the largest errors. It is infinite where the field is not finite there.
     """
     halves, nodes, found = _halves(problem.degree), problem.nodes(u), rule(problem.degree)
     count = len(halves.points) * problem.intervals
@@ -86,6 +86,8 @@ def state_error(problem: Discretisation, u: Array) -> float:
     errors, smooth = np.empty(problem.intervals), np.empty(problem.intervals)
     fill_ranges(nodes, problem.scales, sizes)
     integrate_defect(slopes, f, problem.widths, T, halves.integrals, sizes, errors)
+    if not np.isfinite(errors).all():
+        return np.inf
     fill_smooth_errors(problem.widths, nodes, found.top, sizes, smooth)
     odd = np.flatnonzero(errors > _ODD * found.bump * smooth)
     # Those below the largest of the others need no better ones.
@@ -101,9 +103,10 @@ def state_error(problem: Discretisation, u: Array) -> float:
         shape = (len(several), len(halves.points), nodes.shape[1])
         defect = slopes[rows].reshape(shape) - step[:, None, None] * f[rows].reshape(shape)
         try:
-            errors[several] = _solved(defect, J.reshape(*shape, -1), step, sizes, problem.degree)
+            solved = _solved(defect, J.reshape(*shape, -1), step, sizes, problem.degree)
         except np.linalg.LinAlgError:
             break
+        errors[several] = np.where(np.isfinite(solved), solved, np.inf)
         rest = odd[first + _AT_ONCE :]
         if not len(rest) or max(others, errors[odd[: first + _AT_ONCE]].max()) >= errors[rest[0]]:
             break

@@ -2,9 +2,10 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from numbers import Real
 from types import CodeType, MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -112,7 +113,8 @@ class FunctionField(VectorField):
     ) -> tuple[Array, Array, Array]:
         """See :meth:`VectorField.rough_derivatives`.
 
-        By the complex step without a check unless it was wrong before, or central differences.
+        By the complex step without a check unless it was wrong before, or central differences;
+        :meth:`as_new` forgets what was before.
         """
         chosen = np.array(tuple(active), dtype=np.int64)
         n, d = x.shape
@@ -130,6 +132,12 @@ class FunctionField(VectorField):
         kernels.central_differences(self._rates.address, places, step, np.empty(len(values)),
                                     np.empty((3, d)), J, P)
         return f, J, P
+
+    def as_new(self) -> Self:
+        """The same field, of which no complex step was wrong yet."""
+        made = copy(self)
+        made._was_wrong = False
+        return made
 
     def heed(self, wrong: Integers, active: Integers = _NONE) -> None:
         """Warn of a complex step that failed at places (d + a,), or raise; see derivatives."""

@@ -55,6 +55,10 @@ class VectorField(ABC):
         """
         return None
 
+    def as_new(self) -> Self:
+        """The same field without what earlier calls have shown of it."""
+        return self
+
     def forcing_period(self, values: Array) -> float | None:
         """Period of f in t [s]; None where f does not depend on t."""
         return None

@@ -217,6 +217,11 @@ class Series:
             self._g[0, self._place[_unit(k, 1)]] = 1.0
         self._fit(order, radius)
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether all coefficients are, as the rates at the amplitudes of the fit were."""
+        return bool(np.isfinite(self._g).all() and np.isfinite(self._H).all())
+
     def term(self, amplitude: int, *powers: int) -> complex:
         """Coefficient of a normal form for amplitudes of vectors of unit mean square."""
         sizes = self._of.sizes

@@ -287,7 +287,8 @@ def orbit_curve(
         If the point is not on a branch of orbits by collocation, belongs to another field, or its
         period, which is to be kept, is that of the excitation.
     """
-    problem, u, _ = restored(field, point)
+    # What came before does not choose how derivatives of the curve are formed.
+    problem, u, _ = restored(field.as_new(), point)
     problem = rescaled(problem, scales, widths.get(point.branch.parameter_name))
     index = field.index(second)
     value = float(problem.values[index])

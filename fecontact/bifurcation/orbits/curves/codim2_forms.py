@@ -28,7 +28,7 @@ import numpy as np
 
 from fecontact.bifurcation.orbits.curves.centre_manifold import CentreManifold, Series
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
-from fecontact.core.errors import FecontactError
+from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 
 # Radii of the amplitudes at which series are fitted, where one is the range of the states.
@@ -77,21 +77,35 @@ def orbit_form(
 def agreed(
     manifold: CentreManifold, order: int, formula: Callable[[Series], list[float]]
 ) -> tuple[Array, Array, Series]:
-    """Coefficients of a series from the two radii that agree best, their difference, the series."""
+    """Coefficients of a series from the two radii that agree best, their difference, the series.
+
+    Radii at which the rates are not finite are left out.
+
+    Raises
+    ------
+    AnalysisError
+        If less than two are left.
+    """
     before: Array | None = None
     pairs: list[tuple[float, Array, Array, Series]] = []
     with np.errstate(all="ignore"):
         for radius in _RADII:
             series = Series(manifold, order, radius)
+            if not series.is_finite:
+                continue
+            # A coefficient that the formula leaves open is NaN at all radii.
             value = np.array(formula(series))
             if before is not None:
                 error = np.abs(value - before)
                 size = np.nanmax(np.abs(value))
-                relative = float(np.nanmax(error) / size) if size > 0.0 else 0.0
+                relative = 0.0 if size == 0.0 else float(np.nanmax(error) / size)
                 pairs.append((relative if np.isfinite(relative) else np.inf, value, error, series))
                 if relative < _AGREEMENT:
                     break
             before = value
+    if not pairs:
+        raise AnalysisError(f"The rates about the orbit are not finite at amplitudes of "
+                            f"{_RADII[-2]:g} of its range; the field must be smooth there.")
     return min(pairs, key=lambda one: one[0])[1:]
 
 

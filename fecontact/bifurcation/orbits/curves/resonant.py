@@ -71,7 +71,10 @@ class StrongResonance:
             b, c = series.term(0, 0, self.order - 1), series.term(0, 2, 1)
             return [b.real, b.imag, c.real, c.imag]
 
-        found, _, series = agreed(manifold, 3, formula)
+        try:
+            found, _, series = agreed(manifold, 3, formula)
+        except AnalysisError as error:
+            raise AnalysisError(f"{self.point.place} has no normal form. {error}") from error
         return complex(*found[:2]), complex(*found[2:]), series
 
     @property
