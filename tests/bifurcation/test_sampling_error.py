@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oscillators import duffing, jenkins, jenkins_amplitude, jenkins_system, unilateral
+from scipy.optimize import minimize_scalar
+from test_nonlinear_modes import masses
 
 from fecontact.bifurcation import (
     ContinuationOptions,
@@ -12,9 +14,10 @@ from fecontact.bifurcation import (
     frequency_response,
     nonlinear_mode,
 )
+from fecontact.bifurcation.continuation import newton
 from fecontact.bifurcation.harmonic import branches
 from fecontact.bifurcation.harmonic.branches import sampling_error
-from fecontact.bifurcation.harmonic.starts import corrected, problem_for
+from fecontact.bifurcation.harmonic.starts import corrected, problem_for, restored
 from fecontact.bifurcation.response_options import ResponseSettings
 from fecontact.core.errors import AnalysisError, InputError
 
@@ -25,6 +28,24 @@ def orbit(field, harmonics, samples, **values):
     problem = problem_for(field, p, 0, HarmonicBalance(harmonics, samples),
                           np.ones(field.dimension + 2))
     return corrected(problem, np.append(np.zeros(problem.size), p[0]))
+
+
+def fixed(u):
+    """The direction along the parameter: at right angles to it this stays as it is."""
+    return np.append(np.zeros(len(u) - 1), 1.0)
+
+
+def distance(problem, u, tangent, samples):
+    """From an orbit to the branch of so many samples, at right angles to the tangent."""
+    b = problem.layout.harmonic
+    weights = problem.weights().copy()
+    weights[:b] = 0.0
+    weights[: problem.size] /= weights[: problem.size] @ u[: problem.size] ** 2
+    if problem.autonomous:
+        weights[-2] = u[-2] ** -2
+    found, _, _ = newton.corrected(replace(problem, samples=samples), u, weights * tangent, 1e-13,
+                                   20, exact=True)
+    return np.sqrt(weights @ (found - u) ** 2)
 
 
 def exact(w):
@@ -41,7 +62,29 @@ def exact(w):
 def test_it_is_the_distance_to_the_describing_function(w, samples):
     problem, u = orbit(jenkins(w), 1, samples)
     off = abs(u[1] - 1j * u[2] - exact(w)) / abs(exact(w))
-    assert 0.5 * off < sampling_error(problem, u) < 2.0 * off
+    assert 0.5 * off < sampling_error(problem, u, fixed(u)) < 2.0 * off
+
+
+@pytest.mark.parametrize("samples", [32, 128])
+def test_along_a_branch_it_is_the_distance_at_right_angles(samples):
+    """From the curve of the describing function."""
+    branch = frequency_response(
+        jenkins_system(), (1.05, 1.3), method=HarmonicBalance(1, samples, stability=None),
+        options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
+    turned = 0
+    for point in branch.points[1:-1:7]:
+        problem, u, tangent = restored(jenkins(), point)
+        x = u[1] - 1j * u[2]
+
+        def away(w, x=x, at=point.parameter):
+            return np.hypot(abs(exact(w) - x) / abs(x), (w - at) / 0.25)
+
+        off = minimize_scalar(away, bounds=(point.parameter - 0.02, point.parameter + 0.02),
+                              method="bounded", options={"xatol": 1e-7}).fun
+        found = sampling_error(problem, u, tangent)
+        assert 0.7 * off < found < 1.4 * off
+        turned += found < 0.8 * sampling_error(problem, u, fixed(u))
+    assert turned > 0
 
 
 def test_it_is_that_of_a_contact_with_separation():
@@ -53,18 +96,83 @@ def test_it_is_that_of_a_contact_with_separation():
                 [0.0, 0.0, 2.0, *np.zeros(8)], 1.3))
         _, fine = corrected(replace(problem, samples=16 * samples), u)
         off = np.sqrt(((u - fine)[1:-1] ** 2).sum() / (fine[1:-1] ** 2).sum())
-        assert 0.3 * off < sampling_error(problem, u) < 3.0 * off
+        assert 0.3 * off < sampling_error(problem, u, fixed(u)) < 3.0 * off
 
 
 def test_smooth_forces_have_none_but_aliasing():
     """Products of three harmonics are exact above 4 H samples."""
     problem, u = orbit(duffing(), 5, 24, W=0.9)
-    assert sampling_error(problem, u) < 1e-10
+    assert sampling_error(problem, u, fixed(u)) < 1e-10
     problem, u = orbit(duffing(), 5, 14, W=0.9, P=2.0)
     _, fine = orbit(duffing(), 5, 64, W=0.9, P=2.0)
     off = np.sqrt(((u - fine)[1:-1] ** 2).sum() / (fine[1:-1] ** 2).sum())
     assert off > 1e-6
-    assert sampling_error(problem, u) == pytest.approx(4.0 / 3.0 * off, rel=0.02)
+    assert sampling_error(problem, u, fixed(u)) == pytest.approx(4.0 / 3.0 * off, rel=0.02)
+
+
+def test_folds_have_errors_like_the_points_beside_them():
+    """The parameter cannot be held there: the error is the distance of the branches."""
+    field = duffing(0.6, 0.25)
+    branch = frequency_response(
+        field, (0.6, 1.8), "W", method=HarmonicBalance(5, 14, sampling_tolerance=1e-3)).branches[0]
+    assert branch.attributes["samples"] == 14
+    folds = branch.of_kind("fold")
+    assert len(folds) == 2
+    largest = 0.0
+    for point in (*folds, *branch.points[::10]):
+        found = sampling_error(*restored(field, point))
+        largest = max(found, largest)
+        # Newton's method leaves about 1e-8 of this distance.
+        if found > 1e-6:
+            assert found == pytest.approx(4.0 / 3.0 * distance(*restored(field, point), 56),
+                                          rel=0.01)
+    assert sampling_error(*restored(field, folds[0])) > 1e-6
+    assert branch.attributes["sampling_error"] == pytest.approx(largest, rel=0.2)
+    # Twice the samples are exact here, and move the folds by no more than the estimate.
+    fine = frequency_response(field, (0.6, 1.8), "W", method=HarmonicBalance(
+        5, 14, sampling_tolerance=1e-9)).branches[0]
+    assert fine.attributes["samples"] == 28
+    assert fine.attributes["sampling_error"] < 1e-12
+    for coarse, better in zip(folds, fine.of_kind("fold"), strict=True):
+        off = abs(coarse.parameter - better.parameter) / 1.2
+        assert off <= 1.01 * distance(*restored(field, coarse), 28)
+
+
+def test_branches_that_cross_have_an_error_too():
+    """Of a pitchfork, where no last row makes the equations regular."""
+    branch = frequency_response(duffing(0.5, 10.0), (0.5, 1.8), "W", method=HarmonicBalance(
+        9, 40, sampling_tolerance=1e-9)).branches[0]
+    assert branch.of_kind("branch point")
+    assert branch.attributes["sampling_error"] < 1e-11
+    assert branch.attributes["samples"] == 40
+
+
+def test_what_newton_left_is_no_error_of_samples():
+    branch = frequency_response(duffing(0.6, 0.5), (0.6, 1.8), "W", method=HarmonicBalance(
+        5, 32, sampling_tolerance=1e-9)).branches[0]
+    assert branch.attributes["samples"] == 32
+    assert branch.attributes["sampling_error"] < 1e-11
+    problem, u = orbit(duffing(), 5, 14, W=0.9, P=2.0)
+    expected = sampling_error(problem, u, fixed(u))
+    beside = u.copy()
+    beside[1] += 1e-2 * expected
+    assert sampling_error(problem, beside, fixed(u)) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("bounds", [(0.0, 0.5), (-0.1, 0.1)])
+def test_orbits_at_rest_have_no_error(bounds):
+    """Over the force, which begins at nothing or goes through it."""
+    branch = frequency_response(duffing(0.8), bounds, "P", method=HarmonicBalance(
+        5, 14, sampling_tolerance=1e-6), start=0.0).branches[0]
+    assert min(np.abs(point.u[:-1]).max() for point in branch.points) < 1e-12
+    assert branch.attributes["samples"] == 14
+    assert branch.attributes["sampling_error"] < 1e-6
+    # Rounding of forces on a body that they do not move, beside a motion and alone.
+    problem, _ = orbit(duffing(), 5, 14)
+    u = np.append(np.zeros(problem.size), 0.8)
+    assert sampling_error(problem, u, fixed(u), 1.0) < 1e-14
+    still = replace(problem, values=problem.field.values_with(P=0.0))
+    assert sampling_error(still, u, fixed(u)) == 0.0
 
 
 @pytest.mark.parametrize("stability", [None, "transitions"])
@@ -110,6 +218,20 @@ def test_modes_get_samples_enough_too():
     assert mode.branch.attributes["sampling_error"] <= 2e-3
 
 
+def test_modes_without_losses_do_not_hold_the_parameter():
+    """xi is zero along them, for any amplitude; the error has that of the period in it."""
+    system = masses(between=0.5)
+    few, fine = (nonlinear_mode(system, (1e-3, 2.0), 2, observe=("a.p", "y"),
+                                method=HarmonicBalance(5, samples, sampling_tolerance=tolerance))
+                 for samples, tolerance in ((12, 1e-2), (12, 1e-9)))
+    assert few.branch.attributes["samples"] == 12
+    assert fine.branch.attributes["samples"] == 24
+    assert fine.branch.attributes["sampling_error"] < 1e-11
+    assert fine.amplitude[-1] == pytest.approx(few.amplitude[-1], rel=1e-9)
+    off = abs(fine.angular_frequency[-1] / few.angular_frequency[-1] - 1.0)
+    assert 0.5 < off / few.branch.attributes["sampling_error"] < 1.0
+
+
 def test_what_cannot_be_met_is_told(monkeypatch):
     monkeypatch.setattr(branches, "MOST", 100)
     with pytest.raises(AnalysisError, match=r"from its 64 samples is .*, above "
@@ -129,7 +251,7 @@ def test_an_orbit_whose_friction_does_not_repeat_has_an_infinite_error(monkeypat
 
     monkeypatch.setattr(branches, "replace", lambda problem, **changes: type(
         "Failing", (), {"linearise": fails})())
-    assert sampling_error(problem, u) == np.inf
+    assert sampling_error(problem, u, fixed(u)) == np.inf
 
 
 def test_study_files_have_the_same_key():

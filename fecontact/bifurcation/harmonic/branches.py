@@ -28,6 +28,10 @@ from fecontact.system.fields.vector_field import VectorField
 _FIRST_STEPS = (1.0, 0.2, 0.04)
 # Factor by which harmonics grow until the tolerance is met.
 _MORE = 1.5
+# Size below which orbits are at rest, in that of the largest on the branch, means included.
+_AT_REST = 1e-8
+# Points at which two branches meet.
+_ON_TWO = ("branch point", HALVING)
 
 
 def from_motion(
@@ -203,28 +207,50 @@ def _with_more_samples(method: HarmonicBalance, error: float) -> HarmonicBalance
     return replace(method, samples=2 * method.count)
 
 
-def sampling_error(problem: HarmonicProblem, u: Array) -> float:
+def sampling_error(
+    problem: HarmonicProblem, u: Array, tangent: Array, least: float = 0.0
+) -> float:
     """Estimate of the error of an orbit u relative to its size; infinite where there is none.
 
-    One step of Newton's method leads to the orbit of twice the samples, at the same parameter.
-    Kinks of laws make errors of order 1 / N^2, of which a fourth is left there: the error is four
-    thirds of that step. Both are root mean squares of harmonics 1 to H, in the scales of the
-    problem.
+    A step of Newton's method leads to the orbits of twice the samples, at right angles to the
+    tangent, so that at folds it is as long as elsewhere. What is left of the residual with as many
+    samples as the problem has is no error of theirs, and taken off. Kinks of laws make errors of
+    order 1 / N^2, of which a fourth is left there: the error is four thirds of that step.
+
+    Its length is the root of three squares: the root mean square of harmonics 1 to H, relative to
+    that of the orbit or ``least``, whichever is larger; the change of an unknown period, relative
+    to it; that of the parameter, in widths of the diagram.
     """
     finer = replace(problem, samples=2 * problem.samples, before=(), bend=None)
-    row = np.zeros_like(u)
-    row[-1] = 1.0
     try:
         linearised = finer.linearise(u)
-        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        residual = linearised.residual - problem.evaluate(u).residual
+        size = max(_size(problem, u, problem.reference.shape[1]), least)
+        if not residual.any() or not size > 0.0:
+            return np.inf if residual.any() else 0.0
+        weights = problem.weights().copy()
+        weights[: problem.reference.shape[1]] = 0.0
+        weights[: problem.size] /= size**2
+        if problem.autonomous:
+            weights[-2] = problem.period(u) ** -2.0
+        step = linearised.solve(weights * tangent, -np.append(residual, 0.0))
     except AnalysisError:
         return np.inf
-    weights = problem.weights()[problem.reference.shape[1] : problem.size]
-    size, off = (float(np.sqrt(weights @ x[problem.reference.shape[1] : problem.size] ** 2))
-                 for x in (u, step))
-    return 4.0 / 3.0 * off / size if size > 0.0 and np.isfinite(off) else np.inf
+    off = 4.0 / 3.0 * float(np.sqrt(weights @ step**2))
+    return off if np.isfinite(off) else np.inf
+
+
+def _size(problem: HarmonicProblem, u: Array, first: int = 0) -> float:
+    """Root mean square of an orbit in the scales of the problem, from one of its coefficients."""
+    return float(np.sqrt(problem.weights()[first : problem.size] @ u[first : problem.size] ** 2))
 
 
 def _largest_error(problem: HarmonicProblem, points: Iterable[BranchPoint]) -> float:
-    """The largest such error of the points of a branch."""
-    return max(sampling_error(problem, np.asarray(point.u)) for point in points)
+    """The largest such error of the points of a branch, but for those on two branches.
+
+    There the equations are singular with any last row; the points beside them tell the same.
+    """
+    found = [(np.asarray(point.u), np.asarray(point.tangent)) for point in points
+             if point.kind not in _ON_TWO]
+    least = _AT_REST * max(_size(problem, u) for u, _ in found)
+    return max(sampling_error(problem, u, tangent, least) for u, tangent in found)
