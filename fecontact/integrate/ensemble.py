@@ -95,9 +95,8 @@ def ensemble(
     The results are those of :func:`fecontact.simulate`, except that Rodas5P does not integrate
     powers, which do not limit its steps. Threads share the cores. On each, eight runs of plane
     systems of one node and up to three modes, or two of each, go side by side: on level and even
-    ground, with common laws without memory, constant or harmonic excitation, and no events. They
-    are by steps of Rodas5P at any ``rtol``, by collocation only if the solver says 'always', and
-    differ by rounding from single runs without it; one alone takes up to twice as long.
+    ground, with common laws without memory, constant or harmonic excitation, no events, and not
+    by collocation, unless it is 'always'. They differ by rounding from single runs without it.
 
     Parameters
     ----------
