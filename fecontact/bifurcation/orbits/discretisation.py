@@ -165,8 +165,8 @@ class Discretisation:
 
 
 _DIFFERENCE = 1e-5  # relative parameter step for the derivative of the forcing period
-# Steps of rough Jacobians, in ranges of the states: of single ones, and of differences of these.
-_NEAR, _FAR = 1e-5, 3e-4
+# Step of rough Jacobians that are differenced again, in ranges of the states.
+_FAR = 3e-4
 # Smallest range of a state, in its values and in the scale that its field has.
 _LEAST_OF_VALUES, _LEAST_OF_SCALE = 1e-3, 1e-4
 
@@ -222,8 +222,9 @@ class CollocationLinearisation:
         """
         if self._to == "states":
             values = self.problem.parameters(self.u)
+            # Plain differences would have other solutions than the equations with derivatives.
             found = self.problem.field.rough_derivatives(
-                self.times, self._x, values, (), self.problem.ranges, _NEAR)
+                self.times, self._x, values, (), self.problem.ranges, None)
             f, J, _ = found or self.problem.field.derivatives(self.times, self._x, values, ())
             return f, J, np.zeros((*f.shape, len(self.problem.active)))
         return self._derivatives_at(self.times, self._x)

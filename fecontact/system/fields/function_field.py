@@ -109,8 +109,9 @@ class FunctionField(VectorField):
         return f, J, P, wrong
 
     def rough_derivatives(
-        self, t: Array, x: Array, values: Array, active: Iterable[int], sizes: Array, step: float
-    ) -> tuple[Array, Array, Array]:
+        self, t: Array, x: Array, values: Array, active: Iterable[int], sizes: Array,
+        step: float | None,
+    ) -> tuple[Array, Array, Array] | None:
         """See :meth:`VectorField.rough_derivatives`.
 
         By the complex step without a check unless it was wrong before, or central differences;
@@ -129,6 +130,8 @@ class FunctionField(VectorField):
                                             kernels.complex_room_for(d, len(values)), J, P)
             if np.isfinite(J.sum() + P.sum()):
                 return f, J, P
+        if step is None:
+            return None
         kernels.central_differences(self._rates.address, places, step, np.empty(len(values)),
                                     np.empty((3, d)), J, P)
         return f, J, P

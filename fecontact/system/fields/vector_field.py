@@ -47,11 +47,13 @@ class VectorField(ABC):
         """
 
     def rough_derivatives(
-        self, t: Array, x: Array, values: Array, active: Iterable[int], sizes: Array, step: float
+        self, t: Array, x: Array, values: Array, active: Iterable[int], sizes: Array,
+        step: float | None,
     ) -> tuple[Array, Array, Array] | None:
-        """As :meth:`derivatives` from plain differences, where these take much less time, or None.
+        """As :meth:`derivatives` without checks, where that takes much less time, or None.
 
-        The differences go over a step in ``sizes`` (d,) of the states.
+        Plain differences over a step in ``sizes`` (d,) of the states may serve too, but where the
+        step is None.
         """
         return None
 
