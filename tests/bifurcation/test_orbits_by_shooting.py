@@ -202,7 +202,7 @@ def test_kind_errors(two_masses):
     doubling, = orbits.of_kind("period doubling")
     with pytest.raises(InputError, match="collocation of degree 4, and so are the orbits beyond"):
         orbit_branch(field, doubling, method=Shooting())
-    with pytest.raises(InputError, match="both = True goes with motions, regular and branch"):
+    with pytest.raises(InputError, match="both = True goes with motions, resonances, regular"):
         orbit_branch(field, doubling, both=True)
     with pytest.raises(InputError, match="follow the equilibrium over that one first"):
         orbit_branch(field, sliding.of_kind("Hopf")[0], "ground.speed")
