@@ -112,6 +112,12 @@ def titled_bar() -> Iterator[Show]:
             bar.clear()
 
 
+def say(line: str) -> None:
+    """Print a line on stderr, where a bar would be drawn: on a terminal or in a notebook."""
+    if _kind() is not None:
+        print(line, file=sys.stderr, flush=True)
+
+
 def clock(seconds: float) -> str:
     """``1:05``, ``2:03:04``."""
     whole = round(seconds)

@@ -60,6 +60,7 @@ def start(
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
     collocation: str = "auto",
+    inline_laws: bool = False,
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -96,6 +97,8 @@ def start(
         Whether to expand the motion in power series; see :class:`fecontact.integrate.Rodas5P`.
     collocation : 'auto', 'always' or 'never'
         Whether to take steps by collocation; see there.
+    inline_laws : bool
+        Whether steps of Rodas5P are to have the laws written out; see there.
     """
     _require_finite(state)
     basis = system.basis
@@ -116,6 +119,14 @@ def start(
     problem = Problem(system.arrays, blocks, control)
     expanded = None if vary or collocation == "always" else chosen_series(
         system, state, times, rtol, max_step, events, work, series)
+    collocated = None if vary or expanded else chosen_collocation(
+        system, rtol, events, collocation)
+    with_laws = None
+    if inline_laws and not (vary or expanded or collocated):
+        # Compiled for runs that need it only.
+        from fecontact.integrate.inlined_laws.step_loops import advance_with_laws
+
+        with_laws = advance_with_laws(system, problem)
     looser = _IN_PARTS if in_parts(problem) else _LOOSER
     return Run(
         problem,
@@ -129,8 +140,7 @@ def start(
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate_for(problem) if vary else 0),
         watch_for(system, events, bool(vary)),
-        expanded,
-        None if vary or expanded else chosen_collocation(system, rtol, events, collocation))
+        expanded, collocated, with_laws)
 
 
 def again(run: Run, system: ContactSystem, state: Array) -> Run:
@@ -152,7 +162,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
         run.variation, run.watch,
         None if run.series is None else from_state(run.series, system, state),
         None if run.collocation is None else collocation_for(
-            system.basis.modes, system.basis.contact_nodes, control.rtol))
+            system.basis.modes, system.basis.contact_nodes, control.rtol), run.with_laws)
 
 
 def _require_finite(state: Array) -> None:
@@ -311,11 +321,12 @@ def integrate(
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
     collocation: str = "auto",
+    inline_laws: bool = False,
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
     run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series,
-                collocation=collocation)
+                collocation=collocation, inline_laws=inline_laws)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()

@@ -13,6 +13,7 @@ import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.references import constants
+from fecontact.integrate.inlined_laws.kernels import intermediate
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, step_loop
 from fecontact.integrate.rodas5p.blocks import BLOCKS, one_block
 from fecontact.integrate.rodas5p.variational import (
@@ -57,11 +58,23 @@ def in_parts(problem: state.Problem) -> bool:
     return not (_small(problem) or problem.system.memory.any())
 
 
-def _small(problem: state.Problem) -> bool:
+def not_small(problem: state.Problem) -> str | None:
+    """Why a system has no step loop of its size, or None."""
     s = problem.system
     n, m = s.Tx.shape
-    return bool((m, n) in SIZES and len(problem.blocks.coupled) == 1 and len(s.T2) == 0
-                and s.second_motion == 0 and not s.memory.any())
+    if len(s.T2):
+        return "bodies in space are not among them"
+    if (m, n) not in SIZES:
+        return f"{m} modes and {n} nodes are not among them"
+    if s.memory.any():
+        return "there is friction with memory"
+    if s.second_motion != 0:
+        return "two motions are prescribed"
+    return None if len(problem.blocks.coupled) == 1 else "its bodies move apart from each other"
+
+
+def _small(problem: state.Problem) -> bool:
+    return not_small(problem) is None
 
 
 @cache
@@ -132,3 +145,4 @@ def _shapes(arrays: Any) -> dict[str, Any]:
 if step_loop.advance.stats.cache_misses:
     for size in SIZES:
         _advance(*size)
+    intermediate(step_loop.advance, step_loop.ADVANCE)
