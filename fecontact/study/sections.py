@@ -228,6 +228,9 @@ class SimulationSettings:
     collocation : str, optional
         For 'rodas5p': 'auto', 'always' or 'never'; whether steps are of order 9, which are longer
         where little error is allowed.
+    inline_laws : bool, optional
+        For 'rodas5p': whether the laws are written out in its steps, compiled once for them, which
+        takes less time for plane systems of few modes and nodes.
     events : bool
         For 'rodas5p' and 'set-valued': locate touch-down, lift-off, stick and slip of every
         contact node and store them with the run.
@@ -252,6 +255,7 @@ class SimulationSettings:
     scheme: str | None = None
     series: str | None = None
     collocation: str | None = None
+    inline_laws: bool | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding", "preload"] | RigidStart = "rest"
@@ -279,7 +283,8 @@ class SimulationSettings:
             "restitution": self.restitution, "impact_law": self.impact_law,
             "tangential_restitution": self.tangential_restitution,
             "static_coefficient": self.static_coefficient, "scheme": self.scheme,
-            "series": self.series, "collocation": self.collocation})
+            "series": self.series, "collocation": self.collocation,
+            "inline_laws": self.inline_laws})
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,10 @@ from fecontact.integrate.collocation.tableau import (
 )
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.rodas5p import dynamics
+from fecontact.integrate.rodas5p.small_systems import not_small
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
-# Systems up to these sizes have step loops.
-MOST_MODES, MOST_NODES = 4, 2
 # Largest rtol at which it is taken unasked: steps of Rodas5P do not become much longer above.
 ACCURATE = 1e-7
 # Errors of a step, in parts of the tolerance of the run, and at least.
@@ -130,16 +129,10 @@ def chosen_collocation(
 
 def obstacle(system: ContactSystem, events: Sequence[AnyEvent]) -> str | None:
     """Why a run of a system with such events cannot be by collocation, or None."""
-    basis, arrays = system.basis, system.arrays
-    if basis.dimension == 3:
-        return "bodies in space are not among them"
-    if basis.modes > MOST_MODES or basis.contact_nodes > MOST_NODES:
-        return f"{basis.modes} modes and {basis.contact_nodes} nodes are not among them"
-    if system.memory:
-        return "there is friction with memory"
-    if arrays.second_motion != 0:
-        return "two motions are prescribed"
-    if system.ground.wavy and basis.ground_nodes.any():
+    large = not_small(system.arrays)
+    if large is not None:
+        return large
+    if system.ground.wavy and system.basis.ground_nodes.any():
         return "the ground is wavy"
     if events:
         return "events are not located in its steps"

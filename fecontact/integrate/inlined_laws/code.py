@@ -51,9 +51,10 @@ def with_laws(constants: str, tuple_type: Any, given: Mapping[str, Given]) -> st
     laws = dict.fromkeys(law for value in given.values() for law in _each(value) if law is not None)
     names = {law: f"law{number}" for number, law in enumerate(laws)}
     tables = ir.Module("tables")
-    functions = {None: ir.Constant(_I64, 0), **{
-        law: ir.Function(tables, ir.FunctionType(ir.VoidType(), []), name).ptrtoint(_I64)
-        for law, name in names.items()}}
+    functions: dict[CompiledLaw | None, Any] = {None: ir.Constant(_I64, 0)}
+    for law, name in names.items():
+        function = ir.Function(tables, ir.FunctionType(ir.VoidType(), []), name)
+        functions[law] = function.ptrtoint(_I64)
     for field, value in given.items():
         name = f"{Reference(tuple_type).name}.{field}"
         if not isinstance(value, tuple):
@@ -96,13 +97,6 @@ def _code_of(law: CompiledLaw, name: str) -> ModuleRef:
     # Numba keeps the entry apart from the function behind it; neither throws.
     text = _ATTRIBUTES.sub(lambda found: re.sub(r"\bnoinline\b", "nounwind", found[0]), text)
     module = parse_assembly(text)
-    python = [item.name for item in module.functions
-              if item.is_declaration and item.name.startswith(_OF_PYTHON)]
-    # Numbers that are addresses mean something else in another process.
-    if python or compiled._library.has_dynamic_globals or "inttoptr (i64" in text:
-        raise InputError(f"The law {law.python.__name__} does more than arithmetic (it allocates, "
-                         f"may raise, or calls functions of other libraries) and cannot become "
-                         f"part of the step loop; leave inline_laws out.")
     numbers = count()
     for item in (*module.global_variables, *module.functions):
         if item.is_declaration:
@@ -110,4 +104,14 @@ def _code_of(law: CompiledLaw, name: str) -> ModuleRef:
         entry = item.name == compiled._wrapper_name
         item.name = name if entry else f"{name}.{next(numbers)}"
         item.linkage = Linkage.external if entry else Linkage.internal
+    # What follows an exception goes with the proof that there is none.
+    passes, builder = compiled._library.codegen._module_pass_manager()
+    passes.run(module, builder)
+    python = [item.name for item in module.functions
+              if item.is_declaration and item.name.startswith(_OF_PYTHON)]
+    # Numbers that are addresses mean something else in another process.
+    if python or compiled._library.has_dynamic_globals or "inttoptr (i64" in text:
+        raise InputError(f"The law {law.python.__name__} does more than arithmetic (it allocates, "
+                         f"may raise, or calls functions of other libraries) and cannot become "
+                         f"part of the step loop; leave inline_laws out.")
     return module

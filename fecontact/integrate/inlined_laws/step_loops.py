@@ -29,7 +29,9 @@ def advance_with_laws(system: ContactSystem, problem: Problem) -> Any:
     InputError
         For a system that is not small, or with laws that cannot be a part of its step loop.
     """
-    found = not_small(problem) or _foreign(system)
+    found = not_small(problem.system) or _foreign(system)
+    if len(problem.blocks.coupled) > 1:
+        found = "bodies that are not coupled are not among them"
     if found is not None:
         raise InputError(f"Rodas5P: inline_laws = True is for small plane systems with compiled "
                          f"laws, but {found}; leave it out.")

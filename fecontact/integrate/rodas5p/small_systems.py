@@ -24,7 +24,7 @@ from fecontact.integrate.rodas5p.variational import (
     propagate_in_parts,
     variation_for,
 )
-from fecontact.system.nodes import SYSTEM
+from fecontact.system.nodes import SYSTEM, SystemArrays
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Modes and nodes.
@@ -58,23 +58,20 @@ def in_parts(problem: state.Problem) -> bool:
     return not (_small(problem) or problem.system.memory.any())
 
 
-def not_small(problem: state.Problem) -> str | None:
-    """Why a system has no step loop of its size, or None."""
-    s = problem.system
-    n, m = s.Tx.shape
-    if len(s.T2):
+def _small(problem: state.Problem) -> bool:
+    return len(problem.blocks.coupled) == 1 and not_small(problem.system) is None
+
+
+def not_small(system: SystemArrays) -> str | None:
+    """Why there is no step loop of its size for a system, even of one block; or None."""
+    n, m = system.Tx.shape
+    if len(system.T2):
         return "bodies in space are not among them"
     if (m, n) not in SIZES:
         return f"{m} modes and {n} nodes are not among them"
-    if s.memory.any():
+    if system.memory.any():
         return "there is friction with memory"
-    if s.second_motion != 0:
-        return "two motions are prescribed"
-    return None if len(problem.blocks.coupled) == 1 else "its bodies move apart from each other"
-
-
-def _small(problem: state.Problem) -> bool:
-    return not_small(problem) is None
+    return "two motions are prescribed" if system.second_motion != 0 else None
 
 
 @cache
