@@ -651,6 +651,8 @@ simulate(osc,1,events=True)
 simulate(osc,1,progress="bar")
 SetValued(static_coefficient=True)
 Rodas5P(keep_checkpoint=3)
+Rodas5P(inline_laws="yes")
+Rodas5P(inline_laws=True,series="always")
 """
 
 NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study",

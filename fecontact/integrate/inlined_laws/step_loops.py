@@ -86,6 +86,6 @@ def _of_code(code: str) -> Any:
 
 
 def _announce(prepared: bool) -> None:
-    seconds = 6 if prepared else 35
+    seconds = 4 if prepared else 30
     say(f"Compiling the step loop of this system with its laws, once for all parameters: about "
         f"{seconds} s.")
