@@ -94,9 +94,9 @@ class Rodas5P(Solver):
         default if ``rtol`` is 1e-7 or less, for plane systems of up to four modes and two nodes
         on flat ground, of laws without memory, without events. A run by series stays one.
     inline_laws : bool
-        Whether the laws are written out in steps of Rodas5P instead of called, which takes 0.81 to
-        0.9 of the time: for plane systems of up to four modes and two nodes, of laws without
-        memory. It is compiled once for their laws, whatever the parameters, in about six seconds.
+        Whether the laws are written out in steps of Rodas5P instead of called, which takes 0.75 to
+        0.85 of the time: for plane systems of up to four modes and two nodes, of laws without
+        memory. It is compiled once for their laws, whatever the parameters, in about four seconds.
         Results differ by rounding. Runs by series or by collocation stay as they are.
     checkpoint : path, optional
         File to which the run is saved every minute and on interruption. If it exists, the run is

@@ -105,8 +105,10 @@ def _code_of(law: CompiledLaw, name: str) -> ModuleRef:
         item.name = name if entry else f"{name}.{next(numbers)}"
         item.linkage = Linkage.external if entry else Linkage.internal
     # What follows an exception goes with the proof that there is none.
-    passes, builder = compiled._library.codegen._module_pass_manager()
-    passes.run(module, builder)
+    library = compiled._library.codegen.create_library(name)
+    library._final_module = module
+    library._optimize_final_module()
+    module = library._final_module
     python = [item.name for item in module.functions
               if item.is_declaration and item.name.startswith(_OF_PYTHON)]
     # Numbers that are addresses mean something else in another process.
