@@ -73,8 +73,7 @@ def simulate(
     system : ContactSystem or VectorField
         The system; a field at its base values, see :meth:`fecontact.bifurcation.VectorField.with_`.
     t_end, t_start : float
-        End and start of the run [s]; by default it starts where the run that it continues ends, or
-        at zero.
+        End and start of the run [s]; it starts where the run that it continues ends, else at zero.
     initial : 'rest', 'sliding', RigidStart, Trajectory, LoadHistory, RestState or array
         Initial state; see :func:`fecontact.integrate.initial_state`. Of a field a state, or a run.
     outputs : int or (N,) array
