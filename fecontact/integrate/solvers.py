@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, as_path, require_kind
+from fecontact.core.checks import as_count, as_floats, as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.integrate.events import AnyEvent
@@ -103,6 +103,11 @@ class Rodas5P(Solver):
         resumed from it with bit-for-bit the same results; it is removed at the end.
     keep_checkpoint : bool
         Keep the file at the end, to be removed once the run is written.
+    workers : int, optional
+        Number of threads that share the contact nodes of each step, where 256 or more may touch;
+        results do not depend on it. By default two, from 1000 nodes on four, at most one per core,
+        and not more than the environment variable OMP_NUM_THREADS says. Runs of ensembles and
+        sweeps have one.
 
     Raises
     ------
@@ -120,6 +125,7 @@ class Rodas5P(Solver):
     series: str = "auto"
     collocation: str = "auto"
     inline_laws: bool = False
+    workers: int | None = None
 
     locates_events: ClassVar[bool] = True
     uses: ClassVar[tuple[str, ...]] = ("auto", "always", "never")
@@ -141,6 +147,8 @@ class Rodas5P(Solver):
             if self.inline_laws and getattr(self, name) == "always":
                 raise InputError(f"Rodas5P: inline_laws = True is for steps without {name}, which "
                                  f"is 'always' to be used; leave one of them out.")
+        if self.workers is not None:
+            as_count(self.workers, "Rodas5P: workers")
 
     @property
     def name(self) -> str:
@@ -158,7 +166,8 @@ class Rodas5P(Solver):
         found = integrate(task.system, task.state, task.times, rtol=task.rtol,
                           max_step=task.max_step, progress=task.progress, checkpoint=path,
                           events=task.events, series=self.series,
-                          collocation=self.collocation, inline_laws=self.inline_laws)
+                          collocation=self.collocation, inline_laws=self.inline_laws,
+                          workers=self.workers)
         if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
             path.unlink(missing_ok=True)
         return found

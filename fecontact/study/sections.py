@@ -231,6 +231,9 @@ class SimulationSettings:
     inline_laws : bool, optional
         For 'rodas5p': whether the laws are written out in its steps, compiled once for them, which
         takes less time for plane systems of few modes and nodes.
+    workers : int, optional
+        For 'rodas5p': threads that share the contact nodes of a step, where 256 or more may touch;
+        by default as many as pay, in a sweep one.
     events : bool
         For 'rodas5p' and 'set-valued': locate touch-down, lift-off, stick and slip of every
         contact node and store them with the run.
@@ -256,6 +259,7 @@ class SimulationSettings:
     series: str | None = None
     collocation: str | None = None
     inline_laws: bool | None = None
+    workers: int | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding", "preload"] | RigidStart = "rest"
@@ -284,7 +288,7 @@ class SimulationSettings:
             "tangential_restitution": self.tangential_restitution,
             "static_coefficient": self.static_coefficient, "scheme": self.scheme,
             "series": self.series, "collocation": self.collocation,
-            "inline_laws": self.inline_laws})
+            "inline_laws": self.inline_laws, "workers": self.workers})
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,9 @@ def stacked():
     return stack(3, 2)
 
 
-def stack(nodes, nodes_between):
+def stack(nodes, nodes_between, element_size=0.004):
     """Four beams on each other and the ground, told in another order than they stand in."""
-    mesh = generate(Beam(length=0.1, height=HEIGHT, element_size=0.004))
+    mesh = generate(Beam(length=0.1, height=HEIGHT, element_size=element_size))
     upwards = ("bottom", "middle", "top", "lid")
     bodies = {name: ElasticBody(mesh.placed((0.0, upwards.index(name) * HEIGHT)), thickness=0.01,
                                 fixed={"left": "xy"}) for name in ORDER}

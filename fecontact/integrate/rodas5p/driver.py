@@ -30,6 +30,8 @@ from fecontact.integrate.rodas5p.state import (
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.series.branches import chosen_series, from_state
+from fecontact.integrate.shared_nodes.helpers import workers_for
+from fecontact.integrate.shared_nodes.team import ALONE, Team, parts_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
@@ -61,6 +63,7 @@ def start(
     series: str = "auto",
     collocation: str = "auto",
     inline_laws: bool = False,
+    workers: int = 1,
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -99,6 +102,8 @@ def start(
         Whether to take steps by collocation; see there.
     inline_laws : bool
         Whether steps of Rodas5P are to have the laws written out; see there.
+    workers : int
+        Threads that share the contact nodes; results do not depend on it.
     """
     _require_finite(state)
     basis = system.basis
@@ -131,7 +136,8 @@ def start(
     return Run(
         problem,
         _progress(system, control, float(times[0]), state),
-        room_for(m, n, states, basis.dimension, blocks),
+        room_for(m, n, states, basis.dimension, blocks,
+                 _team(m, n, 0 if expanded else workers - 1)),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(above.arrays, below.arrays, width, _moved_both_ways(system, above, below),
@@ -163,6 +169,16 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
         None if run.series is None else from_state(run.series, system, state),
         None if run.collocation is None else collocation_for(
             system.basis.modes, system.basis.contact_nodes, control.rtol), run.with_laws)
+
+
+def _team(modes: int, nodes: int, helpers: int) -> Team:
+    """What threads share the nodes with, if they are many."""
+    if not parts_for(nodes):
+        return ALONE
+    # Compiled for runs that need it only.
+    from fecontact.integrate.shared_nodes.node_work import team_for
+
+    return team_for(modes, nodes, helpers)
 
 
 def _require_finite(state: Array) -> None:
@@ -322,11 +338,13 @@ def integrate(
     series: str = "auto",
     collocation: str = "auto",
     inline_laws: bool = False,
+    workers: int | None = None,
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
     run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series,
-                collocation=collocation, inline_laws=inline_laws)
+                collocation=collocation, inline_laws=inline_laws,
+                workers=workers_for(system.basis.contact_nodes, workers))
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()

@@ -76,26 +76,33 @@ def motion_of(j, w, s):
 def project(blocks, y, places, speeds):
     """Fill displacements and velocities (d n,) of the nodes: from 0 on x, n on y, 2 n on across."""
     shapes = blocks.shapes
-    m, columns = shapes.shape
+    columns = shapes.shape[1]
     count = blocks.used[0]
     for first in range(0, columns, len(blocks.nodes)):
         for j in range(first, first + count):
             places[j] = 0.0
             speeds[j] = 0.0
     for tile in range(len(blocks.tiles)):
-        i, end, left, right = block_at(blocks.tiles, tile)
-        while i + 3 < end:
-            for j in range(left, right):
-                a, b, c, d = shapes[i, j], shapes[i + 1, j], shapes[i + 2, j], shapes[i + 3, j]
-                places[j] += a * y[i] + b * y[i + 1] + c * y[i + 2] + d * y[i + 3]
-                speeds[j] += (a * y[m + i] + b * y[m + i + 1] + c * y[m + i + 2]
-                              + d * y[m + i + 3])
-            i += 4
-        while i < end:
-            for j in range(left, right):
-                places[j] += shapes[i, j] * y[i]
-                speeds[j] += shapes[i, j] * y[m + i]
-            i += 1
+        project_block(block_at(blocks.tiles, tile), shapes, y, places, speeds)
+
+
+@helper
+def project_block(ends, shapes, y, places, speeds):
+    """Add to displacements and velocities what a block of the rows gives, see ``block_at``."""
+    m = len(shapes)
+    i, end, left, right = ends
+    while i + 3 < end:
+        for j in range(left, right):
+            a, b, c, d = shapes[i, j], shapes[i + 1, j], shapes[i + 2, j], shapes[i + 3, j]
+            places[j] += a * y[i] + b * y[i + 1] + c * y[i + 2] + d * y[i + 3]
+            speeds[j] += (a * y[m + i] + b * y[m + i + 1] + c * y[m + i + 2]
+                          + d * y[m + i + 3])
+        i += 4
+    while i < end:
+        for j in range(left, right):
+            places[j] += shapes[i, j] * y[i]
+            speeds[j] += shapes[i, j] * y[m + i]
+        i += 1
 
 
 @helper
@@ -107,33 +114,53 @@ def project_one(blocks, q, places):
         for j in range(first, first + count):
             places[j] = 0.0
     for tile in range(len(blocks.tiles)):
-        i, end, left, right = block_at(blocks.tiles, tile)
-        while i + 3 < end:
-            for j in range(left, right):
-                places[j] += (shapes[i, j] * q[i] + shapes[i + 1, j] * q[i + 1]
-                              + shapes[i + 2, j] * q[i + 2] + shapes[i + 3, j] * q[i + 3])
-            i += 4
-        while i < end:
-            for j in range(left, right):
-                places[j] += shapes[i, j] * q[i]
-            i += 1
+        project_block_once(block_at(blocks.tiles, tile), shapes, q, places)
+
+
+@helper
+def project_block_once(ends, shapes, q, places):
+    """As :func:`project_block` for coordinates q (m,) alone."""
+    i, end, left, right = ends
+    while i + 3 < end:
+        for j in range(left, right):
+            places[j] += (shapes[i, j] * q[i] + shapes[i + 1, j] * q[i + 1]
+                          + shapes[i + 2, j] * q[i + 2] + shapes[i + 3, j] * q[i + 3])
+        i += 4
+    while i < end:
+        for j in range(left, right):
+            places[j] += shapes[i, j] * q[i]
+        i += 1
 
 
 @helper
 def push(blocks, forces, out):
     """Add to ``out`` (m,) the modal forces of the node forces (d n,): -T, F, across."""
     for tile in range(len(blocks.tiles)):
-        top, bottom, left, right = block_at(blocks.tiles, tile)
-        for i in range(top, bottom):
-            total = 0.0
-            for j in range(left, right):
-                total += blocks.shapes[i, j] * forces[j]
-            out[i] += total
+        push_block(block_at(blocks.tiles, tile), blocks.shapes, forces, out)
+
+
+@helper
+def push_block(ends, shapes, forces, out):
+    """Add to ``out`` (m,) the modal forces by a block of the rows."""
+    top, bottom, left, right = ends
+    for i in range(top, bottom):
+        total = 0.0
+        for j in range(left, right):
+            total += shapes[i, j] * forces[j]
+        out[i] += total
 
 
 @helper
 def gather(y, s, blocks, load, forces, rate):
     """Fill the first 2 m entries of ``rate`` from the node forces (d n,) of :func:`push`."""
+    m = len(load)
+    set_free_rate(y, s, blocks, load, rate)
+    push(blocks, forces, rate[m : 2 * m])
+
+
+@helper
+def set_free_rate(y, s, blocks, load, rate):
+    """Fill the first 2 m entries of ``rate`` with what they are without node forces."""
     m = len(load)
     v = y[m : 2 * m]
     for i in range(m):
@@ -146,7 +173,6 @@ def gather(y, s, blocks, load, forces, rate):
             for k in range(left, right):
                 total += s.stiffness[i, k] * y[k] + s.damping[i, k] * v[k]
             rate[m + i] -= total
-    push(blocks, forces, rate[m : 2 * m])
 
 
 @helper
@@ -155,11 +181,17 @@ def set_forces(y, s, blocks, moved, w, scratch, rate):
 
     ``w`` (3, d n) holds the nodes as :func:`project` puts them there, ``scratch`` is room.
     """
+    set_some_forces(0, blocks.used[0], y, s, blocks, moved, w, scratch, rate)
+
+
+@helper
+def set_some_forces(begin, end, y, s, blocks, moved, w, scratch, rate):
+    """As :func:`set_forces`, from one place of the nodes of ``blocks`` to another."""
     m, n = len(blocks.position), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
-    force, rates = scratch.force[0], scratch.rates[0]
-    for at in range(blocks.used[0]):
+    force, rates = scratch.force[begin], scratch.rates[begin]
+    for at in range(begin, end):
         j = blocks.nodes[at]
         first = 2 * m + j * states
         F, R, contact = kernels.node_forces(j, motion_of(at, w, s), moved,
@@ -190,11 +222,17 @@ def set_gradients(y, s, blocks, moved, w, out):
 
     The node forces go to w[2], in the order of :func:`push`.
     """
+    project(blocks, y, w[0], w[1])
+    set_some_gradients(0, blocks.used[0], y, s, blocks, moved, w, out)
+
+
+@helper
+def set_some_gradients(begin, end, y, s, blocks, moved, w, out):
+    """As :func:`set_gradients` from one place to another, with the nodes' motion in w."""
     m, n = len(blocks.position), len(s.gap)
     states = out.rates.shape[1]
     forces = w[2]
-    project(blocks, y, w[0], w[1])
-    for at in range(blocks.used[0]):
+    for at in range(begin, end):
         j = blocks.nodes[at]
         first = 2 * m + j * states
         F, T, contact = kernels.node_gradients(j, motion_of(at, w, s), moved,
@@ -210,13 +248,18 @@ def set_gradients(y, s, blocks, moved, w, out):
 @routine
 def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
-    m, n = len(load), len(s.gap)
-    states = out.rates.shape[1]
     set_gradients(y, s, blocks, motion_given(given), w, out)
-    for j in range(n):
-        for k in range(states):
-            rate[2 * m + j * states + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
+    set_memory_rates(len(load), s, out, rate)
     gather(y, s, blocks, load, w[2], rate)
+
+
+@helper
+def set_memory_rates(m, s, g, rate):
+    """Fill the z' of ``rate`` from the Gradients g, behind those of m modes."""
+    states = g.rates.shape[1]
+    for j in range(len(s.gap)):
+        for k in range(states):
+            rate[2 * m + j * states + k] = g.rates[j, k, 0] if k < s.memory[j] else 0.0
 
 
 @helper
@@ -286,9 +329,16 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     speed with x'. ``acceleration`` (2,) is that of the ground's motions, ``rate_of_loads`` (m,) the
     rate of the modal loads.
     """
-    m, n = len(rate_of_loads), len(s.gap)
-    states = g.rates.shape[1]
-    forces = w[2]
+    m = len(rate_of_loads)
+    set_free_time_rate(s, given, rate_of_loads, out)
+    set_some_time_rates(0, blocks.used[0], s, blocks, given, acceleration, g, w[2], out)
+    push(blocks, w[2], out[m : 2 * m])
+
+
+@helper
+def set_free_time_rate(s, given, rate_of_loads, out):
+    """Fill the first 2 m entries of ``out`` with df/dt without node forces."""
+    m = len(rate_of_loads)
     for i in range(m):
         out[i] = 0.0
         out[m + i] = (rate_of_loads[i] + given[PULL_RATE] * s.drive_shapes[0, i]
@@ -296,7 +346,17 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     if nodes.in_space(s):
         for i in range(m):
             out[m + i] += given[PULL_RATE + 2] * s.drive_shapes[2, i]
-    for at in range(blocks.used[0]):
+
+
+@helper
+def set_some_time_rates(begin, end, s, blocks, given, acceleration, g, forces, out):
+    """Fill ``forces`` with the rates of node forces from one place to another, and z' of ``out``.
+
+    The other arguments are those of :func:`set_time_rate`.
+    """
+    m, n = len(blocks.position), len(s.gap)
+    states = g.rates.shape[1]
+    for at in range(begin, end):
         j = blocks.nodes[at]
         v = nodes.moved_along(j, given[SPEED], given[SECOND_SPEED], s)
         a = nodes.moved_along(j, acceleration[0], acceleration[1], s)
@@ -319,7 +379,6 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
                 if nodes.in_space(s):
                     rate -= a2 * g.rates[j, k, 3 + states]
             out[2 * m + j * states + k] = rate
-    push(blocks, forces, out[m : 2 * m])
 
 
 @routine

@@ -9,6 +9,8 @@ from fecontact.integrate.near_nodes import extend_near
 from fecontact.integrate.rodas5p import dynamics, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
+from fecontact.integrate.shared_nodes.tasks import POWERS, SLIP_ERROR, share_at
+from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
 
@@ -34,16 +36,32 @@ def state_error(control, progress, room):
 
 
 @routine
-def slip_error(error, s, control, progress, room):
+def slip_error(error, problem, progress, room):
     """The larger of the error and that of the slip velocities at the end of the step.
 
     Only where friction has no memory: there the force follows the slip velocity alone.
     """
-    m, n = len(control.largest), len(s.gap)
+    s, control = problem.system, problem.control
+    m = len(control.largest)
+    if shares(room):
+        return share_at(room.team.share)(SLIP_ERROR, error, problem, progress, room)
+    dynamics.project_one(room.near, room.stages[tableau.STAGES - 1, m : 2 * m], room.between[0])
+    error, worst = largest_slip_error(0, room.near.used[0], error, s, control, room)
+    if worst >= 0:
+        progress.counts[WORST_NODE] = worst
+    return error
+
+
+@helper
+def largest_slip_error(begin, end, error, s, control, room):
+    """The larger of the error and those of nodes from one place to another, and the worst node.
+
+    That is -1 if no node has a larger one. ``room.between[0]`` holds errors of velocities.
+    """
+    n, worst = len(s.gap), -1
     near, slips = room.near, room.between[0]
     moved = dynamics.motion_given(room.given)
-    dynamics.project_one(near, room.stages[tableau.STAGES - 1, m : 2 * m], slips)
-    for at in range(near.used[0]):
+    for at in range(begin, end):
         j = near.nodes[at]
         if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
             slip = slips[at]
@@ -54,9 +72,8 @@ def slip_error(error, s, control, progress, room):
                     j, moved.speed, moved.second_speed, s))
             part = abs(slip) / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
-                error = part
-                progress.counts[WORST_NODE] = j
-    return error
+                error, worst = part, j
+    return error, worst
 
 
 @helper
@@ -112,24 +129,42 @@ _DIFFERENCE = _third_difference()
 
 
 @helper
-def _powers(t, y, problem, room, out):
-    """As :func:`fecontact.system.powers.powers` by blocks; ``out`` (p + 2 n,) holds both."""
-    s, blocks, near = problem.system, problem.blocks, room.near
-    m, n = len(blocks.position), len(s.gap)
-    states = (len(y) - 2 * m) // n
+def _powers(point, t, y, problem, progress, room):
+    """Fill a row of ``room.power`` (4, p + 2 n): :func:`fecontact.system.powers.powers` by blocks.
+
+    It is that of the ``point`` of the step at the time t, where the state is y.
+    """
+    s, blocks, near, out = problem.system, problem.blocks, room.near, room.power[point]
     given_powers(t, y, s, out)
     for part in range(len(blocks.own)):
         matrix_powers(block_at(blocks.own, part), y, s, out)
-    moved = ground_motion(t, s)
-    dynamics.project(near, y, room.between[0], room.between[1])
     for j in range(POWER_COUNT, len(out)):
         out[j] = 0.0
-    for at in range(near.used[0]):
+    if shares(room):
+        room.team.numbers[0] = t
+        share_at(room.team.share)(POWERS, point, problem, progress, room)
+        return
+    dynamics.project(near, y, room.between[0], room.between[1])
+    add_some_powers(0, near.used[0], t, y, problem, room, out, out[POWER_COUNT:])
+
+
+@helper
+def add_some_powers(begin, end, t, y, problem, room, out, node_powers):
+    """Add to ``out`` (p,) the powers of the nodes from one place to another; fill their own (2 n,).
+
+    ``room.between`` holds the motion of the nodes.
+    """
+    s, near = problem.system, room.near
+    n, m = len(s.gap), len(problem.blocks.position)
+    states = (len(y) - 2 * m) // n
+    force, rates = room.scratch.force[begin], room.scratch.rates[begin]
+    moved = ground_motion(t, s)
+    for at in range(begin, end):
         j = near.nodes[at]
         first = 2 * m + j * states
         add_node_powers(j, dynamics.motion_of(at, room.between, s), moved,
                         y[first : first + s.memory[j]], problem.control.stick_speed[j], s,
-                        room.scratch.force[0], room.scratch.rates[0], out, out[POWER_COUNT:])
+                        force, rates, out, node_powers)
 
 
 @helper
@@ -144,8 +179,8 @@ def _set_powers(step, problem, progress, room):
         else:
             state = room.after
         extend_near(state, problem, progress, room)
-        _powers(min(step.t + _POINTS[point] * step.h, step.latest), state, problem, room,
-                room.power[point])
+        _powers(point, min(step.t + _POINTS[point] * step.h, step.latest), state, problem,
+                progress, room)
 
 
 @helper

@@ -17,6 +17,7 @@ from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.step_length import TIME
 from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.integrate.series.branches import Series
+from fecontact.integrate.shared_nodes.helpers import assisted
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +141,7 @@ class Run:
 
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""
-        status = self._advance(steps)
+        with assisted(self.problem, self.progress, self.room):
+            status = self._advance(steps)
         take_events(self.watch, self.found, self.time)
         return int(status)

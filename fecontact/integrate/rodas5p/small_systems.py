@@ -24,6 +24,7 @@ from fecontact.integrate.rodas5p.variational import (
     propagate_in_parts,
     variation_for,
 )
+from fecontact.integrate.shared_nodes.team import TEAM
 from fecontact.system.nodes import SYSTEM, SystemArrays
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
@@ -114,6 +115,7 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
         state.CONTROL: {"largest": (m,), "memory_scale": (0,), "levels": (None, n)},
         state.PROGRESS: _shapes(progress),
         state.ROOM: _shapes(room),
+        TEAM: {**_shapes(room.team), "most": 0},
         stage_solver.REDUCED: _shapes(room.reduced),
         dynamics.GRADIENTS: _shapes(progress.gradients),
         state.OUTPUT: {"states": (None, 2 * m), "work": (None, POWER_COUNT + NODE_POWERS * n)},

@@ -12,6 +12,7 @@ from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks, near_blocks
 from fecontact.integrate.rodas5p.step_length import LAST_ROOT, STEP, TIME
+from fecontact.integrate.shared_nodes.team import ALONE, TEAM, Team
 from fecontact.system.nodes import (
     CONTACT_FIELDS,
     GROUND_MOTION,
@@ -181,7 +182,7 @@ class Room(NamedTuple):
     nodes at a point within the step, ``power`` (4, p + 2 n) for a quadrature. ``ends`` to
     ``places`` serve to look at the course of a step: the nodes at its ends, its coefficients,
     those of the nodes, and room for what they may do. ``sums`` (2, size, 8) are what stages add to
-    those after them.
+    those after them. ``team`` is for systems of many nodes, which threads may share.
     """
 
     near: Blocks
@@ -211,12 +212,13 @@ class Room(NamedTuple):
     halves: Array
     places: Array
     sums: Array
+    team: Team
 
 
 ROOM = types.NamedTuple(
     [BLOCKS, vector] + [matrix] * 2 + [vector] * 6 + [matrix] * 3 + [vector] * 3
     + [matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector]
-    + [block], Room)
+    + [block, TEAM], Room)
 
 
 def gradients_for(
@@ -233,7 +235,9 @@ def gradients_for(
                             np.zeros((nodes, length)), np.zeros((nodes, states, width)))
 
 
-def room_for(modes: int, nodes: int, states: int, dimension: int, blocks: Blocks) -> Room:
+def room_for(
+    modes: int, nodes: int, states: int, dimension: int, blocks: Blocks, team: Team = ALONE,
+) -> Room:
     """Room for a system of so many modes, contact nodes and internal variables per node."""
     columns = dimension * nodes
     size = 2 * modes + nodes * states
@@ -253,7 +257,7 @@ def room_for(modes: int, nodes: int, states: int, dimension: int, blocks: Blocks
         np.zeros((courses.DOUBT + 1, (2 * dimension - 1) * nodes)),
         np.zeros((3, courses.COEFFICIENTS)),
         np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST),
-        np.zeros((2, size, tableau.STAGES)))
+        np.zeros((2, size, tableau.STAGES)), team)
 
 
 def progress_for(

@@ -51,6 +51,8 @@ from fecontact.integrate.rodas5p.variational import (
     propagate_at,
     write_columns,
 )
+from fecontact.integrate.shared_nodes.tasks import JACOBIAN, STAGE, TIME_RATE, share_at
+from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
@@ -128,8 +130,12 @@ def _linearise(step, after_t, problem, progress, room):
     acceleration = dynamics.ground_acceleration(step.t, later,
                                                 dynamics.motion_given(room.given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, room.pull_rate)
-    dynamics.set_time_rate(s, room.near, room.given, acceleration, progress.gradients,
-                           room.pull_rate, room.nodes, room.time_rate)
+    if shares(room):
+        room.team.numbers[0], room.team.numbers[1] = acceleration
+        share_at(room.team.share)(TIME_RATE, 0.0, problem, progress, room)
+    else:
+        dynamics.set_time_rate(s, room.near, room.given, acceleration, progress.gradients,
+                               room.pull_rate, room.nodes, room.time_rate)
     for i in range(m):
         progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
         speed = abs(progress.state[m + i]) * control.largest[i]
@@ -155,8 +161,11 @@ def _stages(step, G, problem, progress, room):
                 dynamics.set_given(now, s, room.given, room.load)
                 last = now
             extend_near(room.stage, problem, progress, room)
-            dynamics.set_rate(room.stage, s, room.near, room.given, room.load, room.nodes,
-                              room.scratch, room.base)
+            if shares(room):
+                share_at(room.team.share)(STAGE, 0.0, problem, progress, room)
+            else:
+                dynamics.set_rate(room.stage, s, room.near, room.given, room.load, room.nodes,
+                                  room.scratch, room.base)
             for k in range(size):
                 room.right[k] += room.base[k]
         factor = tableau.TIME[i] * step.h
@@ -181,7 +190,10 @@ def _attempt(step, new, end, problem, progress, room):
     if memory:
         stage_solver.eliminate_memory(G, s, progress.gradients, room.reduced)
     if new or memory:
-        stage_solver.assemble(s, room.near, progress.gradients, room.reduced)
+        if shares(room):
+            share_at(room.team.share)(JACOBIAN, 0.0, problem, progress, room)
+        else:
+            stage_solver.assemble(s, room.near, progress.gradients, room.reduced)
     stage_solver.factorise_step(G, problem.blocks, room.reduced)
     _stages(step, G, problem, progress, room)
 
@@ -198,7 +210,7 @@ def _error_at_end(step, end, problem, progress, room):
         if step.at_break:
             dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.load)
         set_end(problem, progress, room)
-        error = slip_error(error, s, control, progress, room)
+        error = slip_error(error, problem, progress, room)
     return error
 
 
