@@ -245,8 +245,11 @@ def _step(
 ) -> list[tuple[Solution, list[BranchPoint]]] | None:
     """The solution a step ahead, with the special points before it; None if the step fails."""
     row = problem.weights() * here.tangent
-    found = corrected(problem, problem.predicted(here.u, here.tangent, step), row,
-                      options.tolerance, options.iterations, known=here.linearisation)
+    guess = problem.predicted(here.u, here.tangent, step)
+    # One step with the matrix at the guess will do where that is near enough.
+    near = problem.off(here.u, step) <= options.tolerance * (1.0 + norm(problem, guess))
+    found = corrected(problem, guess, row, options.tolerance, options.iterations,
+                      known=None if near else here.linearisation)
     if found is None:
         return None
     # What rounding takes for a solution may lie where the step began.

@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
+from fecontact.bifurcation.continuation import predictor
+from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
@@ -26,7 +27,7 @@ from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
-# Largest curvature correction of the predictor, in steps.
+# Largest distance of a guess from the tangent, in steps.
 _MOST_BENT = 0.2
 # Largest relative difference in amplitude of the same orbit on two meshes.
 _AMPLITUDE_CHANGE = 0.1
@@ -136,8 +137,10 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         Tolerance of the location of special points, relative to the step. Above 1e-6 normal forms
         are omitted.
     before : tuple of (n,) arrays
-        u and tangent at the start of the last step and, after the first step, the derivative of
-        the tangent along the branch; empty before the first step.
+        u and tangent at the start of this step and, after the first one, of the step before; empty
+        before the first step.
+    bends : Bends
+        How far guesses of the last point were off.
     sizes : Intervals, optional
         Of orbits along the branch; None keeps their number.
     calm : int
@@ -149,6 +152,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     limits: Array | None = None
     precision: float = 1e-12
     before: tuple[Array, ...] = ()
+    bends: predictor.Bends = predictor.Bends()
     sizes: Intervals | None = None
     calm: int = 0
 
@@ -221,20 +225,23 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return float(np.sqrt((weights @ (nodes - weights @ nodes) ** 2).sum()))
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Predictor along the tangent, with the curvature of the last step."""
-        guess = u + step * tangent
-        if len(self.before) < 3:
-            return guess
-        # The length of the old tangent changes with mesh and scales.
-        length = step / weighted_norm(self.weights(), self.before[1])
-        aside = 0.5 * length * length * self.before[2]
-        straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
-        return guess if straight else guess + aside
+        """Predictor along the tangent, bent as the branch was before."""
+        if len(self.before) < 4:
+            return u + step * tangent
+        return predictor.predicted(self.weights(), (u, tangent), self.before[2:], step, self.bends,
+                                   _MOST_BENT)
+
+    def off(self, u: Array, step: float) -> float:
+        """See :meth:`Problem.off`."""
+        if len(self.before) < 4:
+            return np.inf
+        return predictor.expected(self.weights(), u, self.before[2:], step, self.bends)
 
     def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
         """The problem for the next step: phase condition at u, periodically a new mesh."""
-        bend = self._bend(u, tangent)
-        vectors = [u, tangent] if bend is None else [u, tangent, bend]
+        bends = predictor.Bends() if len(self.before) < 4 else predictor.bends_at(
+            self.weights(), u, self.before[:2], self.before[2:])
+        vectors = [u, tangent, *self.before[:2]]
         mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
             fewer = min(count, self.sizes.after(count, state_error(self, u), self.degree))
@@ -245,7 +252,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
             mesh, age = equidistributed(mesh, self.nodes(u), self.degree, count), 0
             vectors = self._on_other_mesh(mesh, vectors)
         problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, vectors[0]),
-                          scales=self._grown(u), before=tuple(vectors), calm=calm)
+                          scales=self._grown(u), before=tuple(vectors), bends=bends, calm=calm)
         return problem, vectors[0], vectors[1]
 
     def refined(
@@ -263,14 +270,6 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, vectors[0]),
                           before=tuple(vectors) if self.before else (), calm=0)
         return problem, vectors[0], vectors[1]
-
-    def _bend(self, u: Array, tangent: Array) -> Array | None:
-        """Derivative of the tangent along the branch, from the last step."""
-        if not self.before:
-            return None
-        direction = self.before[1] / weighted_norm(self.weights(), self.before[1])
-        length = weighted_product(self.weights(), direction, u - self.before[0])
-        return (tangent - direction) / length if length > 0.0 else None
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
