@@ -15,15 +15,21 @@ from fecontact.core.compiled import f8, kernel, matrix, vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
+# Part of the largest error of late that counts at the next point.
+_REMEMBERED = 0.9
 # Cosine between both tangents below which the point before does not tell of the next one.
 _LEAST_COSINE = 0.5
 
 
 class Bends(NamedTuple):
-    """How far both guesses were off at the last point, over the powers of the lengths."""
+    """How far guesses were off: both at the last point, and that which was taken, of late.
+
+    The first two are over the powers of the lengths.
+    """
 
     third: float = math.inf
     fourth: float = math.inf
+    worst: float = 0.0
 
 
 @kernel(f8(vector, vector, vector, vector, vector, f8, matrix))
@@ -90,13 +96,14 @@ def expected(
     weights: Array, u: Array, before: tuple[Array, Array], step: float, bends: Bends
 ) -> float:
     """How far :func:`predicted` is likely to be off a step ahead of u."""
-    return min(_off(bends, step, float(weighted_norm(weights, u - before[0]))))
+    return max(min(_off(bends, step, float(weighted_norm(weights, u - before[0])))), bends.worst)
 
 
 def bends_at(
-    weights: Array, there: Array, here: tuple[Array, Array], before: tuple[Array, Array]
+    weights: Array, there: Array, here: tuple[Array, Array], before: tuple[Array, Array],
+    bends: Bends,
 ) -> Bends:
-    """The :class:`Bends` at a point ``there`` that was reached from ``here``."""
+    """The :class:`Bends` at a point ``there`` that was reached from ``here``, with those there."""
     u, tangent = here
     step = float(weighted_product(weights, tangent, there - u) / weighted_norm(weights, tangent))
     found = np.empty((2, len(u)))
@@ -104,8 +111,9 @@ def bends_at(
     if length == 0.0:
         return Bends()
     parabola, cubic = (float(weighted_norm(weights, guess - there)) for guess in found)
-    powers = _powers(step, length)
-    return Bends(parabola / powers[0], cubic / powers[1])
+    powers, guessed = _powers(step, length), _off(bends, step, length)
+    taken = cubic if guessed[1] < guessed[0] else parabola
+    return Bends(parabola / powers[0], cubic / powers[1], max(taken, _REMEMBERED * bends.worst))
 
 
 def _off(bends: Bends, step: float, length: float) -> tuple[float, float]:

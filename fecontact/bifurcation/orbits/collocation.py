@@ -175,7 +175,14 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
-                "maximum": high, "state_error": state_error(self, u)}
+                "maximum": high, "state_error": self._state_error(u)}
+
+    def _state_error(self, u: Array) -> float:
+        """That of u, which is asked for twice at each point."""
+        known: list[tuple[Array, float]] = vars(self).setdefault("_known_error", [])
+        if not known or known[0][0] is not u:
+            known[:] = [(u, state_error(self, u))]
+        return known[0][1]
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -240,11 +247,11 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
         """The problem for the next step: phase condition at u, periodically a new mesh."""
         bends = predictor.Bends() if len(self.before) < 4 else predictor.bends_at(
-            self.weights(), u, self.before[:2], self.before[2:])
+            self.weights(), u, self.before[:2], self.before[2:], self.bends)
         vectors = [u, tangent, *self.before[:2]]
         mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
-            fewer = min(count, self.sizes.after(count, state_error(self, u), self.degree))
+            fewer = min(count, self.sizes.after(count, self._state_error(u), self.degree))
             calm = self.calm + 1 if fewer < count else 0
             if calm >= _CALM:
                 count, calm = fewer, 0
