@@ -195,8 +195,8 @@ class Problem(Protocol):
         """The predictor, a step from u."""
         return u + step * tangent
 
-    def off(self, u: Array, step: float) -> float:
-        """How far the predictor is likely to be off, a step from u; infinite if unknown."""
+    def off(self, step: float) -> float:
+        """How far the predictor is likely to be off a step ahead; infinite if unknown."""
         return np.inf
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":

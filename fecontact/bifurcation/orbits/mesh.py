@@ -234,7 +234,9 @@ def _extremes(nodes, fine, low, high):
             for row in range(1, len(fine) - 1):
                 left, here, right = values[row - 1], values[row], values[row + 1]
                 bend = left - 2.0 * here + right
-                if (here - left) * (right - here) <= 0.0 and bend != 0.0:
+                # At the ends of an interval the peak may lie between the outermost points.
+                reach = 2.0 if row == 1 or row == len(fine) - 2 else 1.0
+                if abs(right - left) <= reach * abs(bend) and bend != 0.0:
                     peak = here - (right - left) ** 2 / (8.0 * bend)
                     high[i], low[i] = max(high[i], peak), min(low[i], peak)
 

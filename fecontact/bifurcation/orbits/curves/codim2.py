@@ -100,9 +100,9 @@ class OrbitCurve(Problem):
         """Predictor, that of orbits."""
         return self.orbit.predicted(u, tangent, step)
 
-    def off(self, u: Array, step: float) -> float:
+    def off(self, step: float) -> float:
         """See :meth:`Problem.off`."""
-        return self.orbit.off(u, step)
+        return self.orbit.off(step)
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[OrbitCurve, Array, Array]":
         """The problem for the next step, on a new mesh."""
