@@ -22,7 +22,7 @@ MOST_BEHIND = 3
 # Powers of the step with which the errors of parabola, Hermite's cubic, cubic and quartic grow.
 _POWERS = (3, 4, 4, 5)
 # Part of the largest error of late that counts at the next point.
-_REMEMBERED = 0.9
+_REMEMBERED = 0.7
 # Cosine between both tangents below which a point behind does not tell of the next one.
 _LEAST_COSINE = 0.5
 
