@@ -195,6 +195,10 @@ class Problem(Protocol):
         """The predictor, a step from u."""
         return u + step * tangent
 
+    def off(self, step: float) -> float:
+        """How far the predictor is likely to be off a step ahead; infinite if unknown."""
+        return np.inf
+
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
         """Problem, u and tangent on a new mesh, asked for after each step; None to keep the old."""
         return None

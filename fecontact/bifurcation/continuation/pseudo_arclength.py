@@ -39,6 +39,8 @@ _OVERSHOOT = 1.2
 _ON_BOUND = 1e-13
 # Distance at which the start of a branch, interpolated to another mesh, counts as met again.
 _MET_AGAIN = 1e-5
+# Distance of a guess, in tolerances, from which one Newton step leads to the solution.
+_NEAR = 0.1
 # Solutions closer than this many times the error of Newton's method are the same.
 _SAME_SOLUTION = 10.0
 
@@ -245,8 +247,12 @@ def _step(
 ) -> list[tuple[Solution, list[BranchPoint]]] | None:
     """The solution a step ahead, with the special points before it; None if the step fails."""
     row = problem.weights() * here.tangent
-    found = corrected(problem, problem.predicted(here.u, here.tangent, step), row,
-                      options.tolerance, options.iterations, known=here.linearisation)
+    guess = problem.predicted(here.u, here.tangent, step)
+    # One step with the matrix at the guess does where that is no farther than others leave it.
+    near = problem.polishes and problem.off(step) <= _NEAR * options.tolerance * (
+        1.0 + norm(problem, guess))
+    found = corrected(problem, guess, row, options.tolerance, options.iterations,
+                      known=None if near else here.linearisation)
     if found is None:
         return None
     # What rounding takes for a solution may lie where the step began.

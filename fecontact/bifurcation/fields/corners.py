@@ -1,6 +1,7 @@
 """Arrays of contact systems between the corners of a box of parameter values."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -122,11 +123,15 @@ class Corners:
                 x, rate = (value - low) / (high - low), 1.0 / (high - low)
                 below, above = (-rate, rate) if each == index else (1.0 - x, x)
                 weights = [w * below for w in weights] + [w * above for w in weights]
-            # What does not vary has the rate zero.
-            still = [np.zeros_like(array) if isinstance(array, np.ndarray)
-                     and array.dtype.kind == "f" else array for array in self._plain]
-            self._slopes[index] = key, self._with(np.array(weights) @ self._flat, still)
+            self._slopes[index] = key, self._with(np.array(weights) @ self._flat,
+                                                  self._still.copy())
         return self._slopes[index][1]
+
+    @cached_property
+    def _still(self) -> list[Any]:
+        """Slopes of what does not vary, zero; addresses of laws and the like unchanged."""
+        return [np.zeros_like(array) if isinstance(array, np.ndarray) and array.dtype.kind == "f"
+                else array for array in self._plain]
 
     def agrees(self, arrays: SystemArrays, values: Array) -> bool:
         """Whether the arrays for values (k,) are these."""

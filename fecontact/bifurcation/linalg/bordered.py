@@ -48,13 +48,15 @@ def expand_open(factors: CondensedFactors, start: Array, end: Array) -> Array:
 def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> ComplexArray:
     """All nodes (N m d,) with x(1) = closing x(0), the common unknowns zero.
 
-    ``rhs`` (N m d,) are the right-hand sides of the collocation rows; both are complex.
+    ``rhs`` (N m d,) are the right-hand sides of the collocation rows; both are complex. The
+    solution of a singular system is not finite.
     """
-    d = len(factors.end)
-    reduced, side = open_side(factors, rhs)
-    start = np.asarray(np.linalg.solve(
-        factors.end[:, :d] + closing * factors.end[:, d : 2 * d], side), dtype=complex)
-    return open_solution(factors, reduced, start, closing * start)
+    parts, out = np.empty((2, len(rhs))), np.empty((2, len(rhs)))
+    parts[0], parts[1] = rhs.real, rhs.imag
+    bordered_kernels.solve_turned(factors, parts, closing.real, closing.imag, out)
+    found = np.empty(len(rhs), dtype=complex)
+    found.real, found.imag = out
+    return found
 
 
 def open_side(factors: CondensedFactors, rhs: Array) -> tuple[ComplexArray, ComplexArray]:

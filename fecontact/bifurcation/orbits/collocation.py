@@ -1,12 +1,13 @@
 """Continuation problem of periodic orbits by orthogonal collocation."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
+from fecontact.bifurcation.continuation import predictor
+from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
@@ -26,7 +27,7 @@ from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
-# Largest curvature correction of the predictor, in steps.
+# Largest distance of a guess from the tangent, in steps.
 _MOST_BENT = 0.2
 # Largest relative difference in amplitude of the same orbit on two meshes.
 _AMPLITUDE_CHANGE = 0.1
@@ -40,6 +41,7 @@ _NEWTON = 1e-2
 _CALM = 10
 # Numbers of intervals are multiples of this: so many are eliminated at once.
 _AT_ONCE = 8
+_NONE = np.empty((0, 0))
 
 
 @dataclass(frozen=True)
@@ -135,9 +137,10 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     precision : float
         Tolerance of the location of special points, relative to the step. Above 1e-6 normal forms
         are omitted.
-    before : tuple of (n,) arrays
-        u and tangent at the start of the last step and, after the first step, the derivative of
-        the tangent along the branch; empty before the first step.
+    trail : (2 k, n) array
+        u and tangent of the last points, the latest first; empty before the first step.
+    misses : Misses
+        How far guesses of the last point were off.
     sizes : Intervals, optional
         Of orbits along the branch; None keeps their number.
     calm : int
@@ -148,7 +151,8 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     renewal: int = 1
     limits: Array | None = None
     precision: float = 1e-12
-    before: tuple[Array, ...] = ()
+    trail: Array = field(default_factory=lambda: _NONE)
+    misses: predictor.Misses = predictor.UNKNOWN
     sizes: Intervals | None = None
     calm: int = 0
 
@@ -171,7 +175,14 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
-                "maximum": high, "state_error": state_error(self, u)}
+                "maximum": high, "state_error": self._state_error(u)}
+
+    def _state_error(self, u: Array) -> float:
+        """That of u, which is asked for twice at each point."""
+        known: list[tuple[Array, float]] = vars(self).setdefault("_known_error", [])
+        if not known or known[0][0] is not u:
+            known[:] = [(u, state_error(self, u))]
+        return known[0][1]
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -221,32 +232,36 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return float(np.sqrt((weights @ (nodes - weights @ nodes) ** 2).sum()))
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Predictor along the tangent, with the curvature of the last step."""
-        guess = u + step * tangent
-        if len(self.before) < 3:
-            return guess
-        # The length of the old tangent changes with mesh and scales.
-        length = step / weighted_norm(self.weights(), self.before[1])
-        aside = 0.5 * length * length * self.before[2]
-        straight = weighted_norm(self.weights(), aside) > _MOST_BENT * step
-        return guess if straight else guess + aside
+        """Predictor along the tangent, bent as the branch was before."""
+        straight = u + step * tangent
+        return straight if not len(self.trail) else predictor.predicted(
+            self.weights(), self.trail, straight, step, self.misses, _MOST_BENT)
+
+    def off(self, step: float) -> float:
+        """See :meth:`Problem.off`."""
+        return predictor.expected(step, self.misses)
 
     def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
         """The problem for the next step: phase condition at u, periodically a new mesh."""
-        bend = self._bend(u, tangent)
-        vectors = [u, tangent] if bend is None else [u, tangent, bend]
+        behind, misses = self.trail, predictor.UNKNOWN
+        if len(behind):
+            misses = predictor.misses_at(self.weights(), u, behind, self.misses)
+        # Branches are not smooth enough for more than two points.
+        most = 2 * (1 if self.second is None else predictor.MOST_BEHIND)
+        trail = np.concatenate([[u, tangent], behind[:most]]) if len(behind) else np.array(
+            [u, tangent])
         mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
-            fewer = min(count, self.sizes.after(count, state_error(self, u), self.degree))
+            fewer = min(count, self.sizes.after(count, self._state_error(u), self.degree))
             calm = self.calm + 1 if fewer < count else 0
             if calm >= _CALM:
                 count, calm = fewer, 0
         if (self.renewal and age >= self.renewal) or count < self.intervals:
             mesh, age = equidistributed(mesh, self.nodes(u), self.degree, count), 0
-            vectors = self._on_other_mesh(mesh, vectors)
-        problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, vectors[0]),
-                          scales=self._grown(u), before=tuple(vectors), calm=calm)
-        return problem, vectors[0], vectors[1]
+            trail = self._carried(mesh, trail)
+        problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, trail[0]),
+                          scales=self._grown(u), trail=trail, misses=misses, calm=calm)
+        return problem, trail[0], trail[1]
 
     def refined(
         self, u: Array, tangent: Array, ahead: Sequence[Solution | BranchPoint]
@@ -259,18 +274,11 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         if count <= self.intervals:
             return None
         mesh = equidistributed(self.mesh, self.nodes(worst.u), self.degree, count)
-        vectors = self._on_other_mesh(mesh, [u, tangent, *self.before[2:]])
-        problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, vectors[0]),
-                          before=tuple(vectors) if self.before else (), calm=0)
-        return problem, vectors[0], vectors[1]
-
-    def _bend(self, u: Array, tangent: Array) -> Array | None:
-        """Derivative of the tangent along the branch, from the last step."""
-        if not self.before:
-            return None
-        direction = self.before[1] / weighted_norm(self.weights(), self.before[1])
-        length = weighted_product(self.weights(), direction, u - self.before[0])
-        return (tangent - direction) / length if length > 0.0 else None
+        moved = self._carried(mesh, np.concatenate([[u, tangent], self.trail[2:]]) if len(
+            self.trail) else np.array([u, tangent]))
+        problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved[0]),
+                          trail=moved if len(self.trail) else moved[:0], calm=0)
+        return problem, moved[0], moved[1]
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
@@ -288,7 +296,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         """Problem, u and tangent on another mesh."""
         moved, turned = self._on_other_mesh(mesh, [u, tangent])
         return replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved),
-                       before=()), moved, turned
+                       trail=_NONE), moved, turned
 
     def _nodes_on(self, mesh: Array, u: Array) -> Array:
         """Copy of the nodes (N m, d) of an orbit on another mesh."""
@@ -297,10 +305,14 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
 
     def _on_other_mesh(self, mesh: Array, vectors: list[Array]) -> list[Array]:
         """Vectors like u on another mesh."""
+        return [*self._carried(mesh, np.array(vectors))]
+
+    def _carried(self, mesh: Array, vectors: Array) -> Array:
+        """Rows like u on another mesh."""
         nodal = (len(mesh) - 1) * self.degree * self.field.dimension
-        out = np.empty((len(vectors), nodal + len(vectors[0]) - self.size))
-        carry_over(self.mesh, mesh, self.degree, np.array(vectors), out)
-        return [*out]
+        out = np.empty((len(vectors), nodal + vectors.shape[1] - self.size))
+        carry_over(self.mesh, mesh, self.degree, vectors, out)
+        return out
 
 
 def require_mesh(intervals: int, degree: int) -> None:

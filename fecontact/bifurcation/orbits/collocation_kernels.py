@@ -142,31 +142,6 @@ def amplitude_along(weights, nodes, before):
     return mixed / square
 
 
-@kernel(types.void(vector, matrix, matrix, matrix, matrix, vector))
-def compare_halves(weights, nodes, nodes_later, before, before_later, out):
-    """Fill out (3,) with weighted sums: products of both differences, squares of those before, and
-    squares of the nodes before about their mean.
-
-    Differences are those between a half of an orbit and the other, ``later`` by half a period.
-    """
-    weights, out = borrowed(weights), borrowed(out)
-    nodes, nodes_later = borrowed(nodes), borrowed(nodes_later)
-    before, before_later = borrowed(before), borrowed(before_later)
-    total, d = nodes.shape
-    out[:] = 0.0
-    for i in range(d):
-        mean = 0.0
-        for row in range(total):
-            mean += before[row, i]
-        mean /= total
-        for row in range(total):
-            weight = weights[row * d + i]
-            apart = before[row, i] - before_later[row, i]
-            out[0] += weight * apart * (nodes[row, i] - nodes_later[row, i])
-            out[1] += weight * apart * apart
-            out[2] += weight * (before[row, i] - mean) ** 2
-
-
 @helper
 def _power(x, m):
     result = x

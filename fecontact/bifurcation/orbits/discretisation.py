@@ -246,17 +246,21 @@ class CollocationLinearisation:
         """
         problem, values = self.problem, self.problem.parameters(self.u)
         x, times = self._beside(shifts)
-        rough = problem.field.rough_derivatives(times, x, values, problem.active, problem.ranges,
-                                                _FAR)
-        here = problem.field.rough_derivatives(self.times, self._x, values, (), problem.ranges,
-                                               _FAR)
-        if rough is None or here is None:
-            _, J, P = self.derivatives_beside(shifts)
-            return J, P, self.derivatives[1]
+        given, known = (problem.active, problem.ranges), self.derivatives[1]
+        rough = problem.field.rough_derivatives(times, x, values, *given, None)
+        if rough is None:
+            # Those that are known are no plain differences.
+            rough = problem.field.rough_derivatives(times, x, values, *given, _FAR)
+            here = problem.field.rough_derivatives(self.times, self._x, values, (),
+                                                   problem.ranges, _FAR)
+            if rough is None or here is None:
+                _, J, P = self.derivatives_beside(shifts)
+                return J, P, known
+            known = here[1]
         if not problem.autonomous:
             self._add_forcing(times / self.period, x, values, rough[2])
         _, J, P = self._apart(rough, len(shifts))
-        return J, P, here[1]
+        return J, P, known
 
     def _beside(self, shifts: list[Array]) -> tuple[Array, Array]:
         return (np.concatenate([self._x + shift for shift in shifts]),

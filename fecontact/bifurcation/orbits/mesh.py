@@ -164,6 +164,42 @@ def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
     return result
 
 
+@kernel(types.void(vector, vector, matrix, matrix, vector))
+def compare_halves(mesh, weights, nodes, before, out):
+    """Fill out (3,) with weighted sums: products of both differences, squares of those before, and
+    squares of the nodes before about their mean.
+
+    Differences are those between a half of an orbit and the other, half a period later. Both
+    orbits have nodes (N m, d).
+    """
+    mesh, weights, out = borrowed(mesh), borrowed(weights), borrowed(out)
+    nodes, before = borrowed(nodes), borrowed(before)
+    total, d = nodes.shape
+    N = len(mesh) - 1
+    m = total // N
+    basis, scales = np.empty(m + 1), _scales_of_basis(m)
+    later, before_later, mean = np.empty(d), np.empty(d), np.zeros(d)
+    for row in range(total):
+        for i in range(d):
+            mean[i] += before[row, i] / total
+    out[:] = 0.0
+    j = 0
+    for row in range(total):
+        start = row // m
+        t = mesh[start] + (mesh[start + 1] - mesh[start]) * (row % m) / m + 0.5
+        if t >= 1.0:
+            t -= 1.0
+        j = _basis_at(mesh, t, j, scales, basis)
+        _combined(nodes, j, basis, later)
+        _combined(before, j, basis, before_later)
+        for i in range(d):
+            weight = weights[row * d + i]
+            apart = before[row, i] - before_later[i]
+            out[0] += weight * apart * (nodes[row, i] - later[i])
+            out[1] += weight * apart * apart
+            out[2] += weight * (before[row, i] - mean[i]) ** 2
+
+
 @kernel(types.void(matrix, matrix, vector, vector))
 def _extremes(nodes, fine, low, high):
     """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k points."""
@@ -198,7 +234,9 @@ def _extremes(nodes, fine, low, high):
             for row in range(1, len(fine) - 1):
                 left, here, right = values[row - 1], values[row], values[row + 1]
                 bend = left - 2.0 * here + right
-                if (here - left) * (right - here) <= 0.0 and bend != 0.0:
+                # At the ends of an interval the peak may lie between the outermost points.
+                reach = 2.0 if row == 1 or row == len(fine) - 2 else 1.0
+                if abs(right - left) <= reach * abs(bend) and bend != 0.0:
                     peak = here - (right - left) ** 2 / (8.0 * bend)
                     high[i], low[i] = max(high[i], peak), min(low[i], peak)
 

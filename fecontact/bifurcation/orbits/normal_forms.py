@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.bordered import solve_turned
-from fecontact.bifurcation.orbits.curves.kernels import multiplied
+from fecontact.bifurcation.orbits.curves.kernels import applied, multiplied
 from fecontact.bifurcation.orbits.curves.singularity import (
     Bend,
     Singularity,
@@ -216,4 +216,6 @@ def _complex(real: Array, imaginary: Array, vectors: Array, sign: float = 1.0) -
 
 def _applied(matrices: Array, vectors: Array) -> Array:
     """Products (N m, d) of matrices (N m, d, d) with vectors (N m, d)."""
-    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
+    out = np.empty_like(vectors)
+    applied(matrices, vectors, out)
+    return out

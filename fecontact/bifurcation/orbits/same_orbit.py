@@ -12,9 +12,9 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.equilibria.equilibrium import newton, sorted_eigenvalues
-from fecontact.bifurcation.orbits.collocation_kernels import amplitude_along, compare_halves
+from fecontact.bifurcation.orbits.collocation_kernels import amplitude_along
 from fecontact.bifurcation.orbits.discretisation import Discretisation
-from fecontact.bifurcation.orbits.mesh import interpolate, node_times
+from fecontact.bifurcation.orbits.mesh import compare_halves, interpolate, node_times
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
@@ -23,6 +23,9 @@ _SAMPLES = 512
 # Largest relative difference of halves that coincide, and smallest fraction of the tangent that
 # separates them.
 _HALVES_MEET, _HALVES_PART = 0.02, 0.9
+
+# How far behind the step, in twice its length, its bend may make a point ahead appear.
+_BEHIND = 0.25
 
 HALVING = "period halving"
 # Name of the test function that is zero where an orbit shrinks to an equilibrium.
@@ -66,10 +69,15 @@ class _Scaled(Protocol):
 def same_place(
     problem: _Weighted, one: tuple[Array, Array], other: tuple[Array, Array], within: float
 ) -> bool:
-    """Whether two points, unknowns and tangents, agree in period, parameter and heading."""
+    """Whether two points, unknowns and tangents, agree in period, parameter and heading.
+
+    False too where the first one lies well behind the other.
+    """
     weights, common = problem.weights()[-problem.common :], slice(-problem.common, None)
-    heading = float(weights * one[1][common] @ other[1][common])
-    return heading > 0.0 and weighted_norm(weights, one[0][common] - other[0][common]) <= within
+    row, off = weights * other[1][common], one[0][common] - other[0][common]
+    if not float(row @ one[1][common]) > 0.0 or float(weighted_norm(weights, off)) > within:
+        return False
+    return bool(float(row @ off) >= -_BEHIND * within * weighted_norm(weights, other[1][common]))
 
 
 def in_phase(problem: Discretisation, u: Array, like: Array) -> Array:
@@ -152,11 +160,8 @@ def halves_apart(problem: Discretisation, u: Array) -> float:
     Where it vanishes a doubled orbit is a single one; beyond, the same orbits come once more, with
     their halves exchanged.
     """
-    times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
-    sums, sides = np.empty(3), []
-    for nodes in (problem.nodes(u), problem.reference):
-        sides += [nodes, interpolate(problem.mesh, nodes, times)]
-    compare_halves(problem.weights(), *sides, sums)
+    sums = np.empty(3)
+    compare_halves(problem.mesh, problem.weights(), problem.nodes(u), problem.reference, sums)
     mixed, square, whole = sums.tolist()
     if square < _HALVES_MEET**4 * whole:
         return 1.0

@@ -97,8 +97,12 @@ class OrbitCurve(Problem):
         return self.orbit.weights()
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Predictor with the curvature of the last step, that of orbits."""
+        """Predictor, that of orbits."""
         return self.orbit.predicted(u, tangent, step)
+
+    def off(self, step: float) -> float:
+        """See :meth:`Problem.off`."""
+        return self.orbit.off(step)
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[OrbitCurve, Array, Array]":
         """The problem for the next step, on a new mesh."""

@@ -96,8 +96,7 @@ def _on_twice(curve: OrbitCurve, point: BranchPoint) -> Finer:
     """The curve near a point, on twice its intervals."""
     mesh, d = np.asarray(point.values["mesh"], dtype=float), curve.orbit.field.dimension
     nodes = point.u[: (len(mesh) - 1) * curve.orbit.degree * d].reshape(-1, d).copy()
-    orbit = replace(curve.orbit, mesh=mesh, reference=nodes, before=(), renewal=0,
-                    sizes=None)
+    orbit = replace(curve.orbit, mesh=mesh, reference=nodes, renewal=0, sizes=None)
     twice = equidistributed(mesh, orbit.nodes(point.u), orbit.degree, 2 * orbit.intervals)
     orbit, u, tangent = orbit.on_mesh(twice, point.u, point.tangent)
     problem = replace(curve, orbit=orbit, sign=ContinuedSign())

@@ -29,6 +29,19 @@ def open_values(nodes, end, values, out):
                     out[row, i] += value * (nodes[node, i] if node < total else end[i])
 
 
+@kernel(types.void(block, matrix, matrix))
+def applied(matrices, vectors, out):
+    """Fill out (N m, d) with the products of matrices (N m, d, d) and vectors."""
+    matrices, vectors, out = borrowed(matrices), borrowed(vectors), borrowed(out)
+    rows, d = vectors.shape
+    for row in range(rows):
+        for i in range(d):
+            total = 0.0
+            for c in range(d):
+                total += matrices[row, i, c] * vectors[row, c]
+            out[row, i] = total
+
+
 _complex_matrix = types.Array(types.complex128, 2, "C")
 
 
