@@ -78,7 +78,8 @@ def test_damaged_code_is_compiled_again(tmp_path, stored):
             path.write_bytes(DAMAGES[damage](path.read_bytes()))
         cases.append(folder)
         others.append(other)
-    assert dict(zip(cases, hits(*cases), strict=True)) == dict.fromkeys(cases, ["0", "0"])
+    found = zip(cases, hits(*cases), strict=True)
+    assert not [folder.name for folder, said in found if said != ["0", "0"]]
     assert {other.read_bytes() for other in others} == {b"of somebody else"}
     # All of it is stored anew, and found by the same means.
     assert hits(*cases) == len(cases) * [["1", "1"]]
