@@ -65,7 +65,6 @@ def test_it_is_the_distance_to_the_describing_function(w, samples):
     assert 0.5 * off < sampling_error(problem, u, fixed(u)) < 2.0 * off
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("samples", [32, 128])
 def test_along_a_branch_it_is_the_distance_at_right_angles(samples):
     """From the curve of the describing function."""
@@ -219,7 +218,6 @@ def test_modes_get_samples_enough_too():
     assert mode.branch.attributes["sampling_error"] <= 2e-3
 
 
-@pytest.mark.long
 def test_modes_without_losses_do_not_hold_the_parameter():
     """xi is zero along them, for any amplitude; the error has that of the period in it."""
     system = masses(between=0.5)
