@@ -7,6 +7,9 @@ RUNS   := $(VENV)/.compiled-for-runs
 ALL    := $(VENV)/.compiled
 SYSTEM := $(VENV)/.system-libraries
 
+# Tests start many processes, and pytest rewrites their files: what Python keeps of this saves time.
+export PYTHONDONTWRITEBYTECODE :=
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-slow check bench docs validation clean
 

@@ -54,7 +54,11 @@ LONG = {
     "test_solid_basis", "test_solid_assembly", "test_surface_patches", "test_solid_movie",
     "test_solid_plots", "test_prestressed_solids", "test_load_history_space", "test_solid_eigen",
     "test_set_valued_orbits", "test_homoclinic_curves", "test_branch_tree", "test_branch_ends",
-    "test_simulate", "test_set_valued_space", "test_inlined_laws",
+    "test_simulate", "test_set_valued_space", "test_flights_from_stops", "test_compliant_lift_off",
+    "test_near_solver", "test_runs_in_blocks", "test_pickled_systems", "test_study_convergence",
+    "test_executors", "test_event_branches", "test_homoclinic_by_projection",
+    "test_codim2_switching", "test_sampling_error", "test_ends_by_method", "test_canards",
+    "test_static_friction_borders", "test_inlined_laws",
 }
 
 

@@ -6,6 +6,7 @@ those for types alone count.
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,9 +27,14 @@ MODULES = {
 }
 
 
+@cache
+def tree(module: str) -> ast.Module:
+    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
+
+
 def imported(module: str) -> Iterator[str]:
     """Modules of the package that a module imports, wherever in its text."""
-    for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(module)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name.startswith("fecontact"))
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fecontact"):
@@ -39,8 +45,10 @@ def imported(module: str) -> Iterator[str]:
                 yield full if full in MODULES else str(node.module)
 
 
-ARROWS = {module: {target for target in imported(module) if target != module}
-          for module in MODULES}
+@cache
+def arrows() -> dict[str, set[str]]:
+    return {module: {target for target in imported(module) if target != module}
+            for module in MODULES}
 
 
 def room(module: str) -> str:
@@ -59,14 +67,14 @@ def test_there_is_nothing_beside_the_rooms():
 @pytest.mark.parametrize("name", ROOMS)
 def test_rooms_import_only_from_rooms_above_them(name):
     above = {other for other in ROOMS[: ROOMS.index(name)] if (name, other) not in STRANGERS}
-    wrong = {f"{module} -> {target}" for module, targets in ARROWS.items()
+    wrong = {f"{module} -> {target}" for module, targets in arrows().items()
              if room(module) == name for target in targets if room(target) not in {name, *above}}
     assert not wrong
 
 
 def test_no_module_imports_itself_through_others():
     left = {module: {target for target in targets if target in MODULES}
-            for module, targets in ARROWS.items()}
+            for module, targets in arrows().items()}
     while free := [module for module, targets in left.items() if not targets & left.keys()]:
         for module in free:
             del left[module]
@@ -75,16 +83,15 @@ def test_no_module_imports_itself_through_others():
 
 
 def test_every_import_names_a_module_that_exists():
-    assert {target for targets in ARROWS.values() for target in targets} <= MODULES.keys()
+    assert {target for targets in arrows().values() for target in targets} <= MODULES.keys()
 
 
 def test_imports_are_absolute_and_found_by_this_test():
     """A module that imports nothing would pass the others without being looked at."""
-    relative = [module for module, path in MODULES.items()
-                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    relative = [module for module in MODULES for node in ast.walk(tree(module))
                 if isinstance(node, ast.ImportFrom) and node.level]
     assert not relative
-    assert sum(map(len, ARROWS.values())) > 800
+    assert sum(map(len, arrows().values())) > 800
 
 
 def test_modules_and_folders_are_of_a_size_to_be_read():

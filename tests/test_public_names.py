@@ -9,7 +9,7 @@ import subprocess
 import sys
 import textwrap
 import typing
-from functools import cached_property
+from functools import cache, cached_property
 
 import pytest
 
@@ -95,6 +95,7 @@ def test_help_of_a_public_function_fits_a_screen():
         assert len(shown) + len(signature) - 1 <= 52, name
 
 
+@cache
 def names_for_types(module):
     """Names of a module with those that it imports for type checkers alone."""
     found = dict(vars(module))

@@ -155,6 +155,7 @@ def layer_slope(t, x, p, out):
         out[0, 0] = np.nan
 
 
+@pytest.mark.long
 def test_error_of_an_orbit_without_a_jacobian():
     """Where an error is solved for with the Jacobian, that has to be finite."""
     field = vector_field(layer, {"slope": 1e3, "none": 0.0}, 1, jacobian=layer_slope, period=TURN)

@@ -126,7 +126,13 @@ def test_a_motion_has_its_least_period():
     assert motion.points.tolist() == [[1.0]]
 
 
-def test_a_folder_and_processes_change_nothing(tmp_path):
+@pytest.fixture(scope="module")
+def pool():
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as processes:
+        yield processes
+
+
+def test_a_folder_and_processes_change_nothing(tmp_path, pool):
     plain = two_motions(workers=1)
     assert len(plain.attractors) > 1
     assert (plain.label >= 0).all()
@@ -138,8 +144,7 @@ def test_a_folder_and_processes_change_nothing(tmp_path):
     written = [path.stat().st_mtime_ns for path in blocks]
     same(plain, two_motions(folder=tmp_path / "own"))
     assert [path.stat().st_mtime_ns for path in blocks] == written
-    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
-        same(plain, two_motions(folder=tmp_path / "pool", executor=pool))
+    same(plain, two_motions(folder=tmp_path / "pool", executor=pool))
     for one, other in zip(blocks, sorted((tmp_path / "pool").glob("*.npz")), strict=True):
         assert one.read_bytes() == other.read_bytes()
 
@@ -173,6 +178,7 @@ def scanned(**settings):
                          transient_periods=60, keep=6, initial=np.zeros(2), **settings)
 
 
+@pytest.mark.slow
 def test_what_was_killed_goes_on_to_the_same_result(tmp_path):
     """Killed three times, at blocks of basins and chains of a diagram: not a bit differs."""
     script = tmp_path / "script.py"
@@ -195,14 +201,13 @@ def test_what_was_killed_goes_on_to_the_same_result(tmp_path):
     assert not list(tmp_path.glob("*/.*.part"))
 
 
-def test_a_diagram_does_not_depend_on_the_machine(monkeypatch, tmp_path):
+def test_a_diagram_does_not_depend_on_the_machine(monkeypatch, tmp_path, pool):
     """Not on cores, threads or processes: chains are cut by the number of values alone."""
     found = []
     for cores in (1, 7):
         monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores)
         found.append(scanned())
-    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
-        found.append(scanned(folder=tmp_path / "pool", executor=pool))
+    found.append(scanned(folder=tmp_path / "pool", executor=pool))
     for one in found[1:]:
         assert (one.up == found[0].up).all()
         assert (one.down == found[0].down).all()

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 from unittest import mock
 
@@ -34,13 +35,24 @@ print(*hits)
 '''
 
 
-def hits(folder):
-    """Whether kernel and law were found on disk by a new process."""
-    done = subprocess.run([sys.executable, "-c", "import own_kernels"], cwd=folder, check=False,
+IMPORTS = """
+import sys
+for folder in sys.argv[1:]:
+    sys.path[0] = folder
+    sys.modules.pop("own_kernels", None)
+    import own_kernels
+"""
+
+
+def hits(*folders):
+    """What a new process says that imports the module of each folder: whether it was on disk."""
+    done = subprocess.run([sys.executable, "-c", IMPORTS, *map(str, folders)], check=False,
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    return done.stdout.split()
+    said = [line.split() for line in done.stdout.splitlines()]
+    assert len(said) == len(folders)
+    return said[0] if len(folders) == 1 else said
 
 
 DAMAGES = {
@@ -53,19 +65,24 @@ DAMAGES = {
 }
 
 
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_code_is_compiled_again(tmp_path, stored, suffix, damage):
-    # With times of files, by which stored code is known to be that of the source.
-    folder = Path(shutil.copytree(stored, tmp_path / "copy"))
-    other = folder / "__pycache__" / f"mine{suffix}"
-    other.write_bytes(b"of somebody else")
-    own = [path for path in other.parent.glob(f"*{suffix}") if path != other]
-    assert len(own) == 2
-    for path in own:
-        path.write_bytes(DAMAGES[damage](path.read_bytes()))
-    assert hits(folder) == ["0", "0"]
-    assert other.read_bytes() == b"of somebody else"
+def test_damaged_code_is_compiled_again(tmp_path, stored):
+    cases, others = [], []
+    for damage, suffix in product(DAMAGES, (".nbi", ".nbc")):
+        # With times of files, by which stored code is known to be that of the source.
+        folder = Path(shutil.copytree(stored, tmp_path / f"{damage}{suffix}"))
+        other = folder / "__pycache__" / f"mine{suffix}"
+        other.write_bytes(b"of somebody else")
+        own = [path for path in other.parent.glob(f"*{suffix}") if path != other]
+        assert len(own) == 2
+        for path in own:
+            path.write_bytes(DAMAGES[damage](path.read_bytes()))
+        cases.append(folder)
+        others.append(other)
+    found = zip(cases, hits(*cases), strict=True)
+    assert not [folder.name for folder, said in found if said != ["0", "0"]]
+    assert {other.read_bytes() for other in others} == {b"of somebody else"}
+    # All of it is stored anew, and found by the same means.
+    assert hits(*cases) == len(cases) * [["1", "1"]]
 
 
 def test_whole_code_is_found_and_damaged_code_stored_anew(tmp_path, stored):
@@ -86,15 +103,13 @@ def stored(tmp_path_factory):
     return folder
 
 
-def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path):
+def test_code_that_cannot_be_stored_is_compiled_all_the_same(tmp_path, stored):
     """Folders stand where numba would put its index: neither read nor written."""
-    (tmp_path / "own_kernels.py").write_text(MODULE)
-    assert hits(tmp_path) == ["0", "0"]
-    assert hits(tmp_path) == ["1", "1"]
-    for path in (tmp_path / "__pycache__").glob("*.nbi"):
+    folder = Path(shutil.copytree(stored, tmp_path / "copy"))
+    for path in (folder / "__pycache__").glob("*.nbi"):
         path.unlink()
         path.mkdir()
-    assert hits(tmp_path) == ["0", "0"]
+    assert hits(folder) == ["0", "0"]
 
 
 HELPERS = '''
@@ -127,23 +142,31 @@ print(*outer.stats.cache_hits.values() or [0], outer(3.0))
 '''
 
 
+@pytest.fixture(scope="module")
+def calling(tmp_path_factory):
+    folder = Path(tmp_path_factory.mktemp("calling"))
+    (folder / "own_kernels.py").write_text(CALLING)
+    (folder / "helpers.py").write_text(HELPERS)
+    assert hits(folder) == ["0", "7.0"]
+    assert hits(folder) == ["1", "7.0"]
+    return folder
+
+
 @pytest.mark.parametrize(("old", "new", "result"), [
     ("FACTOR = 2.0", "FACTOR = 3.0", ["0", "10.0"]),
     ("FACTOR * x", "FACTOR - x", ["0", "0.0"]),
     ("Scale a number.", "A longer docstring,\n\n    with lines.", ["1", "7.0"]),
     ("FACTOR = 2.0", "# A comment.\nFACTOR = 2.0", ["1", "7.0"]),
 ])
-def test_code_is_compiled_again_if_anything_changes_that_it_calls(tmp_path, old, new, result):
+def test_code_is_compiled_again_if_anything_changes_that_it_calls(tmp_path, calling, old, new,
+                                                                  result):
     """Else a changed helper would leave the code of kernels in other files as it was."""
     assert old in HELPERS
-    (tmp_path / "own_kernels.py").write_text(CALLING)
-    (tmp_path / "helpers.py").write_text(HELPERS)
-    assert hits(tmp_path) == ["0", "7.0"]
-    assert hits(tmp_path) == ["1", "7.0"]
-    (tmp_path / "helpers.py").write_text(HELPERS.replace(old, new))
-    for path in (tmp_path / "__pycache__").glob("helpers.*.pyc"):
+    folder = Path(shutil.copytree(calling, tmp_path / "copy"))
+    (folder / "helpers.py").write_text(HELPERS.replace(old, new))
+    for path in (folder / "__pycache__").glob("helpers.*.pyc"):
         path.unlink()  # Python would take it for that of the new file, of the same size and second
-    assert hits(tmp_path) == result
+    assert hits(folder) == result
 
 
 def _outer(x):

@@ -149,6 +149,7 @@ def test_constants_stand_for_what_a_tuple_says():
     assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)
 
 
+@pytest.mark.long
 def test_a_law_keeps_its_functions_whatever_kernel_was_loaded_before():
     # The step loop holds functions of the same names as the law that changes contacts.
     script = """

@@ -125,6 +125,7 @@ def test_events_are_those_of_all_nodes(case):
     assert own.events.time == pytest.approx(other.events.time, abs=1e-12)
 
 
+@pytest.mark.long
 def test_states_far_from_the_start_find_their_nodes():
     run, _ = runs_of(*beam())
     run.advance(60)

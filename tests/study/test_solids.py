@@ -111,6 +111,7 @@ def same_runs(one, other):
         assert (getattr(one, name) == getattr(other, name)).all(), name
 
 
+@pytest.mark.long
 def test_a_solid_on_a_belt_runs_as_in_python():
     study = fc.Study.from_toml(template("solid")).with_(**{"simulation.t_end": 0.004,
                                                            "simulation.outputs": 41})
@@ -455,6 +456,7 @@ def test_summaries_of_one_point_see_all_directions():
         summarise(fc.Study.from_toml(PLANE).run(), functions_for(["amplitude_z@0"]))
 
 
+@pytest.mark.long
 def test_sweeps_of_solids_have_the_numbers_of_single_runs(tmp_path):
     from fecontact.sweeps.summaries import functions_for, summarise
 

@@ -169,6 +169,7 @@ def test_failed_cases_have_reasons_and_do_not_stop_the_others(study, tmp_path, c
     assert len(counts()) == 1
 
 
+@pytest.mark.slow
 def test_a_case_that_ends_its_process_is_found_and_the_others_go_on(study, tmp_path):
     table = sweep(study, {"friction.static_coefficient": [0.5, 0.6, 0.8, 0.7]},
                   folder=tmp_path / "f", batch=2, workers=2,

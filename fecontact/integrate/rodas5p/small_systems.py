@@ -93,7 +93,7 @@ def _propagate(size: tuple[int, int] | None, parts: bool = False) -> int:
 
 def compile_usual() -> None:
     """Compile the derivatives of steps of all systems, and of those of the usual sizes."""
-    for size in (None, (1, 1), (2, 1), (3, 1)):
+    for size in (None, (1, 1), (2, 1), (3, 1), (1, 2), (2, 2)):
         _propagate(size)
     _propagate(None, True)
 
