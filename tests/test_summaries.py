@@ -7,7 +7,7 @@ import pytest
 from synthetic import basis, run
 
 import fecontact as fc
-from fecontact.bifurcation import Branch, BranchPoint, StabilityMap
+from fecontact.bifurcation import Branch, BranchPoint, BranchTree, PeriodicMotion, StabilityMap
 from fecontact.core.units import html_table, listed, span
 from fecontact.integrate import Ensemble
 from fecontact.laws import LinearContact
@@ -103,6 +103,12 @@ SHOWN = {
                                    "boundary left: 2 edges")),
     "Branch": (branch, ("ground.speed", "0.5 ... 2", "42", "Hopf at 1", "fold at 2",
                         "13 of 40 regular")),
+    "HopfPoint": (lambda: branch().of_kind("Hopf")[0], ("ground.speed: 1", "values: stable")),
+    "BranchTree": (lambda: BranchTree({"sliding": branch()}, ["The branch 'b' fell."]), (
+        "sliding: 0.5 ... 2, Hopf, fold, points", "note: The branch 'b' fell.")),
+    "PeriodicMotion": (lambda: PeriodicMotion([0.0, 0.5, 1.0], [[0.0], [2.0], [0.0]], 1.0,
+                                              state_names=["x"]), (
+        "period: 1", "samples: 3", "x 0 ... 2")),
     "SweepTable": (table, ("cases: 20", "failed: 1", "load.normal 1 ... 4",
                            "friction.law of 2 values", "friction_power")),
     "Study": (lambda: fc.Study.from_toml(TOML), ("Beam", "modes: 6", "RoughSurface", "50 ms",

@@ -340,6 +340,7 @@ def begun(field: VectorField, point: BranchPoint, parameter: str, to: str | None
     if to is not None and to not in known:
         if to == "homoclinic" and (point.is_orbit or point.is_homoclinic):
             return point
-        others = choices(known) if known else "none that is named"
-        raise InputError(f"{point.place}: no curve to = {to!r} begins there; known are: {others}.")
+        others = (f"known are: {choices(known)}" if known else
+                  "leave it out to follow the curve on which the point lies")
+        raise InputError(f"{point.place}: no curve to = {to!r} begins there; {others}.")
     return known[to or next(iter(known))](field, point, parameter)

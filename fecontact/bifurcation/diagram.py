@@ -84,7 +84,7 @@ def follow_branches(
                             f"{task.title}, " if task.generation else "")
 
     result = Branches(contact_field=field, observe=(shown, wanted.component))
-    grow(result, _first_tasks(field, wanted, initial), beyond, wanted.generations,
+    grow(result, _first_tasks(field, wanted, initial), beyond, wanted.depth,
          lambda title: titled(wanted.options(), title, progress), kept)
     return result
 

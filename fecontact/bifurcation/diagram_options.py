@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError, choices, require_finite, require_positive
 from fecontact.core.units import Unit
 
@@ -36,7 +37,7 @@ class BranchSettings:
     switch : list of 'Hopf', 'period doubling', 'branch point'
         Special points at which the branches that begin there are followed too: the orbits born at
         Hopf points, those of twice the period, the other branch.
-    generations : int
+    depth : int
         How often to go over from a branch to others that begin on it.
     step, largest_step : float
         First and largest step, in parts of the diagram.
@@ -80,7 +81,7 @@ class BranchSettings:
     start: float | None = None
     kind: Literal["equilibria", "orbits", "both"] = "equilibria"
     switch: tuple[str, ...] = ()
-    generations: int = 1
+    depth: int = 1
     step: float = 0.01
     largest_step: float = 0.05
     points: int = 200
@@ -98,14 +99,13 @@ class BranchSettings:
 
     def __post_init__(self) -> None:
         require_positive("BranchSettings", step=self.step, largest_step=self.largest_step,
-                         points=self.points, intervals=self.intervals, tolerance=self.tolerance,
-                         state_tolerance=self.state_tolerance, segments=self.segments)
+                         tolerance=self.tolerance, state_tolerance=self.state_tolerance)
         for name in ("transient", "longest_period"):
             if getattr(self, name) is not None:
                 require_positive("BranchSettings", **{name: getattr(self, name)})
-        if self.generations < 0:
-            raise InputError(f"BranchSettings: generations = {self.generations} must be zero or "
-                             f"above.")
+        as_count(self.depth, "BranchSettings: depth", 0)
+        for name in ("points", "intervals", "segments"):
+            as_count(getattr(self, name), f"BranchSettings: {name}")
         if self.poincare_scan < 0 or self.poincare_scan == 1:
             raise InputError(f"BranchSettings: poincare_scan = {self.poincare_scan} must be zero, "
                              f"for none, or at least 2.")

@@ -19,9 +19,10 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.diagram_options import SWITCHES
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.orbits.same_orbit import HALVING
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import as_count, as_texts, require_flags, require_kind
 from fecontact.core.errors import FecontactError, InputError, choices
 from fecontact.core.types import Array
+from fecontact.core.units import Summarised, listed, span
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 _SAME = 1e-4
 
 
-@dataclass
-class BranchTree:
+@dataclass(repr=False)
+class BranchTree(Summarised):
     """Branches by name, in the order in which they were followed.
 
     Attributes
@@ -49,6 +50,14 @@ class BranchTree:
     found: dict[str, Branch] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     interrupted: bool = False
+
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Of each branch the range, its special points, and how it ended."""
+        rows = [(name, f"{span(branch.parameter)}, "
+                       f"{listed([str(point.kind) for point in branch.special], 3)}, "
+                       f"{branch.status.name.lower()}") for name, branch in self.found.items()]
+        return [*rows, *(("note", note) for note in self.notes)]
 
 
 def _followed(options: ContinuationOptions) -> Branch:
@@ -109,14 +118,20 @@ def branch_tree(
         If the branches have different parameters, or a kind of point is unknown.
     """
     require_field(field)
+    from fecontact.bifurcation.harmonic.method import HarmonicBalance
+    from fecontact.bifurcation.orbit_methods import Collocation, Shooting
+
+    require_kind("branch_tree", (Branch, Sequence, Mapping), first=first)
+    require_kind("branch_tree", (Collocation, Shooting, HarmonicBalance, type(None)),
+                 method=method)
+    require_flags("branch_tree", both=both)
     roots = _named(first)
-    kinds = tuple([switch] if isinstance(switch, str) else switch)
+    kinds = as_texts(switch, "branch_tree: switch")
     for kind in kinds:
         if kind not in SWITCHES:
             raise InputError(f"branch_tree: switch = {kind!r} is not known; choose from "
                              f"{choices(SWITCHES)}.")
-    if not (isinstance(depth, int | np.integer) and depth >= 0):
-        raise InputError(f"branch_tree: depth = {depth!r} must be a whole number from 0 on.")
+    as_count(depth, "branch_tree: depth", 0)
     if bounds is None and (options is None or not np.isfinite(options.bounds).any()):
         ends = np.concatenate([branch.parameter for branch in roots.values()])
         bounds = (float(ends.min()), float(ends.max()))

@@ -61,6 +61,7 @@ app = App(
     version=_version,
     help_format="markdown",
     suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(negative=()),
 )
 app.meta.suppress_keyboard_interrupt = False
 for _place, _command in enumerate(COMMANDS):

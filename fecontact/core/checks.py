@@ -1,7 +1,7 @@
 """Checks of arguments, shared by all public functions."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, cast
@@ -36,6 +36,25 @@ def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> No
 
 _NAMES: dict[Any, str] = {Mapping: "a mapping of names", Sequence: "a sequence", str: "a text",
                           int: "a whole number", Callable: "a function", bool: "true or false"}
+
+
+def require_flags(owner: str, **values: Any) -> None:
+    """Raise :class:`InputError` unless the named arguments are True or False."""
+    for name, value in values.items():
+        if not isinstance(value, bool | np.bool_):
+            raise InputError(f"{owner}: {name} = {shown(value)} must be True or False.")
+
+
+def as_texts(values: Any, what: str) -> tuple[str, ...]:
+    """Convert one text or several to a tuple; ``what`` is their name in the InputError."""
+    given = (values,) if isinstance(values, str) else values
+    if not (isinstance(given, Iterable) and not isinstance(given, bytes)):
+        raise InputError(f"{what} = {shown(values)} must be a text or several.")
+    found = tuple(given)
+    for one in found:
+        if not isinstance(one, str):
+            raise InputError(f"{what}: {shown(one)} must be a text, not {type(one).__name__}.")
+    return found
 
 
 def as_path(path: Any, what: str) -> Path:

@@ -7,8 +7,9 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.checks import require_flags
 from fecontact.core.compiled import CompiledLaw, compile_law
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, choices, nearest, require_choice, require_finite
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.event_kernels import EVENT, FIRST_OWN
 from fecontact.reduction.modal_basis import COMPONENTS, Component
@@ -162,8 +163,8 @@ class Crossing:
     def __post_init__(self) -> None:
         _require_sense("Crossing", self.sense)
         require_quantity("Crossing", self.component, self.of)
-        if not np.isfinite(self.value):
-            raise InputError(f"Crossing: value = {self.value!r} must be finite.")
+        require_finite("Crossing", value=self.value)
+        require_flags("Crossing", stop=self.stop)
 
     def row(self, system: ContactSystem | VectorField) -> Array:
         """Parameters of the function for a system: the value, and the row (size,) of the quantity.
@@ -284,9 +285,7 @@ def as_events(events: AnyEvent | Sequence[AnyEvent] | None) -> tuple[AnyEvent, .
 
 
 def _require_sense(owner: str, sense: str) -> None:
-    if sense not in _SENSES:
-        raise InputError(f"{owner}: sense = {sense!r} must be one of "
-                         f"{choices(tuple(_SENSES))}.")
+    require_choice(owner, "sense", sense, _SENSES)
 
 
 def direction_sign(watched: Event | Crossing) -> int:

@@ -123,7 +123,7 @@ def test_kind_errors():
     rest = equilibrium_branch(field, parameter="p", bounds=(-0.5, 1.5))
     with pytest.raises(InputError, match="switch = 'hopf' is not known; choose from"):
         branch_tree(field, rest, switch=["hopf"])
-    with pytest.raises(InputError, match=r"depth = -1 must be a whole number from 0 on"):
+    with pytest.raises(InputError, match=r"depth = -1 must be a whole number, 0 or above"):
         branch_tree(field, rest, depth=-1)
     with pytest.raises(InputError, match="branches over the same single parameter"):
         branch_tree(field, [])

@@ -56,6 +56,21 @@ def test_quantities_and_numbers_of_points():
         plot_branches([BRANCH], "state")
 
 
+def test_orbits_are_drawn_by_the_largest_value_of_a_state():
+    """So that equilibria and the orbits born of them stand in one diagram."""
+    orbits = Branch("p", tuple(
+        BranchPoint(np.array([0.0, p]), np.array([0.0, 1.0]),
+                    {"maximum": np.array([3.0 + p, 7.0]), "minimum": np.zeros(2), "stable": True})
+        for p in (1.5, 2.0)))
+    axis = plot_branches([BRANCH, orbits]).axes[0]
+    assert [line.get_ydata().tolist() for line in axis.lines
+            if line.get_linestyle() != "None"][-1] == [4.5, 5.0]
+    assert axis.get_ylabel() == "state 0"
+    assert plot_branches(orbits, np.int64(1)).axes[0].lines[0].get_ydata().tolist() == [7.0, 7.0]
+    with pytest.raises(InputError, match="There is no state 2: the branch stores 2 states"):
+        plot_branches([BRANCH, orbits], 2)
+
+
 def test_branches_of_one_name_share_colour_and_entry():
     above = Branch("p", (point(0.0, 7.0, True), point(1.0, 8.0, True)))
     axis = plot_branches([BRANCH, above, above], 0, names=["a", "b", "a"]).axes[0]

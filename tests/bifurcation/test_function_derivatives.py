@@ -314,3 +314,20 @@ def test_terms_that_cancel_do_not_refute_the_complex_step():
     for c in (-0.3, 0.2, 0.7434):
         P = field.derivatives(np.zeros(len(k)), x, np.array([-1.0, c]), (0, 1))[2]
         assert P[:, 1, 1] == pytest.approx(x[:, 1], rel=1e-12, abs=0.0)
+
+
+def test_states_at_rounding_of_zero_are_zero():
+    """The complex step underflows there; a saddle at zero comes as near along a curve."""
+    def product(t, x, p, out):
+        out[0] = p[0] * x[0] - x[1]
+        out[1] = x[0] * x[1] + p[1] * x[1]
+
+    field = vector_field(product, {"a": 2.0, "b": 3.0}, 2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for size in (1e-150, 1e-250, 1e-300, 5e-324, 0.0):
+            x = size * np.array([[1.0, -2.0]])
+            _, J, P = field.derivatives(np.zeros(1), x, field.values, (0, 1))
+            assert J[0] == pytest.approx(np.array([[2.0, -1.0], [0.0, 3.0]]), rel=1e-12)
+            expected = np.array([[1.0, 0.0], [0.0, -2.0]]) * (size if size > 1e-200 else 0.0)
+            assert P[0] == pytest.approx(expected, rel=1e-12, abs=0.0)

@@ -134,7 +134,7 @@ def test_orbits_at_a_value(field, kept):
     assert motion.times[-1] == motion.period == pytest.approx(np.pi, rel=1e-7)
     assert motion.parameter_values == pytest.approx([0.25, 2.0])
     assert kept.at(field, kept.points[3].parameter) is kept.points[3]
-    with pytest.raises(InputError, match=r"has 0 solutions at 0\.7"):
+    with pytest.raises(InputError, match=r"= 0\.7: the branch lies between .*; choose a value"):
         kept.at(field, 0.7)
     several = kept.at(field, [0.09, 0.16, 0.36])
     assert [point.parameter for point in several] == pytest.approx([0.09, 0.16, 0.36], rel=1e-12)
@@ -164,8 +164,12 @@ def test_equilibria_at_a_value_which_are_several():
     assert near == pytest.approx(fold.u[0] + np.array([-1e-3, 1e-3]), abs=1e-5)
     assert [branch.at(field, 0.0, which).values["stable"] for which in range(3)] == [
         True, False, True]
-    with pytest.raises(InputError, match="has 3 solutions at 0, none with the number which = 3"):
+    with pytest.raises(InputError, match="a = 0: the branch passes this value 3 times; choose a "
+                                         "whole number from 0 to 2, not which = 3"):
         branch.at(field, 0.0, 3)
+    with pytest.raises(InputError, match="is written 'fold'"):
+        branch.of_kind("Fold")
+    assert branch.of_kind("neutral saddle") == ()
 
 
 def test_equilibria_go_on_and_cross(tmp_path):

@@ -254,7 +254,9 @@ def test_settings_of_a_movie_out_of_range(cli, study):
 
 
 @pytest.mark.parametrize("tokens", [["rnu"], ["run"], ["run", "a.toml", "--sett", "x=1"],
-                                    ["init", "--shape", "bem"], ["render", "a", "--fps", "many"]])
+                                    ["init", "--shape", "bem"], ["render", "a", "--fps", "many"],
+                                    ["branch", "a.toml", "--empty-bounds"],
+                                    ["branch", "a.toml", "--bounds", "1"]])
 def test_command_lines_that_cannot_be_understood(tokens, cli):
     code, _, err = cli(*tokens)
     assert code == 2

@@ -196,6 +196,15 @@ def test_a_damaged_branch_is_one_sentence(change, tmp_path):
     assert "\n" not in str(caught.value)
 
 
+def test_a_file_of_branches_is_no_run(tmp_path):
+    system = run(times=3).system
+    points = tuple(BranchPoint(np.array([0.1 * k, 1.0 + k]), np.array([1.0, 0.0]),
+                               {"state": np.zeros(1)}) for k in range(2))
+    path = write_branches(tmp_path / "a.h5", {"a": Branch("p", points)}, system=system)
+    with pytest.raises(InputError, match="holds branches but no run; read it with read_branches"):
+        read_case(path)
+
+
 def test_a_damaged_basis_is_one_sentence(tmp_path):
     path = tmp_path / "basis.h5"
     write_basis(path, run(times=3).system.basis)

@@ -11,9 +11,11 @@ from systems import friction_oscillator, impact_oscillator
 
 import fecontact as fc
 from fecontact.bifurcation import (
+    Collocation,
     PeriodicMotion,
     contact_field,
     orbit_branch,
+    periodic_motion,
     poincare_scan,
     vector_field,
 )
@@ -100,6 +102,25 @@ def test_movies_in_space(tmp_path):
 def test_errors(call, told, tmp_path):
     with pytest.raises(fc.InputError, match=told):
         call(tmp_path / "a.png")
+
+
+def test_orbits_know_the_names_of_their_states():
+    def circle(t, x, p, out):
+        square = x[0] * x[0] + x[1] * x[1]
+        out[0] = p[0] * x[0] - x[1] - square * x[0]
+        out[1] = x[0] + p[0] * x[1] - square * x[1]
+
+    field = vector_field(circle, {"mu": 0.25}, ["left", "up"])
+    motion = periodic_motion(field, initial=[0.5, 0.0], transient=50.0, longest_period=10.0)
+    branch = orbit_branch(field, motion, "mu", bounds=(0.2, 0.3), method=Collocation(intervals=10))
+    for one in (motion, branch.points[0].orbit(field)):
+        axis = plot_phase_space(one, ["up", "left"]).axes[0]
+        assert (axis.get_xlabel(), axis.get_ylabel()) == ("up", "left")
+        assert np.hypot(*axis.lines[0].get_data()) == pytest.approx(0.5, abs=1e-5)
+        with pytest.raises(fc.InputError, match=r"no state 'u' .*mean 'up'"):
+            plot_phase_space(one, ["u", "left"])
+    with pytest.raises(fc.InputError, match="There is no state 'up'"):
+        plot_phase_space(branch.points[0].orbit(), ["up", "left"])
 
 
 @pytest.mark.parametrize("run", [RUN, SWING])

@@ -13,6 +13,7 @@ import numpy as np
 from fecontact.bifurcation.attractors.attractor import Attractor, told_apart
 from fecontact.bifurcation.attractors.blocks import Found, Place, mark_of, work_off
 from fecontact.bifurcation.attractors.labels import Settled
+from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
@@ -164,6 +165,7 @@ def basins(
         if transient_periods is None or transient is not None:
             raise InputError("basins: without a section give transient_periods, the periods of "
                              "the excitation before states count, and no transient.")
+        as_count(transient_periods, "basins: transient_periods", 0)
     elif transient_periods is not None or not (
             isinstance(transient, Real) and 0.0 < transient < np.inf):
         raise InputError(f"basins: transient = {transient!r} must be a time above zero [s] "

@@ -3,10 +3,11 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from numbers import Integral, Real
+from numbers import Real
 
 import numpy as np
 
+from fecontact.core.checks import as_count
 from fecontact.core.errors import (
     AnalysisError,
     FecontactError,
@@ -116,8 +117,8 @@ def lyapunov_exponents(
                      **({} if interval is None else {"interval": interval}))
     if not (isinstance(transient, Real) and 0.0 <= transient < np.inf):
         raise InputError(f"transient = {transient!r} must be zero or above [s].")
-    if not (isinstance(count, Integral) and 1 <= count <= size):
-        raise InputError(f"count = {count!r} must be a whole number from 1 to {size}.")
+    if as_count(count, "count") > size:
+        raise InputError(f"count = {count} must be a whole number from 1 to {size}.")
     state, time = start_state(moving, initial, 0.0), float(transient)
     with shown(progress, lambda: progress_bar("Lyapunov exponents", time + duration)) as tell:
         if transient > 0.0:

@@ -18,13 +18,24 @@ from fecontact.bifurcation.continuation.points import (
     on_branch,
     require_no_family,
 )
-from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
+from fecontact.bifurcation.continuation.problem import (
+    KINDS,
+    BranchStatus,
+    ContinuationOptions,
+    Problem,
+)
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
-from fecontact.core.checks import as_floats
-from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import AnalysisError, InputError, choices, require_finite, shown
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.fields.vector_field import VectorField, require_field
+
+
+def _plain(kind: str) -> str:
+    """A kind without capitals, hyphens and spaces."""
+    return kind.lower().replace("-", "").replace(" ", "").replace("_", "")
+
 
 # Relative distance within which a value of the parameter is reached.
 _REACHED = 1e-9
@@ -119,7 +130,18 @@ class Branch(Summarised):
     @overload
     def of_kind(self, kind: str) -> tuple[BranchPoint, ...]: ...
     def of_kind(self, kind: str) -> tuple[BranchPoint, ...]:
-        """The special points of one kind."""
+        """The special points of one kind, such as 'fold' or the name of an event.
+
+        Raises
+        ------
+        InputError
+            If there are none, and the kind is one of this package in another spelling.
+        """
+        if not isinstance(kind, str):
+            raise InputError(f"Branch.of_kind: kind = {shown(kind)} must be a text.")
+        written = next((name for name in KINDS if _plain(name) == _plain(kind)), kind)
+        if written != kind and all(point.kind != kind for point in self.points):
+            raise InputError(f"Branch.of_kind: kind = {kind!r} is written {written!r}.")
         return tuple(point for point in self.points if point.kind == kind)
 
     def column(self, name: str) -> NDArray[Any]:
@@ -131,6 +153,7 @@ class Branch(Summarised):
             If no such value is stored; it lists those that are. Or its length differs from point
             to point, as that of the mesh of special points may.
         """
+        require_kind("Branch.column", str, name=name)
         known = self.points[0].values if self.points else {}
         if name not in known:
             raise InputError(f"The branch stores no value {name!r}; it has: {choices(known)}.")
@@ -177,11 +200,8 @@ class Branch(Summarised):
             require_no_family(point)
         passed = self._passed(float(value))
         if not (isinstance(which, int | np.integer) and -len(passed) <= which < len(passed)):
-            span = (f"from {self.parameter.min():.6g} to {self.parameter.max():.6g}" if self.points
-                    else "without any point")
-            raise InputError(f"The branch, {self.parameter_name} {span}, "
-                             f"has {len(passed)} solutions at {value:.6g}, none with the number "
-                             f"which = {which!r}.")
+            raise InputError(f"{self.parameter_name} = {value:.6g}: {self._passages(passed)}"
+                             f"{f', not which = {which!r}' if passed else ''}.")
         place, sign = passed[which]
         start = self.points[place]
         if start.parameter == value:
@@ -195,6 +215,18 @@ class Branch(Summarised):
                                 f"found from that at {start.parameter:.6g}; follow the branch in "
                                 f"shorter steps there.")
         return on_branch(found, BranchHeader(self.parameter_name, self.attributes))
+
+    def _passages(self, passed: list[tuple[int, float]]) -> str:
+        """What may be asked for instead, for a message."""
+        if passed:
+            last = len(passed) - 1
+            return (f"the branch passes this value {len(passed)} times; choose a whole number from "
+                    f"0 to {last}" if last else "the branch passes this value once; choose 0")
+        if not self.points:
+            return "the branch has no point"
+        low, high = self.parameter.min(), self.parameter.max()
+        return (f"the branch lies between {low:.6g} and {high:.6g}; choose a value there, or "
+                f"follow it further")
 
     def _passed(self, value: float) -> list[tuple[int, float]]:
         """Indices of points beside a value of the parameter, with the direction to it along the

@@ -10,7 +10,7 @@ from numba import types
 
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Linearisation, Problem
 from fecontact.core.compiled import f8, helper, i8, kernel, matrix, vector
-from fecontact.core.errors import AnalysisError, FecontactError
+from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -242,8 +242,19 @@ def _tests(
         found |= {"fold": float(tangent[-1]), **problem.tests(u, linearisation, tangent)}
     if options.events:
         known = {**values, "parameter": float(u[-1])}
-        found |= {name: float(event(known)) for name, event in options.events.items()}
+        found |= {name: _of_event(name, event, known) for name, event in options.events.items()}
     return Tests(found)
+
+
+def _of_event(
+    name: str, event: Callable[[Mapping[str, Any]], float], known: Mapping[str, Any]
+) -> float:
+    """The value of a user's event."""
+    try:
+        return float(event(known))
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise InputError(f"The event {name!r} gives no number ({type(error).__name__}: {error}); "
+                         f"its function is called with {choices(known)}.") from error
 
 
 def norm(problem: Problem, vector: Array) -> float:

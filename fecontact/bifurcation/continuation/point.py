@@ -15,6 +15,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
+from fecontact.core.units import Summarised
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
@@ -49,8 +50,8 @@ class BranchHeader:
     attributes: Mapping[str, Any]
 
 
-@dataclass(frozen=True, eq=False)
-class BranchPoint:
+@dataclass(frozen=True, eq=False, repr=False)
+class BranchPoint(Summarised):
     """One solution on a branch.
 
     Attributes
@@ -75,6 +76,22 @@ class BranchPoint:
     kind: str | None = None
     _details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     header: BranchHeader | None = field(default=None, repr=False)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Kind, parameters, period and stability, and what else is stored."""
+        names = ("parameter",) if self.header is None else self.header.attributes.get(
+            "parameters", (self.header.parameter_name,))
+        known = self.values
+        return [
+            ("kind", self.kind or "regular"),
+            (str(names[0]), self.parameter_text()),
+            *((str(name), f"{known[name]:.7g}") for name in names[1:] if name in known),
+            *((name, f"{known[name]:.7g}") for name in ("period", "time") if name in known),
+            *([("criticality", self.criticality)] if self.criticality else []),
+            *([("stable", "yes" if known["stable"] else "no")]
+              if self.kind is None and "stable" in known else []),
+            ("values", ", ".join(known) or "none"),
+        ]
 
     @property
     def parameter(self) -> float:
@@ -136,7 +153,8 @@ class BranchPoint:
         known, values = self.branch.attributes, field.values
         if "parameters" in known or "parameter_values" not in known:
             raise InputError(f"{self.place} is on no branch of equilibria or orbits over one "
-                             f"parameter.")
+                             f"parameter; at a value on a curve over two an event of "
+                             f"ContinuationOptions gives a point.")
         names = known.get("parameter_names", list(field.parameters))
         for name, value in zip(names, np.asarray(known["parameter_values"]), strict=True):
             values[field.index(str(name))] = value
@@ -163,7 +181,8 @@ class BranchPoint:
         ----------
         field : VectorField, optional
             That of the branch; orbits found by shooting are run again and need it. With it the
-            motion knows its parameter values, and can start a branch over another parameter.
+            motion knows its parameter values and the names of its states, and can start a branch
+            over another parameter.
         samples : int
             Number of times; orbits by shooting may have some more.
 
@@ -181,7 +200,7 @@ class BranchPoint:
             found = sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
                             len(self.values["saddle"]), float(self.values["time"]), samples)
             return found if field is None else replace(
-                found, parameter_values=self._curve_values(field))
+                found, parameter_values=self._curve_values(field), state_names=field.state_names)
         values = None if field is None else self.parameter_values(field)
         period = float(self.values["period"])
         mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
@@ -195,7 +214,8 @@ class BranchPoint:
         else:
             found = of_runs(self._runs(field, samples), period)
         periods = int(self.branch.attributes["periods"]) if self.header is not None else 1
-        return replace(found, periods=periods, parameter_values=values)
+        return replace(found, periods=periods, parameter_values=values,
+                       state_names=() if field is None else field.state_names)
 
     def trajectory(self, field: VectorField, outputs: int = 1001) -> "Trajectory":
         """The orbit over one period as a trajectory, which can be plotted, stored and rendered.

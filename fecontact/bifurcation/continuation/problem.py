@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.checks import as_count, as_floats, as_texts, require_flags, require_kind
+from fecontact.core.errors import InputError, choices, nearest, require_positive, shown
 from fecontact.core.types import Array, ArrayLike
 
 _SAME_DIRECTION = 0.9  # cosine between directions that count as the same
@@ -245,6 +245,19 @@ class Problem(Protocol):
         return ()
 
 
+# Kinds of special points of the branches and curves of this package.
+KINDS = (
+    "Hopf", "fold", "branch point", "period doubling", "period halving", "Neimark-Sacker",
+    "unresolved", "cusp", "turning point", "extremum", "Bogdanov-Takens", "Bautin", "zero-Hopf",
+    "double Hopf", "generalised period doubling", "Chenciner", "resonance 1:1", "resonance 1:2",
+    "resonance 1:3", "resonance 1:4", "fold-flip", "fold-Neimark-Sacker", "flip-Neimark-Sacker",
+    "double Neimark-Sacker", "neutral saddle", "stable double eigenvalue",
+    "unstable double eigenvalue", "stable orbit flip", "unstable orbit flip",
+    "stable inclination flip", "unstable inclination flip", "grazing", "grazing-sliding",
+    "crossing-sliding", "switching-sliding", "adding-sliding", "impact-sliding", "lift-off",
+    "corner")
+
+
 @dataclass(frozen=True)
 class ContinuationOptions:
     """Step control, bounds and events of a branch.
@@ -303,6 +316,16 @@ class ContinuationOptions:
                          largest_step=self.largest_step, tolerance=self.tolerance,
                          points=self.points, iterations=self.iterations,
                          largest_turn=self.largest_turn)
+        for name in ("points", "iterations"):
+            as_count(getattr(self, name), f"ContinuationOptions: {name}")
+        require_flags("ContinuationOptions", locate=self.locate)
+        as_texts(self.stop_at, "ContinuationOptions: stop_at")
+        require_kind("ContinuationOptions", Mapping, events=self.events)
+        for name, event in self.events.items():
+            require_kind("ContinuationOptions: events", str, name=name)
+            if not callable(event):
+                raise InputError(f"ContinuationOptions: events: {name!r} = {shown(event)} must be "
+                                 f"a function of the stored values.")
         if not self.smallest_step <= self.step <= self.largest_step:
             raise InputError(f"ContinuationOptions: step = {self.step:g} must lie between "
                              f"smallest_step = {self.smallest_step:g} and "
@@ -331,6 +354,12 @@ def options_of(
     """The options, default ones if None, with the bounds if given."""
     require_kind("A branch", (ContinuationOptions, type(None)), options=options)
     chosen = options or ContinuationOptions()
+    known = (*KINDS, *chosen.events)
+    for kind in as_texts(chosen.stop_at, "stop_at"):
+        if kind not in known:
+            raise InputError(f"ContinuationOptions: stop_at = {kind!r} is no kind of special point "
+                             f"and no name of an event{nearest(kind, known)}; known are: "
+                             f"{choices(known)}.")
     return chosen if bounds is None else replace(chosen, bounds=bounds)
 
 

@@ -24,6 +24,7 @@ from fecontact.bifurcation.equilibria.equilibrium import (
     require_autonomous,
 )
 from fecontact.bifurcation.equilibria.problem import EquilibriumProblem, equilibrium_at
+from fecontact.core.checks import require_flags
 from fecontact.core.errors import InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -85,6 +86,8 @@ def equilibrium_branch(
     """
     require_field(field)
     require_finite("equilibrium_branch", direction=direction)
+    if both is not None:
+        require_flags("equilibrium_branch", both=both)
     if isinstance(start, str):
         raise InputError(f"equilibrium_branch: start = {start!r} must be an equilibrium or a point "
                          f"of a branch; give the parameter by its name, parameter={start!r}.")

@@ -12,6 +12,7 @@ from fecontact.bifurcation.equilibria.equilibrium import (
     unstable_count,
 )
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
@@ -97,12 +98,13 @@ def stability_map(
         If there is no equilibrium at the first values.
     """
     require_field(field)
+    require_kind("stability_map", Mapping, grid=grid)
     if len(grid) != 2:
         raise InputError(f"A stability map is over two parameters, not {len(grid)}; give the "
                          f"values of two by name.")
     names = tuple(grid)
     indices = [field.index(name) for name in names]
-    axes = [np.array(values, dtype=float).ravel() for values in grid.values()]
+    axes = [as_floats(values, f"The values of {name}").ravel() for name, values in grid.items()]
     for name, axis in zip(names, axes, strict=True):
         if not len(axis) or not np.isfinite(axis).all():
             raise InputError(f"The values of {name} for a stability map must be finite numbers, "

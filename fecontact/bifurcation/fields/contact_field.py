@@ -10,7 +10,7 @@ import numpy as np
 
 from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import as_texts, require_kind
 from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
@@ -207,4 +207,5 @@ def contact_field(
         If there is no such parameter, or it has a value per node.
     """
     require_kind("contact_field", ContactSystem, system=system)
+    as_texts(parameters, "contact_field: names of parameters")
     return ContactField(ParametrisedSystem(system, parameters))

@@ -34,7 +34,7 @@ from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.state_error import state_error
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import require_flags, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -103,6 +103,7 @@ def orbit_branch(
     require_kind("orbit_branch", (Collocation, Shooting, HarmonicBalance, type(None)),
                  method=method)
     require_finite("orbit_branch", direction=direction)
+    require_flags("orbit_branch", both=both)
     chosen = options_of(options, bounds)
     if not isinstance(start, BranchPoint):
         return _from_motion(field, as_motion(start), field.parameter_or_only(parameter),

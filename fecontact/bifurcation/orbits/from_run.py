@@ -61,6 +61,7 @@ def periodic_motion(
     """
     moving = in_time("periodic_motion", system)
     values = system.values if isinstance(system, VectorField) else None
+    names = system.state_names if isinstance(system, VectorField) else ()
     for name, value in (("transient", transient), ("longest_period", longest_period)):
         if value is not None:
             require_not_negative("periodic_motion", **{name: value})
@@ -76,7 +77,8 @@ def periodic_motion(
             raise AnalysisError(f"The run comes to rest, or slides steadily, after {transient:g} "
                                 f"s; there is no periodic orbit to start from, so take another "
                                 f"start, or equilibria and their Hopf points.")
-        return PeriodicMotion(run.time, run.states, _period(run, longest_period), 1, values)
+        return PeriodicMotion(run.time, run.states, _period(run, longest_period), 1, values,
+                              names)
     first = _TRANSIENT_PERIODS if transient is None else max(1, round(transient / excitation))
     largest = _LARGEST if longest_period is None else max(1, round(longest_period / excitation))
     checks = largest + max(2 * largest, 8)
@@ -101,7 +103,7 @@ def periodic_motion(
                             f"size); start at another value of the parameter, or run it longer.")
     count = found.periods * _SAMPLES + 1
     return PeriodicMotion(fine.time[:count], fine.states[:count], found.periods * excitation,
-                          found.periods, values)
+                          found.periods, values, names)
 
 
 def _run(

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.core.checks import as_floats
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.checks import as_floats, as_texts
+from fecontact.core.errors import InputError, require_positive, shown
 from fecontact.core.types import Array, ArrayLike
+from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import RODAS5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
@@ -25,8 +26,8 @@ _WITH_TIME = ("modal_coordinates", "modal_velocities", "memory", "held_normal_fo
 _COUNTED = ("work", "node_friction_work", "node_creep_work")
 
 
-@dataclass(frozen=True, eq=False)
-class PeriodicMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class PeriodicMotion(Summarised):
     """A periodic motion over at least one period: a start for branches of orbits.
 
     Parameters
@@ -40,6 +41,8 @@ class PeriodicMotion:
         Number of excitation periods in one period of the motion; 1 without excitation.
     parameter_values : (k,) sequence, optional
         Parameter values of the field for this motion; by default its base values.
+    state_names : sequence of str
+        Names (d,) of the states, for plots; empty where they have none.
 
     Raises
     ------
@@ -52,6 +55,7 @@ class PeriodicMotion:
     period: float | None = None
     periods: int = 1
     parameter_values: Array | None = None
+    state_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("times", "states", "parameter_values"):
@@ -61,11 +65,34 @@ class PeriodicMotion:
         if self.states.ndim != 2 or self.states.size == 0:
             raise InputError(f"states must be those of a motion (k, d), not of shape "
                              f"{self.states.shape}.")
+        if self.times.shape != (len(self.states),) or not np.isfinite(self.times).all() or (
+                np.diff(self.times) < -1e-9 * np.ptp(self.times)).any():
+            raise InputError(f"times must be {len(self.states)} finite numbers in ascending order, "
+                             f"one for each state of the motion, not {shown(self.times)}.")
+        if self.parameter_values is not None and not (
+                self.parameter_values.ndim == 1 and np.isfinite(self.parameter_values).all()):
+            raise InputError(f"parameter_values = {shown(self.parameter_values)} must be finite "
+                             f"numbers, one for each parameter of the field.")
+        names = as_texts(self.state_names, "PeriodicMotion: state_names")
+        object.__setattr__(self, "state_names", names)
+        if names and len(names) != self.states.shape[1]:
+            raise InputError(f"PeriodicMotion: state_names = {shown(names)} must be "
+                             f"{self.states.shape[1]} names.")
         if self.period is not None:
             require_positive("PeriodicMotion", period=self.period)
         if not (isinstance(self.periods, int | np.integer) and self.periods >= 1):
             raise InputError(f"PeriodicMotion: periods = {self.periods!r} must be a whole number "
                              f"from 1 on.")
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Period, samples, states and their ranges."""
+        names = self.state_names or [f"state {k}" for k in range(self.states.shape[1])]
+        ranges = [f"{name} {span(column)}" for name, column in
+                  zip(names, self.states.T, strict=True)]
+        return [
+            ("period", "that of the excitation" if self.period is None else f"{self.period:.7g}"),
+            *([("periods of the excitation", f"{self.periods}")] if self.periods > 1 else []),
+            ("samples", f"{len(self.times)}"), ("range", listed(ranges, 4))]
 
     @property
     def amplitudes(self) -> Array:

@@ -13,7 +13,7 @@ from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate
 from fecontact.bifurcation.orbits.motions import nodes_on_mesh
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -49,7 +49,13 @@ def quantity_range(
         If the field depends on time, or no equilibrium is found.
     """
     require_kind("quantity_range", BranchPoint, point=point)
-    low, high = _extremes(point, as_floats(row, "row"))
+    weights = as_floats(row, "row")
+    states = next((len(point.values[name]) for name in ("minimum", "state")
+                   if name in point.values), weights.size)
+    if weights.shape != (states,) or not np.isfinite(weights).all():
+        raise InputError(f"row = {shown(row)} must hold {states} finite numbers, one for each "
+                         f"state.")
+    low, high = _extremes(point, weights)
     if about is None:
         return low, high
     require_field(about)
@@ -58,14 +64,12 @@ def quantity_range(
     if not isinstance(about, ContactField):
         start = (point.orbit(about).states[:-1].mean(axis=0) if point.is_orbit
                  else np.asarray(point.values["state"]))
-    rest = float(as_floats(row, "row") @ find_equilibrium(about, values, start=start).state)
+    rest = float(weights @ find_equilibrium(about, values, start=start).state)
     return low - rest, high - rest
 
 
 def _extremes(point: BranchPoint, weights: Array) -> tuple[float, float]:
     """The range of the quantity with so many weights."""
-    if weights.ndim != 1:
-        raise InputError(f"row must hold one number for each state, not shape {weights.shape}.")
     if point.is_orbit and point.by_harmonics:
         return _peaks(point.orbit(samples=_FINE).states @ weights)
     if "mesh" not in point.values:

@@ -84,6 +84,9 @@ def write_branches(
     from h5py import SoftLink
 
     require_kind("write_branches", (ContactSystem, type(None)), system=system)
+    require_kind("write_branches", Mapping, branches=branches)
+    for branch in branches.values():
+        require_kind("write_branches", Branch, branch=branch)
     if not branches:
         raise InputError(f"There are no branches to write into {path}.")
     path = as_path(path, "branches")

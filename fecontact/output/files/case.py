@@ -137,8 +137,9 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
     path = as_path(path, "a run")
     with open_file(path, "basis") as file:
         if "trajectory" not in file:
-            raise InputError(f"{path} holds a modal basis but no run; read it with "
-                             f"read_basis.")
+            kind, how = (("branches", "read_branches") if "branches" in file else
+                         ("a modal basis", "read_basis"))
+            raise InputError(f"{path} holds {kind} but no run; read it with {how}.")
         model = stored_tables(file, path)
         basis = model.basis
         stored = member(file, "trajectory")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
+from fecontact.core.checks import as_texts, require_kind
+from fecontact.core.errors import InputError, choices, shown
 from fecontact.core.types import Array
 from fecontact.output.plots.diagram_insets import (
     DOTS,
@@ -72,9 +72,9 @@ def plot_branches(
         Each gets its own colour, those of one name the same.
     y, x : str, int or callable
         What to draw: 'parameter', the name of a stored number, the number of a state counted from
-        0, or a function of a :class:`fecontact.bifurcation.BranchPoint`. For y
-        also 'observed_section' of :func:`fecontact.bifurcation.observe`, one curve
-        for each period of the excitation.
+        0 (of orbits its largest value), or a function of a
+        :class:`fecontact.bifurcation.BranchPoint`. For y also 'observed_section' of
+        :func:`fecontact.bifurcation.observe`, one curve for each period of the excitation.
     x_label, y_label : str, optional
         Labels of the axes, with SI units, such as ``amplitude [m]``; ticks are in a unit that
         suits the values.
@@ -98,12 +98,24 @@ def plot_branches(
     InputError
         For a quantity that is not stored, another suffix, or a file that cannot be written.
     """
+    from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
     from fecontact.bifurcation.continuation.branch import Branch
+    from fecontact.output.plots.diagram_insets import Inset
 
     require_kind("plot_branches", (Branch, Sequence), branches=branches)
     branches = [branches] if isinstance(branches, Branch) else list(branches)
     for branch in branches:
         require_kind("plot_branches", Branch, branch=branch)
+    require_kind("plot_branches", (PoincareScan, type(None)), beneath=beneath)
+    require_kind("plot_branches", Sequence, insets=insets)
+    for inset in insets:
+        require_kind("plot_branches", Inset, inset=inset)
+    require_kind("plot_branches", (str, type(None)), x_label=x_label, y_label=y_label)
+    names = as_texts(names, "plot_branches: names")
+    for name, quantity in (("x", x), ("y", y)):
+        if not (isinstance(quantity, str | int | np.integer) or callable(quantity)):
+            raise InputError(f"plot_branches: {name} = {shown(quantity)} must be the name of a "
+                             f"stored number, the number of a state, or a function of a point.")
     if not branches:
         raise InputError("branches = [] holds nothing to draw; give at least one Branch.")
     with new_figure(8.0, 7.2 if insets else 5.2, path) as figure:
@@ -148,8 +160,8 @@ def _values(branch: "Branch", quantity: Quantity, rows: bool = False) -> Array:
     """Values (N,) of a quantity, or (N, s) of a row of them where these are allowed."""
     if callable(quantity):
         return np.array([quantity(point) for point in branch.points], dtype=float)
-    if isinstance(quantity, int):
-        return np.asarray(branch.column("state")[:, quantity])
+    if not isinstance(quantity, str):
+        return np.array([_of_state(point, int(quantity)) for point in branch.points])
     if quantity == "parameter":
         return branch.parameter
     found = branch.column(quantity)
@@ -163,14 +175,23 @@ def _values(branch: "Branch", quantity: Quantity, rows: bool = False) -> Array:
     return found.astype(float)
 
 
+def _of_state(point: "BranchPoint", number: int) -> float:
+    """A state of an equilibrium, or its largest value over an orbit."""
+    states = point.values.get("state", point.values.get("maximum"))
+    if states is None or not -len(states) <= number < len(states):
+        many = "no states" if states is None else f"{len(states)} states, from 0"
+        raise InputError(f"There is no state {number}: the branch stores {many}.")
+    return float(states[number])
+
+
 def _value(point: "BranchPoint", quantity: Quantity) -> float:
     """A quantity of one point; of a row of them the first."""
     if callable(quantity):
         return float(quantity(point))
     if quantity == "parameter":
         return point.parameter
-    if isinstance(quantity, int):
-        return float(point.values["state"][quantity])
+    if not isinstance(quantity, str):
+        return _of_state(point, int(quantity))
     if quantity not in point.values:
         raise InputError(f"{point.place}, of an inset, stores no value {quantity!r}; make the "
                          f"inset from a point of a branch that is drawn.")
@@ -239,6 +260,6 @@ def _label(quantity: Quantity, parameter: str) -> str:
         return parameter_label(parameter)
     if quantity == "period":
         return "period [s]"
-    if isinstance(quantity, int):
+    if isinstance(quantity, int | np.integer):
         return f"state {quantity}"
     return quantity if isinstance(quantity, str) else ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.core.checks import as_floats
+from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -42,6 +42,9 @@ def phase_curves(
     InputError
         For what is no motion, no state, or not two or three of them.
     """
+    require_kind("A plot in phase space", (Sequence, FieldRun, Trajectory, PeriodicMotion),
+                 motions=motions)
+    require_kind("A plot in phase space", (Sequence, np.ndarray), coordinates=coordinates)
     given = [motions] if isinstance(motions, Motion) else list(motions)
     if not given or not all(isinstance(one, Motion) for one in given):
         raise InputError("motions must be a FieldRun, a Trajectory or a PeriodicMotion, or several "
@@ -58,17 +61,22 @@ def phase_curves(
         events = None if isinstance(one, PeriodicMotion) else one.events
         passed = np.zeros((0, len(rows))) if events is None else events.states @ rows.T
         curves.append(Curve(time, one.states @ rows.T, passed))
-    known = given[0].state_names if isinstance(given[0], FieldRun) else ()
+    known = _names(given[0])
     names = [one if isinstance(one, str) else f"quantity {number + 1}"
              if not isinstance(one, int | np.integer) else known[one] if known else f"state {one}"
              for number, one in enumerate(coordinates)]
     return curves, names if labels is None else list(labels)
 
 
+def _names(motion: Motion) -> tuple[str, ...]:
+    """Names of the states of a motion; none of a trajectory."""
+    return () if isinstance(motion, Trajectory) else tuple(motion.state_names)
+
+
 def _row(motion: Motion, coordinate: Any) -> Array:
     """A coordinate as a row (size,) that acts on states."""
     size = motion.states.shape[1]
-    names = motion.state_names if isinstance(motion, FieldRun) else ()
+    names = _names(motion)
     if isinstance(coordinate, str):
         if coordinate not in names:
             known = choices(names) if names else f"their numbers from 0 to {size - 1}"
@@ -112,8 +120,8 @@ def plot_phase_space(
     motions : FieldRun, Trajectory, PeriodicMotion or sequence of them
         Runs, and orbits of branches (``point.orbit(field)``).
     coordinates : sequence of two or three
-        States by name, for runs of vector fields, or by number from 0; or rows (size,) that give a
-        quantity from a state, such as ``displacement_row`` of a contact field.
+        States by name, of runs and orbits of vector fields, or by number from 0; or rows (size,)
+        that give a quantity from a state, such as ``displacement_row`` of a contact field.
     labels : sequence of str, optional
         Names of the axes.
     path : str or Path, optional

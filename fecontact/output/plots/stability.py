@@ -44,6 +44,9 @@ def plot_eigenvalues(
     InputError
         If the branch stores no eigenvalues, for another suffix, or a file that cannot be written.
     """
+    from fecontact.bifurcation.continuation.branch import Branch
+
+    require_kind("plot_eigenvalues", Branch, branch=branch)
     values, followed = branch.parameter, _followed(branch.column("eigenvalues"))
     with new_figure(8.0, 6.4, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)

@@ -3,14 +3,22 @@
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
-from numbers import Real
 from types import CodeType, MappingProxyType
 from typing import Any, Self
 
 import numpy as np
 
+from fecontact.core.checks import as_count, as_floats, as_texts, require_kind
 from fecontact.core.compiled import CompiledLaw, compile_law
-from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
+from fecontact.core.errors import (
+    AnalysisError,
+    InputError,
+    choices,
+    require_choice,
+    require_finite,
+    require_positive,
+    shown,
+)
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.system.fields import function_kernels as kernels
 from fecontact.system.fields.one_place import compiled_field
@@ -21,6 +29,10 @@ _WAYS = ("automatic", "complex", "differences")
 # Samples at which the complex step is checked against differences before it is used.
 _SAMPLES = 16
 _NONE = np.zeros(0, dtype=np.int64)
+# States below this are zero.
+_NOTHING = 1e-200
+# Most states of a field, against typing errors.
+_MOST_STATES = 100_000
 # Functions that accept complex numbers but are not analytic.
 _NOT_ANALYTIC = {"abs", "absolute", "fabs", "sign", "real", "imag", "conj", "conjugate", "angle"}
 
@@ -91,6 +103,8 @@ class FunctionField(VectorField):
     ) -> tuple[Array, Array, Array, Integers]:
         """As :meth:`derivatives`, with counts (d + a,) of failures of the complex step."""
         n, d = x.shape
+        # The complex step would underflow at states beside zero.
+        x = np.where(np.abs(x) < _NOTHING, 0.0, x)
         f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(active)))
         wrong = np.zeros(d + len(active), dtype=np.int64)
         address, scales, states = self._rates.address, self._scales, self._jacobian is None
@@ -224,18 +238,19 @@ def vector_field(
         If the function cannot be compiled, or does not allow the differentiation asked for.
         With 'complex', derivatives raise :class:`AnalysisError` where it turns out wrong.
     """
-    if differentiation not in _WAYS:
-        raise InputError(f"differentiation = {differentiation!r} must be one of "
-                         f"{choices(_WAYS)}.")
-    names = (tuple(f"x{i + 1}" for i in range(states)) if isinstance(states, int)
-             else tuple(states))
-    if not names:
-        raise InputError("A vector field needs at least one state.")
-    require_finite("Vector field", **dict(parameters))
-    typical = np.ones(len(names)) if scales is None else np.array(scales, dtype=float)
-    if typical.shape != (len(names),) or not (typical > 0.0).all():
-        raise InputError(f"scales = {scales!r} must hold {len(names)} numbers above zero, one for "
-                         f"each state.")
+    require_choice("vector_field", "differentiation", differentiation, _WAYS)
+    for name, given_function in (("function", function), ("jacobian", jacobian)):
+        if not (callable(given_function) or (name == "jacobian" and given_function is None)):
+            raise InputError(f"vector_field: {name} = {shown(given_function)} must be a function "
+                             f"{_FORM}.")
+    require_kind("vector_field", Mapping, parameters=parameters)
+    as_texts(tuple(parameters), "vector_field: names of parameters")
+    require_finite("Vector field", **parameters)
+    names = _state_names(states)
+    typical = np.ones(len(names)) if scales is None else as_floats(scales, "scales")
+    if typical.shape != (len(names),) or not ((typical > 0.0) & (typical < np.inf)).all():
+        raise InputError(f"scales = {shown(scales)} must hold {len(names)} numbers above zero, one "
+                         f"for each state.")
     period_of = _period_of(period)
     rates = compile_law(kernels.RATES, _FORM, function)
     _ = rates.address
@@ -257,12 +272,29 @@ def vector_field(
     return FunctionField(rates, given, None, parameters, names, typical, period_of)
 
 
+def _state_names(states: int | Iterable[str]) -> tuple[str, ...]:
+    """The names of the states, or x1, x2, ... of so many."""
+    if isinstance(states, int | np.integer) or not isinstance(states, Iterable):
+        many = as_count(states, "vector_field: states, their number,")
+        if many > _MOST_STATES:
+            raise InputError(f"vector_field: states = {shown(states)} must be at most "
+                             f"{_MOST_STATES}.")
+        return tuple(f"x{i + 1}" for i in range(many))
+    names = as_texts(tuple(states), "vector_field: states")
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"vector_field: states = {shown(states)} must be at least one name, all "
+                         f"different, or a number of states.")
+    return names
+
+
 def _period_of(period: Any) -> Callable[[Mapping[str, float]], float] | None:
     if period is None or callable(period):
         return period
-    if not (isinstance(period, Real) and 0.0 < float(period) < np.inf):
-        raise InputError(f"period = {period!r} must be a number above zero [s], or a function that "
-                         f"returns it from the parameters by name.")
+    try:
+        require_positive("vector_field", period=period)
+    except InputError:
+        raise InputError(f"period = {shown(period)} must be a number above zero [s], or a function "
+                         f"that returns it from the parameters by name.") from None
     return lambda parameters: float(period)
 
 
