@@ -1,6 +1,6 @@
 """Continuation problem of periodic orbits by orthogonal collocation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -145,6 +145,8 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         Of orbits along the branch; None keeps their number.
     calm : int
         Steps in a row after which fewer of them would have done.
+    noted : list of (u, error)
+        The last orbit whose error was estimated.
     """
 
     age: int = 0
@@ -155,6 +157,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     misses: predictor.Misses = predictor.UNKNOWN
     sizes: Intervals | None = None
     calm: int = 0
+    noted: list[tuple[Array, float]] = field(default_factory=list)
 
     keeps_matrix: ClassVar[bool] = True
     confirms: ClassVar[frozenset[str]] = frozenset({"period doubling", "torus"})
@@ -170,19 +173,21 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, mesh, the extremes of the states and their error."""
+        return self.point_of(u, linearisation, lambda at, side: at.beside(side, tangent))
+
+    def point_of(
+        self, u: Array, linearisation: Any,
+        beside: Callable[[CollocationLinearisation, Array], Array],
+    ) -> dict[str, Any]:
+        """As :meth:`point`; ``beside`` tells how right-hand sides change the orbit."""
         stability = linearisation.floquet
         low, high = extremes(self.nodes(u), self.degree)
+        error = state_error(self, u, linearisation, beside)
+        self.noted[:] = [(u, error)]
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
-                "maximum": high, "state_error": self._state_error(u)}
-
-    def _state_error(self, u: Array) -> float:
-        """That of u, which is asked for twice at each point."""
-        known: list[tuple[Array, float]] = vars(self).setdefault("_known_error", [])
-        if not known or known[0][0] is not u:
-            known[:] = [(u, state_error(self, u))]
-        return known[0][1]
+                "maximum": high, "state_error": error}
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
@@ -252,7 +257,10 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
             [u, tangent])
         mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
-            fewer = min(count, self.sizes.after(count, self._state_error(u), self.degree))
+            error = next((error for known, error in self.noted if known is u), None)
+            if error is None:
+                error = state_error(self, u)
+            fewer = min(count, self.sizes.after(count, error, self.degree))
             calm = self.calm + 1 if fewer < count else 0
             if calm >= _CALM:
                 count, calm = fewer, 0

@@ -7,7 +7,8 @@ slopes are (m, m + 1).
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import block, f8, helper, kernel, matrix, vector
+from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.references import borrowed
 
 # Smallest range of a state to which an error of it is related: in its scale (Newton's method leaves
@@ -15,6 +16,8 @@ from fecontact.core.references import borrowed
 _LEAST_OF_SCALE, _LEAST_OF_VALUE, _LEAST_OF_ALL = 1e-2, 1e-6, 1e-11
 # Part of an interval, in widths of a neighbour, in which the derivative between both counts.
 _MOST_REACH = 2.0
+# Rate times width of an interval above which an error is not carried on to the next one.
+_CARRIED = 8.0
 
 
 @kernel(types.void(vector, vector, vector, vector, vector, vector))
@@ -222,3 +225,61 @@ def fill_smooth_errors(widths, nodes, top, sizes, errors):
             other = min(widths[after], _MOST_REACH * widths[j])
             errors[j] = max(errors[j], rate * _power(one, m + 1))
             errors[after] = max(errors[after], rate * _power(other, m + 1))
+
+
+@kernel(types.void(matrix, matrix, block, vector, f8, matrix, matrix, vector, matrix, matrix))
+def fill_carried(slopes, f, J, widths, T, values, ends, weights, integrals, side):
+    """Fill side (N m, d), right-hand sides of the collocation rows for errors at ends of intervals.
+
+    Slopes and rates (2 N m, d) at the Gauss points of halves; J (N m, d, d) at those of intervals,
+    where values and ``ends`` (m, m + 1) are the basis polynomials and their derivatives.
+    """
+    slopes, f, J, side = borrowed(slopes), borrowed(f), borrowed(J), borrowed(side)
+    widths, values, ends = borrowed(widths), borrowed(values), borrowed(ends)
+    weights, integrals = borrowed(weights), borrowed(integrals)
+    m, d = len(weights), side.shape[1]
+    per = 2 * m
+    mean, filtering = np.empty((d, d)), np.empty((d, d))
+    pivots = np.empty(d, dtype=np.int64)
+    p, defect = np.empty((m + 1, d)), np.empty((per, d))
+    for j in range(len(widths)):
+        step = widths[j] * T
+        for c in range(per):
+            for i in range(d):
+                defect[c, i] = slopes[j * per + c, i] - step * f[j * per + c, i]
+        # At the Gauss points, and last at the end of the interval.
+        for row in range(m + 1):
+            place = per + row if row < m else per - 1
+            for i in range(d):
+                total = 0.0
+                for c in range(per):
+                    total += integrals[place, c] * defect[c, i]
+                p[row, i] = total
+        for i in range(d):
+            for c in range(d):
+                total = 0.0
+                for k in range(m):
+                    total += weights[k] * J[j * m + k, i, c]
+                mean[i, c] = step * total / _CARRIED
+        # 1 - 2^(1/2) z + z^2: of modes that vibrate, the amplitude falls with z^2 above one.
+        for i in range(d):
+            for c in range(d):
+                filtering[i, c] = -np.sqrt(2.0) * mean[i, c]
+            filtering[i, i] += 1.0
+            for k in range(d):
+                factor = mean[i, k]
+                for c in range(d):
+                    filtering[i, c] += factor * mean[k, c]
+        factorise(filtering, d, pivots)
+        for row in range(m + 1):
+            solve(filtering, pivots, p[row])
+            solve(filtering, pivots, p[row])
+        for k in range(m):
+            value, slope = values[k, m], ends[k, m]
+            for c in range(d):
+                defect[0, c] = step * (p[k, c] - value * p[m, c])
+            for i in range(d):
+                total = slope * p[m, i]
+                for c in range(d):
+                    total += J[j * m + k, i, c] * defect[0, c]
+                side[j * m + k, i] = total

@@ -165,6 +165,9 @@ class Discretisation:
 
 
 _DIFFERENCE = 1e-5  # relative parameter step for the derivative of the forcing period
+# Part of the parameter in the tangent of a branch below which orbits are compared with the nearest
+# one instead of that at the same parameter.
+_LEAST_SHARE = 0.05
 # Step of rough Jacobians that are differenced again, in ranges of the states.
 _FAR = 3e-4
 # Smallest range of a state, in its values and in the scale that its field has.
@@ -336,6 +339,22 @@ class CollocationLinearisation:
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
         return self.bordered(row).solve(rhs)
+
+    def beside(self, side: Array, tangent: Array) -> Array:
+        """Change (n,) of the orbit by a right-hand side (n,), zero in the last rows.
+
+        The parameter stays as it is. Near folds of the branch, which has this tangent, the nearest
+        orbit is taken instead.
+        """
+        weights, last = self.problem.weights(), self._last
+        known = last is not None and last[1] == 1.0
+        row = last[0] if last is not None and known else weights * tangent
+        change = self.solve(row, side)
+        row = weights * tangent / (weights @ tangent**2)
+        change -= (row @ change) * tangent
+        share = float(row[-1] * tangent[-1])
+        change -= change[-1] * row[-1] / (share + _LEAST_SHARE**2) * tangent
+        return change
 
     @cached_property
     def floquet(self) -> Floquet:

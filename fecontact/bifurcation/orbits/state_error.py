@@ -1,5 +1,6 @@
-"""Errors of periodic orbits by collocation between the ends of intervals."""
+"""Errors of periodic orbits by collocation, between the ends of intervals and at these."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -7,11 +8,12 @@ import numpy as np
 
 from fecontact.bifurcation.orbits.collocation_kernels import (
     at_points,
+    fill_carried,
     fill_ranges,
     fill_smooth_errors,
     integrate_defect,
 )
-from fecontact.bifurcation.orbits.discretisation import Discretisation
+from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
 
@@ -59,8 +61,11 @@ def _halves(degree: int) -> _Halves:
                    np.ascontiguousarray(integrals))
 
 
-def state_error(problem: Discretisation, u: Array) -> float:
-    r"""Largest error of a state between the ends of intervals, in its range over the orbit.
+def state_error(
+    problem: Discretisation, u: Array, linearisation: CollocationLinearisation | None = None,
+    beside: Callable[[CollocationLinearisation, Array], Array] | None = None,
+) -> float:
+    r"""Largest error of a state, in its range over the orbit.
 
     The range counts as a hundredth of the state's scale at least. On each interval the error is the
     integral of the defect,
@@ -73,6 +78,9 @@ def state_error(problem: Discretisation, u: Array) -> float:
     h^(m+1) x^(m+1); at the ends of intervals it is of the order 2 m. Where it is much more, a layer
     begins or errors decay as in stick: the linear equations of e are then solved on both halves,
     on the intervals with the largest errors. It is infinite where the field is not finite there.
+
+    What the intervals before add is e at their ends, see :func:`_carried`. It needs the equations
+    about the orbit, and ``beside``, their solution for a right-hand side; the larger error counts.
     """
     halves, nodes, found = _halves(problem.degree), problem.nodes(u), rule(problem.degree)
     count = len(halves.points) * problem.intervals
@@ -110,7 +118,39 @@ def state_error(problem: Discretisation, u: Array) -> float:
         rest = odd[first + _AT_ONCE :]
         if not len(rest) or max(others, errors[odd[: first + _AT_ONCE]].max()) >= errors[rest[0]]:
             break
-    return float(errors.max())
+    between = float(errors.max())
+    if linearisation is None or beside is None:
+        return between
+    carried = _carried(linearisation, beside, slopes, f, sizes)
+    # In a layer the equations change much from one step of Newton's method to the next.
+    step = np.abs((u - linearisation.u)[: problem.size].reshape(nodes.shape) / sizes).max()
+    if between < carried < step and problem.second is None:
+        carried = _carried(CollocationLinearisation(problem, u), beside, slopes, f, sizes)
+    return max(between, carried)
+
+
+def _carried(
+    linearisation: CollocationLinearisation,
+    beside: Callable[[CollocationLinearisation, Array], Array], slopes: Array, f: Array,
+    sizes: Array,
+) -> float:
+    """Largest |e| / size at the ends of intervals, from the defect of the whole orbit.
+
+    With p(s) the integral of the defect on an interval and w = e - p, w' = h T J (w + p) is solved
+    by the equations of the orbit itself, periodic and with the steps of p between intervals. These
+    carry errors on as they are where a rate times the width of an interval is small, but modes much
+    faster than that undamped and in a wrong phase, although such an error is that of its own
+    interval; p is therefore filtered.
+    """
+    problem = linearisation.problem
+    points, d = problem.degree, len(sizes)
+    side = np.zeros(problem.size + problem.common)
+    fill_carried(slopes, f, linearisation.derivatives[1], problem.widths, linearisation.period,
+                 problem.rule.values, problem.rule.slopes, problem.rule.weights,
+                 _halves(points).integrals, side[: problem.size].reshape(-1, d))
+    e = beside(linearisation, side)[: problem.size].reshape(-1, points, d)
+    ends = np.abs(e[:, 0] / sizes)
+    return float(ends.max()) if np.isfinite(ends).all() else np.inf
 
 
 def _solved(defect: Array, J: Array, step: Array, sizes: Array, degree: int) -> Array:

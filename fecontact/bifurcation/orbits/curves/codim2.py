@@ -129,7 +129,9 @@ class OrbitCurve(Problem):
         names = list(self.orbit.field.parameters)
         assert self.orbit.second is not None
         return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
-                **self.orbit.point(u, linearisation.orbit, tangent), "unstable": 0}
+                **self.orbit.point_of(u, linearisation.orbit,
+                                      lambda _, side: linearisation.beside(side, tangent)),
+                "unstable": 0}
 
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
@@ -265,6 +267,12 @@ class CurveLinearised:
         if self._last is None or self._last[0] is not row:
             self._last = row, self.orbit.with_rows([self.gradient, row])
         return self._last[1].solve(rhs)
+
+    def beside(self, side: Array, tangent: Array) -> Array:
+        """Change (n,) of the orbit by a right-hand side, to the nearest one of the curve."""
+        row = self.problem.weights() * tangent / (self.problem.weights() @ tangent**2)
+        change = self.solve(row if self._last is None else self._last[0], side)
+        return change - (row @ change) * tangent
 
 
 def orbit_curve(
