@@ -11,8 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from fecontact.bifurcation.attractors.attractor import Attractor, told_apart
-from fecontact.bifurcation.attractors.blocks import Found, Place, mark_of, work_off
+from fecontact.bifurcation.attractors.blocks import Found, Place, work_off
 from fecontact.bifurcation.attractors.labels import Settled
+from fecontact.bifurcation.attractors.marks import mark_of
 from fecontact.core.errors import InputError
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
