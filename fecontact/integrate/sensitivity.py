@@ -44,12 +44,18 @@ class Sensitivity:
         dy(t_k+1) / dy(t_k).
     forced : (K - 1, size) array or None
         dy(t_k+1) / dp for a fixed state at t_k.
+    asymmetry : (K - 1,) array
+        How far differences to both sides of each state are apart, relative to the largest
+        derivative or to 1, by the largest displacement and velocity; zero where steps are
+        differentiated. Above :data:`CERTAIN` a jump of the ends of runs lies so near that
+        ``transitions`` may be wrong.
     """
 
     times: Array
     states: Array
     transitions: Array
     forced: Array | None
+    asymmetry: Array
 
     @property
     def monodromy(self) -> Array:
@@ -153,7 +159,8 @@ def sensitivity(
     columns = run.variation.transitions[1:].transpose(0, 2, 1)
     size = len(state)
     return Sensitivity(times, run.states, np.ascontiguousarray(columns[:, :, :size]),
-                       None if parameter is None else columns[:, :, size].copy())
+                       None if parameter is None else columns[:, :, size].copy(),
+                       np.zeros(len(times) - 1))
 
 
 def _differences(
@@ -177,13 +184,18 @@ def _differences(
     ends = _states(ensemble(system, np.repeat(spans, 2 * size, axis=0), **settings, initial=(
         states[:-1, None] + aside).reshape(-1, size)))[:, -1].reshape(pieces, 2, size, size)
     columns = (ends[:, 0] - ends[:, 1]) / (2.0 * moves[:, None])
+    sizes = moves / _DIFFERENCE
+    scaled = sizes[:, None] / sizes
+    apart = np.abs((ends[:, 0] + ends[:, 1] - 2.0 * states[1:, None]) / moves[:, None] * scaled)
+    asymmetry = apart.max(axis=(1, 2)) / np.maximum(1.0, np.abs(columns * scaled).max(axis=(1, 2)))
     forced = None
     if parameter is not None:
         above, below, width = _moved(system, parameter, False)
         ends = _states(ensemble([above] * pieces + [below] * pieces, np.tile(spans, (2, 1)),
                                 initial=np.tile(states[:-1], (2, 1)), **settings))[:, -1]
         forced = (ends[:pieces] - ends[pieces:]) / width
-    return Sensitivity(times, states, np.ascontiguousarray(columns.transpose(0, 2, 1)), forced)
+    return Sensitivity(times, states, np.ascontiguousarray(columns.transpose(0, 2, 1)), forced,
+                       asymmetry)
 
 
 def _states(found: Ensemble) -> Array:
