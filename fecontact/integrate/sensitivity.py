@@ -44,18 +44,16 @@ class Sensitivity:
         dy(t_k+1) / dy(t_k).
     forced : (K - 1, size) array or None
         dy(t_k+1) / dp for a fixed state at t_k.
-    asymmetry : (K - 1,) array
-        How far differences to both sides of each state are apart, relative to the largest
-        derivative or to 1, by the largest displacement and velocity; zero where steps are
-        differentiated. Above :data:`CERTAIN` a jump of the ends of runs lies so near that
-        ``transitions`` may be wrong.
+    sided : (2, K - 1, size, size) array or None
+        The transitions by differences to one side, above and below the state, where runs are
+        differenced. Where a jump of their ends lies near, they are far apart.
     """
 
     times: Array
     states: Array
     transitions: Array
     forced: Array | None
-    asymmetry: Array
+    sided: Array | None = None
 
     @property
     def monodromy(self) -> Array:
@@ -159,8 +157,7 @@ def sensitivity(
     columns = run.variation.transitions[1:].transpose(0, 2, 1)
     size = len(state)
     return Sensitivity(times, run.states, np.ascontiguousarray(columns[:, :, :size]),
-                       None if parameter is None else columns[:, :, size].copy(),
-                       np.zeros(len(times) - 1))
+                       None if parameter is None else columns[:, :, size].copy())
 
 
 def _differences(
@@ -184,10 +181,8 @@ def _differences(
     ends = _states(ensemble(system, np.repeat(spans, 2 * size, axis=0), **settings, initial=(
         states[:-1, None] + aside).reshape(-1, size)))[:, -1].reshape(pieces, 2, size, size)
     columns = (ends[:, 0] - ends[:, 1]) / (2.0 * moves[:, None])
-    sizes = moves / _DIFFERENCE
-    scaled = sizes[:, None] / sizes
-    apart = np.abs((ends[:, 0] + ends[:, 1] - 2.0 * states[1:, None]) / moves[:, None] * scaled)
-    asymmetry = apart.max(axis=(1, 2)) / np.maximum(1.0, np.abs(columns * scaled).max(axis=(1, 2)))
+    sided = np.stack([ends[:, 0] - states[1:, None], states[1:, None] - ends[:, 1]]) / (
+        moves[:, None])
     forced = None
     if parameter is not None:
         above, below, width = _moved(system, parameter, False)
@@ -195,7 +190,7 @@ def _differences(
                                 initial=np.tile(states[:-1], (2, 1)), **settings))[:, -1]
         forced = (ends[:pieces] - ends[pieces:]) / width
     return Sensitivity(times, states, np.ascontiguousarray(columns.transpose(0, 2, 1)), forced,
-                       asymmetry)
+                       sided.swapaxes(2, 3))
 
 
 def _states(found: Ensemble) -> Array:
