@@ -191,3 +191,16 @@ def test_matrices_and_groups_are_named():
     assert "normal: RoughSurface (left), LinearContact (right)" in line
     assert "ground: -500 mm/s, 2 µm from valley to peak" in line
     assert "load: 800 N" in line
+
+
+@pytest.mark.parametrize(("errors", "words"), [
+    ((1e-6, 3e-6), "3.0e-06 or less, on 20 intervals"),
+    ((1e-6, np.inf), "1.0e-06 or less, but could not be estimated at 1 of 2 points, "
+                     "on 20 intervals"),
+    ((np.inf, np.inf), "could not be estimated, on 20 intervals")])
+def test_errors_that_could_not_be_estimated_are_said_in_words(errors, words):
+    points = tuple(
+        BranchPoint(np.array([0.0, p]), np.array([0.0, 1.0]),
+                    {"state_error": error, "mesh": np.linspace(0.0, 1.0, 21)}, None)
+        for p, error in enumerate(errors))
+    assert ("state error", words) in Branch("ground.speed", points).summary()

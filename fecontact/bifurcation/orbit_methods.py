@@ -7,7 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbits.collocation import require_mesh
-from fecontact.bifurcation.orbits.shooting import require_segments
+from fecontact.bifurcation.orbits.mesh import require_segments
 from fecontact.core.errors import InputError, require_positive
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
 

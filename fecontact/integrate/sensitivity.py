@@ -44,12 +44,16 @@ class Sensitivity:
         dy(t_k+1) / dy(t_k).
     forced : (K - 1, size) array or None
         dy(t_k+1) / dp for a fixed state at t_k.
+    sided : (2, K - 1, size, size) array or None
+        The transitions by differences to one side, above and below the state, where runs are
+        differenced. Where a jump of their ends lies near, they are far apart.
     """
 
     times: Array
     states: Array
     transitions: Array
     forced: Array | None
+    sided: Array | None = None
 
     @property
     def monodromy(self) -> Array:
@@ -177,13 +181,16 @@ def _differences(
     ends = _states(ensemble(system, np.repeat(spans, 2 * size, axis=0), **settings, initial=(
         states[:-1, None] + aside).reshape(-1, size)))[:, -1].reshape(pieces, 2, size, size)
     columns = (ends[:, 0] - ends[:, 1]) / (2.0 * moves[:, None])
+    sided = np.stack([ends[:, 0] - states[1:, None], states[1:, None] - ends[:, 1]]) / (
+        moves[:, None])
     forced = None
     if parameter is not None:
         above, below, width = _moved(system, parameter, False)
         ends = _states(ensemble([above] * pieces + [below] * pieces, np.tile(spans, (2, 1)),
                                 initial=np.tile(states[:-1], (2, 1)), **settings))[:, -1]
         forced = (ends[:pieces] - ends[pieces:]) / width
-    return Sensitivity(times, states, np.ascontiguousarray(columns.transpose(0, 2, 1)), forced)
+    return Sensitivity(times, states, np.ascontiguousarray(columns.transpose(0, 2, 1)), forced,
+                       sided.swapaxes(2, 3))
 
 
 def _states(found: Ensemble) -> Array:

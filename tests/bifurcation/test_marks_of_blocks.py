@@ -1,14 +1,21 @@
 """Marks of folders of blocks: what belongs to other runs is told apart to the last digit."""
 
+import functools
 import math
+import os
+import subprocess
+import sys
+import threading
+import types
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 from systems import friction_oscillator, impact_oscillator
 
 from fecontact import Drive, Ground, InputError, Load, PointLoad, simulate
 from fecontact.bifurcation import VectorField, poincare_scan, vector_field
-from fecontact.bifurcation.attractors.blocks import mark_of
+from fecontact.bifurcation.attractors.marks import mark_of
 from fecontact.integrate import Crossing, Rodas5P
 from fecontact.laws import (
     ConstantFriction,
@@ -206,6 +213,212 @@ def test_the_mark_sees_what_functions_hold(made):
     one, other, again = made(50.0), made(60.0), made(50.0)
     assert mark_of([one]) == mark_of([again])
     assert mark_of([one]) != mark_of([other])
+
+
+class Spring:
+    """A spring that ends where ``reach`` says: what fields call by objects differs far away."""
+
+    def __init__(self, reach, inner=None):
+        self.reach, self.inner = reach, inner
+
+    def force(self, x):
+        return np.where(np.abs(x) < self.reach(), -x, 0.0)
+
+
+class Called(VectorField):
+    """A field of Python that asks an object for its rates."""
+
+    parameters, state_names = {"c": 1.0}, ("x", "v")
+
+    def __init__(self, spring):
+        self.spring = spring
+
+    def rates(self, t, x, values):
+        return values[0] * self.spring.force(x)
+
+    def derivatives(self, t, x, values, active=()):
+        slopes = np.where(np.abs(x) < self.spring.reach(), -values[0], 0.0)
+        return self.rates(t, x, values), slopes[:, :, None] * np.eye(2), np.zeros((len(x), 2, 0))
+
+
+def by_a_closure(limit):
+    return Called(Spring(lambda: limit))
+
+
+def by_a_default(limit):
+    return Called(Spring(lambda at=limit: at))
+
+
+def by_a_keyword(limit):
+    def reach(*, at=limit):
+        return at
+
+    return Called(Spring(reach))
+
+
+def by_a_partial_function(limit):
+    return Called(Spring(functools.partial(float, limit)))
+
+
+def by_an_attribute(limit):
+    class Stiff(Spring):
+        def force(self, x):
+            return np.where(np.abs(x) < self.inner[0]["limit"], -x, 0.0)
+
+    return Called(Stiff(None, [{"limit": limit}]))
+
+
+def by_a_method(limit):
+    class Reach:
+        def __init__(self):
+            self.limit = limit
+
+        def of(self):
+            return self.limit
+
+    return Called(Spring(Reach().of))
+
+
+def by_a_slot(limit):
+    class Reach:
+        __slots__ = ("limit",)
+
+        def __init__(self):
+            self.limit = limit
+
+        def __call__(self):
+            return self.limit
+
+    return Called(Spring(Reach()))
+
+
+def by_a_class(limit):
+    class Base:
+        most = limit
+
+    class Reach(Base):
+        def __call__(self):
+            return self.most
+
+    return Called(Spring(Reach()))
+
+
+def by_a_property(limit):
+    class Reach(Spring):
+        @property
+        def reach(self):
+            return lambda: limit
+
+        @reach.setter
+        def reach(self, value):
+            pass
+
+    return Called(Reach(None))
+
+
+def by_a_cache(limit):
+    @functools.cache
+    def reach():
+        return limit
+
+    return Called(Spring(reach))
+
+
+def by_the_code_of_a_helper(limit):
+    """Same names and values in another order of the code."""
+    if limit == 50.0:
+        class Reach:
+            def __call__(self):
+                return 50.0 if self else 60.0
+    else:
+        class Reach:
+            def __call__(self):
+                return 60.0 if self else 50.0
+
+    return Called(Spring(Reach()))
+
+
+def by_a_table(limit):
+    table = PchipInterpolator([0.0, 1.0, 2.0], [limit, limit, 1.0])
+    return Called(Spring(functools.partial(table, 0.5)))
+
+
+def by_a_global(limit):
+    """Names of globals, and of what is in modules."""
+    module = types.ModuleType("springs_of_the_user")
+    exec("def limit():\n    return LIMIT\n\nLIMIT = None\n", vars(module))
+    module.LIMIT = limit
+    known = {"springs": module}
+    exec("def reach():\n    return springs.limit()\n", known)
+    return Called(Spring(known["reach"]))
+
+
+@pytest.mark.parametrize("made", [
+    by_a_closure, by_a_default, by_a_keyword, by_a_partial_function, by_an_attribute, by_a_method,
+    by_a_slot, by_a_class, by_a_property, by_a_cache, by_the_code_of_a_helper, by_a_table,
+    by_a_global], ids=lambda made: made.__name__)
+def test_the_mark_sees_what_fields_call_through_objects(made):
+    one, other, again = made(50.0), made(60.0), made(50.0)
+    assert mark_of([one]) == mark_of([again])
+    assert mark_of([one]) != mark_of([other])
+
+
+def test_objects_in_circles_have_marks():
+    def ring(limit):
+        spring = Spring(lambda: 1.0)
+        spring.inner = [limit, spring]
+        return Called(spring)
+
+    assert mark_of([ring(1.0)]) == mark_of([ring(1.0)])
+    assert mark_of([ring(1.0)]) != mark_of([ring(2.0)])
+
+
+def test_marks_are_the_same_in_other_processes(tmp_path):
+    """Texts and sets, whose hashes differ from process to process, and addresses of objects."""
+    script = tmp_path / "field.py"
+    script.write_text("""
+import numpy as np
+from fecontact.bifurcation import VectorField
+from fecontact.bifurcation.attractors.marks import mark_of
+
+class Helper:
+    kinds = {"a", "b", "cc", "ddd"}
+    def force(self, x):
+        return -x
+
+class Own(VectorField):
+    parameters, state_names = {"c": 1.0}, ("x", "v")
+    def __init__(self):
+        self.helper, self.names = Helper(), {name: {name} for name in ("x", "y")}
+    def rates(self, t, x, values):
+        return self.helper.force(x)
+    def derivatives(self, t, x, values, active=()):
+        raise NotImplementedError
+
+print(mark_of([Own()]))
+""")
+    found = {subprocess.run([sys.executable, script], check=True, capture_output=True, text=True,
+                            env={**os.environ, "PYTHONHASHSEED": seed}).stdout
+             for seed in ("1", "2", "3")}
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize("held", [threading.Lock(), (one for one in "abc"), memoryview(b"abc")],
+                         ids=lambda held: type(held).__name__)
+def test_what_cannot_be_looked_into_is_refused(held, tmp_path):
+    with pytest.raises(InputError, match=r"cannot be looked into .* leave out the folder"):
+        mark_of([Called(Spring(lambda: 1.0, [held]))])
+
+
+def test_runs_of_another_helper_are_not_taken_as_kept(tmp_path):
+    def scan(limit):
+        return poincare_scan(by_a_closure(limit), "c", [1.0, 2.0], section=Crossing("x"),
+                             transient=1.0, keep=1, initial=[1.0, 0.5], folder=tmp_path / "kept")
+
+    scan(50.0)
+    scan(50.0)
+    with pytest.raises(InputError, match="another system"):
+        scan(60.0)
 
 
 def swing(t, x, p, out):

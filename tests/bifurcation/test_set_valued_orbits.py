@@ -6,6 +6,7 @@ from systems import belt_of_unit_mass as belt
 from systems import last_speed_of_stick_slip as last_speed
 
 import fecontact as fc
+from fecontact import ModelWarning
 from fecontact.bifurcation import (
     BranchStatus,
     ContinuationOptions,
@@ -14,8 +15,10 @@ from fecontact.bifurcation import (
     orbit_branch,
     periodic_motion,
 )
+from fecontact.bifurcation.orbits.shooting import ShootingProblem
 from fecontact.integrate import Scipy, SetValued
 from fecontact.io import read_branch, write_branch
+from fecontact.laws import ConstantFriction, LinearContact
 
 # The start, where the mass is fastest, slips: beside a start that sticks static friction jumps.
 STATIC = SetValued(static_coefficient=1.0)
@@ -70,3 +73,33 @@ def test_stick_slip_ends_where_slip_ends_no_more(tmp_path):
 def test_other_solvers_are_refused():
     with pytest.raises(fc.InputError, match=r"solver = Scipy.* must be Rodas5P\(\) or SetValued"):
         Shooting(solver=Scipy("Radau"))
+
+
+def above_stops(load):
+    """Two masses that chatter into rest on their stops once in a period, and the orbit's start."""
+    rows = np.zeros((2, 3, 2))
+    rows[:, 1] = np.eye(2)
+    along = np.zeros((3, 2))
+    along[1] = 1.0
+    basis = fc.basis_from_matrices(np.eye(2), [[1.0152, -0.4], [-0.4, 1.0399]],
+                                   {"contact": rows, "B": rows[0], "C": along},
+                                   damping=0.1119 * np.eye(2))
+    system = fc.ContactSystem(
+        basis, normal=LinearContact(1e6), friction=ConstantFriction(0.0), load=fc.Load(load),
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=2.738, angular_frequency=1.0645))
+    field = contact_field(system, "load.normal")
+    scales = np.array([0.06, 0.06, 0.2, 0.2, 2.0 * np.pi / 1.0645, 1.0])
+    problem = ShootingProblem(field, np.array([load]), 0, np.array([0.0, 1.0]), np.zeros(4), scales,
+                              solver=SetValued(restitution=0.3))
+    return problem, np.array([0.0, 0.0, 0.0, 0.0, load])
+
+
+def test_multipliers_beside_complete_chatter_say_that_they_cannot_be_told():
+    """A motion that rests on its stops forgets all; as chatter fills the period, runs end apart."""
+    problem, u = above_stops(1.25)
+    point = problem.point(u, problem.linearise(u), u)
+    assert np.abs(point["multipliers"]).max() < 1e-6
+    problem, u = above_stops(1.37)
+    assert np.abs(problem.linearise(u).residual).max() < 1e-9
+    with pytest.warns(ModelWarning, match=r"load.normal = 1\.37 the .* cannot be told"):
+        problem.point(u, problem.linearise(u), u)

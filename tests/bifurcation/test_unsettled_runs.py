@@ -27,6 +27,15 @@ def test_decay_to_a_motion_has_not_settled(period, decay, sign):
     assert attractors == ()
 
 
+@pytest.mark.parametrize(("decay", "label"), [(0.95, -1), (0.98, 0)])
+def test_decay_of_less_than_a_third_in_a_third_of_the_states_counts_as_aperiodic(decay, label):
+    """0.95^10 = 0.60 and 0.98^10 = 0.82: what the label of basins says of slow decay."""
+    points = 1.0 + 0.3 * decay ** np.arange(KEPT)
+    labels, attractors = labels_of(points[np.newaxis, :, np.newaxis])
+    assert labels.tolist() == [label]
+    assert [one.kind for one in attractors] == ["aperiodic"] * (label + 1)
+
+
 def test_motions_that_do_not_settle_are_aperiodic():
     """Chaos of the logistic and the Henon map, and rotations by any angle."""
     rng = np.random.default_rng(1)

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from systems import friction_oscillator, mass_in_y
+from systems import friction_oscillator, mass_in_plane, mass_in_y
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, simulate
@@ -17,6 +17,7 @@ from fecontact.integrate.rodas5p.state import REJECTIONS, WORST_NODE
 from fecontact.laws import (
     BilateralCubic,
     BilateralPiecewise,
+    BilateralPlay,
     ConstantFriction,
     ExponentialFriction,
     LinearContact,
@@ -26,6 +27,7 @@ from fecontact.laws import (
     Pulse,
     RoughSurface,
     Step,
+    TwoSidedStop,
     normal_law,
 )
 
@@ -224,3 +226,26 @@ def test_what_is_not_a_number_is_an_error(work):
     torn = quiet.with_(normal=Torn(begin + (place - 0.01) * h, begin + (place + 0.01) * h))
     run, _ = ended(torn, [0.0, -1.0], times, work=work, max_step=h)
     assert run.progress.counts[REJECTIONS] > 0
+
+
+# Open nodes --------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("normal", [LinearContact(1e5), TwoSidedStop(1e5, 2.0),
+                                    TwoSidedStop(1e5, 2.0, 2.0, 0.1),
+                                    BilateralPlay(1e5, 1.0, shortening=-1.0)],
+                         ids=["open", "gap", "damped", "play"])
+@pytest.mark.parametrize("speed", [0.0, 1e-3])
+def test_nodes_in_a_gap_end_no_steps(normal, speed):
+    """Two oscillators: slip that turns, and depths of a law that does not act, are no matter."""
+    system = mass_in_plane(normal=normal, gap=1.0, ground=Ground(speed=speed), drive=Drive(
+        stiffness_x=100.0, stiffness_y=100.0, amplitude_x=0.01, amplitude_y=0.01,
+        angular_frequency=7.0))
+    run = simulate(system, 20.0, initial=np.array([0.1, 0.05, 0.0, 0.0]), outputs=21, rtol=1e-8,
+                   solver=Rodas5P(series="never", collocation="always"))
+    share = 0.01 * 100.0 / (100.0 - 49.0)
+    for start, x in zip((0.1, 0.05), run.displacement("B").T, strict=False):
+        wanted = (start * np.cos(10.0 * run.time) + share * (
+            np.sin(7.0 * run.time) - 0.7 * np.sin(10.0 * run.time)))
+        assert x == pytest.approx(wanted, abs=1e-8)
+    assert run.statistics["rejected"] < 15
+    assert run.statistics["steps"] < 550

@@ -4,11 +4,9 @@ A folder of blocks belongs to one computation, by the mark in ``blocks.json``. B
 whole or not at all; those that are there are not computed again.
 """
 
-import hashlib
-import inspect
 import json
 import pickle
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -19,9 +17,8 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass
-from functools import cache, partial
-from numbers import Integral, Real
+from dataclasses import dataclass
+from functools import partial
 from os import cpu_count
 from pathlib import Path
 from typing import Any, Protocol
@@ -29,17 +26,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact import __version__
 from fecontact.core.checks import as_count, as_path
-from fecontact.core.compiled import CompiledLaw, source_digest
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.files.atomic_write import clear_leftovers, output_folder, replaced, write_text
 from fecontact.core.files.locks import locked
 from fecontact.core.files.stored import DamagedError, from_json, npz_arrays, reading
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.fields.function_field import FunctionField
-from fecontact.system.fields.in_time import Moving, state_size
-from fecontact.system.fields.vector_field import VectorField
 
 Found = dict[str, NDArray[Any]]
 _ABOUT = "blocks.json"
@@ -103,82 +94,6 @@ class Place:
             workers = as_count(workers, "workers")
         return cls(None if folder is None else as_path(folder, f"{owner}: folder"), executor,
                    workers)
-
-
-def mark_of(systems: Iterable[Moving], *settings: Any) -> str:
-    """A mark that tells computations of other systems or settings apart.
-
-    Numbers, arrays and functions of the user are marked in full: none by its name or a summary.
-    """
-    mark = hashlib.sha256()
-    for item in (__version__, settings):
-        for part in _written(item):
-            mark.update(part + b"\0")
-    for moving in systems:
-        facts = _of_system(moving) if isinstance(moving, ContactSystem) else _of_field(moving)
-        for part in _written(facts):
-            mark.update(part + b"\0")
-    return mark.hexdigest()
-
-
-def _of_system(system: ContactSystem) -> list[Any]:
-    """All that the motion of a contact system depends on."""
-    facts: list[Any] = sorted(system.parameters().items())
-    for kind in ("normal", "friction"):
-        for nodes, share, law in system.law_groups(kind):
-            facts += [kind, nodes.start, nodes.stop, type(law).__qualname__, law.table(share),
-                      law.kernel, getattr(law, "planar_kernel", None)]
-    facts += [one.kernel for one in (*system.drive.motions, *system.load.signals.values())]
-    ground = system.ground
-    facts += [ground.profile_kernel, ground.surface_kernel, ground.friction_scale_kernel]
-    facts += [one.motion_kernel for one in system.prescribed_motion.motions]
-    # Other integers are addresses of functions, and differ from process to process.
-    return facts + [item for name, item in system.arrays._asdict().items()
-                    if np.asarray(item).dtype.kind == "f"
-                    or name in ("memory", "on_ground", "leans")]
-
-
-def _of_field(field: VectorField) -> list[Any]:
-    """All that the motion of a field depends on, as far as it can be seen."""
-    if isinstance(field, FunctionField):
-        functions = list(field.functions)
-    else:
-        functions = [getattr(type(field), name) for name in ("rates", "derivatives")]
-    # Of objects that a function of Python uses, only what it does tells.
-    places = np.random.default_rng(0).normal(size=(3, state_size(field)))
-    scales = field.state_scales(field.values)
-    rates = field.rates(np.array([0.0, 0.1, 0.2]), places * scales, field.values)
-    return [field.state_names, list(field.parameters.items()), scales,
-            field.forcing_period(field.values), [f"{rate:.9e}" for rate in rates.ravel()],
-            *(one if isinstance(one, CompiledLaw) or inspect.isfunction(one) else None
-              for one in functions)]
-
-
-def _written(value: Any) -> Iterator[bytes]:
-    """A value as bytes that no other value has, the same in every process."""
-    if isinstance(value, CompiledLaw) or inspect.isfunction(value):
-        yield _digest(value.python if isinstance(value, CompiledLaw) else value).encode()
-    elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
-        yield f"{value.dtype.str} {value.shape}".encode()
-        yield value.tobytes()
-    elif isinstance(value, Integral) and not isinstance(value, bool):
-        yield str(int(value)).encode()
-    elif isinstance(value, Real) and not isinstance(value, bool):
-        yield float(value).hex().encode()
-    elif isinstance(value, list | tuple | Mapping | np.ndarray):
-        items = list(value.items() if isinstance(value, Mapping) else value)
-        yield f"list {len(items)}".encode()
-        for item in items:
-            yield from _written(item)
-    elif is_dataclass(value) and not isinstance(value, type):
-        yield type(value).__qualname__.encode()
-        yield from _written([getattr(value, one.name) for one in fields(value)])
-    else:
-        yield repr(value).encode()
-
-
-# It is asked for the same few functions at each of many systems.
-_digest = cache(source_digest)
 
 
 def work_off(

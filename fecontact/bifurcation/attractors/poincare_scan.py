@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.bifurcation.attractors.blocks import Found, Place, mark_of, work_off
+from fecontact.bifurcation.attractors.blocks import Found, Place, work_off
+from fecontact.bifurcation.attractors.marks import mark_of
 from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.progress import progress_bar, shown

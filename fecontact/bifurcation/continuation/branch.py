@@ -97,10 +97,16 @@ class Branch(Summarised):
         found = [point.values for point in self.points if "state_error" in point.values]
         if not found:
             return []
+        errors = np.array([float(values["state_error"]) for values in found])
+        known = errors[np.isfinite(errors)]
+        missing = len(errors) - len(known)
+        text = f"{known.max():.1e} or less" if len(known) else "could not be estimated"
+        if len(known) and missing:
+            text += f", but could not be estimated at {missing} of {len(errors)} points"
         counts = [len(values["mesh"]) - 1 for values in found]
         few, many = min(counts), max(counts)
-        return [("state error", f"{max(float(values['state_error']) for values in found):.1e} or "
-                 f"less, on {few if few == many else f'{few} to {many}'} intervals")]
+        return [("state error",
+                 f"{text}, on {few if few == many else f'{few} to {many}'} intervals")]
 
     @property
     def parameter(self) -> Array:

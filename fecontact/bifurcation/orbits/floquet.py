@@ -1,5 +1,6 @@
 """Floquet multipliers and stability of a periodic orbit."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,12 +15,15 @@ from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.core.compiled import i8, kernel, vector
-from fecontact.core.errors import AnalysisError
+from fecontact.core.errors import AnalysisError, ModelWarning
 from fecontact.core.types import Array
 
 # Smallest and largest uncertainty of the distance of a multiplier from the unit circle.
 _ROUNDING, _WORST = 1e-8, 0.1
 _NEAR = 1e-2  # distance of a critical multiplier from the circle at a coarsely located point
+# Multipliers by differences to one side may be so far from those to both, in parts of the largest
+# or of 1: where ends of runs are smooth they are to 1e-3, beside a jump anywhere.
+_APART = 0.02
 # Error of the trivial multiplier above which the mesh is too coarse for any conclusion.
 _LOST = 0.5
 
@@ -290,3 +294,28 @@ class FloquetTests:
         """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
         first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
         return unresolved((first, last), values, tests)
+
+
+def require_same(
+    multipliers: NDArray[np.complex128], sided: Sequence[Array | None], where: str,
+) -> None:
+    """Warn unless derivatives by differences to either side have these multipliers too.
+
+    ``sided`` are those of each segment, (2, 1, d, d), or None where runs are not differenced.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    for side in range(2):
+        product = np.eye(len(multipliers))
+        for segment in sided:
+            if segment is None:
+                return
+            product = segment[side, 0] @ product
+        apart = np.abs(np.linalg.eigvals(product)[:, None] - multipliers)
+        error = float(apart[linear_sum_assignment(apart)].max())
+        if not error <= _APART * max(1.0, float(np.abs(multipliers).max())):
+            warnings.warn(f"At {where} the multipliers of the set-valued orbit cannot be told: by "
+                          f"differences to one side they are {error:.1g} away, for an event "
+                          f"appears or vanishes there, as beside complete chatter; take another "
+                          f"value of the parameter.", ModelWarning, stacklevel=2)
+            return

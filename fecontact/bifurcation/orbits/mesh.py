@@ -12,6 +12,7 @@ import numpy as np
 from numba import types
 
 from fecontact.core.compiled import helper, i8, kernel, matrix, vector
+from fecontact.core.errors import InputError
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -319,3 +320,9 @@ def equidistributed(mesh: Array, nodes: Array, degree: int, intervals: int) -> A
     result = np.empty(intervals + 1)
     _equidistribute(mesh, nodes, rule(degree).top, result)
     return result
+
+
+def require_segments(segments: int) -> None:
+    """Raise InputError for an invalid number of segments."""
+    if not (isinstance(segments, int | np.integer) and segments >= 1):
+        raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")

@@ -14,8 +14,8 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
-from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of
-from fecontact.bifurcation.orbits.mesh import interpolate
+from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of, require_same
+from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
 from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
@@ -177,6 +177,7 @@ class ShootingProblem(FloquetTests, Problem):
         """Period, stability, segments and the extremes of the states."""
         if not isinstance(self.solver, Rodas5P):
             self._require_return(u)
+            linearisation.require_certain()
         stability = linearisation.floquet
         states = linearisation.paths.reshape(-1, self.field.dimension)
         return {"period": self.period(u), "multipliers": stability.multipliers,
@@ -251,12 +252,6 @@ class ShootingProblem(FloquetTests, Problem):
             found[runs] = run_from(self.field.system(self.parameters(u)), times, found[runs],
                                    self.rtol, self.solver)[:, -1]
         return found
-
-
-def require_segments(segments: int) -> None:
-    """Raise InputError for an invalid number of segments."""
-    if not (isinstance(segments, int | np.integer) and segments >= 1):
-        raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
 
 
 def shooting_from(
@@ -448,3 +443,8 @@ class ShootingLinearisation:
     def floquet(self) -> Floquet:
         """Multipliers and stability."""
         return floquet_of(self.factors, self.problem.autonomous)
+
+    def require_certain(self) -> None:
+        """Warn where differences of set-valued runs to one side have other multipliers."""
+        require_same(self.floquet.multipliers, [run.sided for run in self.runs],
+                     f"{list(self.problem.field.parameters)[self.problem.free]} = {self.u[-1]:.6g}")

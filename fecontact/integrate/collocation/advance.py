@@ -39,10 +39,16 @@ from fecontact.integrate.rodas5p.step_length import (
     REJECTED_LAST,
     STEP,
     TIME,
+    next_stop,
 )
-from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE, RUNNING
+from fecontact.integrate.rodas5p.step_loop import (
+    FINISHED,
+    MINIMUM_STEP,
+    NOT_FINITE,
+    RUNNING,
+    add_jump,
+)
 from fecontact.system.nodes import ground_motion
-from fecontact.system.powers import DRIVE, drive_jump
 
 ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, COLLOCATION, i8)
 
@@ -75,10 +81,7 @@ class _Span(NamedTuple):
 @helper
 def _span(t, h, exactly, breaks, end):
     """The next step to try, of about the length h, or ``exactly`` that, but not past a break."""
-    stop, is_break = end, False
-    for k in range(len(breaks)):
-        if t < breaks[k] < stop:
-            stop, is_break = breaks[k], True
+    stop, latest, is_break = next_stop(t, breaks, end)
     target = t + h
     if exactly:
         target = min(target, stop)
@@ -86,7 +89,6 @@ def _span(t, h, exactly, breaks, end):
         target = stop
     elif target + h > stop:
         target = t + 0.5 * (stop - t)
-    latest = np.nextafter(stop, t) if is_break else stop
     return _Span(t, target - t, target, latest, is_break and target == stop)
 
 
@@ -158,11 +160,7 @@ def _go_on(step, exactly, problem, progress, output, c):
             progress.power[k] = c.powers[STAGES, k]
         _set_work(1.0, c, progress.work)
         if step.at_break:
-            jump = drive_jump(step.latest, step.target, c.after, problem.system)
-            progress.work[DRIVE] += jump
-            last = progress.counts[OUTPUTS] - 1
-            if output.times[last] == step.target:
-                output.work[last, DRIVE] += jump
+            add_jump(step, c.after, problem, progress, output)
     keep_rates(c)
     c.flags[BEGINS] = 1 if exactly or step.at_break else 0
     progress.counts[STEPS] += 1

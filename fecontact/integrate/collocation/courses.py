@@ -159,13 +159,10 @@ def powers_at(t, y, problem, room, out):
 @helper
 def _energy_scale(h, control, progress, c):
     """Energy relative to which errors of work count: the largest so far, or of the step."""
-    m, kinetic, energy = c.accelerations.shape[1], 0.0, control.energy_scale
+    m, kinetic = c.accelerations.shape[1], 0.0
     for k in range(m):
         kinetic += 0.5 * c.after[m + k] ** 2
-        # A run from rest without loads begins with no energy: that at the scale of velocities.
-        if control.energy_scale == np.inf:
-            energy = min(energy, 0.5 * (control.speed_scale / control.largest[k]) ** 2)
-    energy = max(energy, max(progress.numbers[ENERGY], kinetic))
+    energy = max(control.energy_scale, max(progress.numbers[ENERGY], kinetic))
     for k in range(POWER_COUNT):
         energy = max(energy, max(abs(progress.work[k]), h * abs(c.powers[STAGES, k])))
     progress.numbers[ENERGY] = energy
@@ -266,6 +263,7 @@ def first_switch(after, problem, c):
     s, control, line = problem.system, problem.control, c.line[0]
     m, first, levels = c.accelerations.shape[1], 2.0, control.levels.shape[0]
     for j in range(len(s.gap)):
+        changes = 2.0
         size = abs(s.gap[j])
         for power in range(PLACE_TERMS):
             line[power] = 0.0
@@ -282,12 +280,18 @@ def first_switch(after, problem, c):
         for level in range(levels + 1):
             here = control.levels[level, j] if level < levels else control.depth[j]
             line[0] = centre - here
-            first = min(first, _first_change(after, noise, c))
+            found = _first_change(after, noise, c)
+            # In a gap there is no law whose character could change.
+            if level == levels and found < 2.0 and not _presses(2.0 * found - 1.0, j, s, c):
+                continue
+            changes = min(changes, found)
         if reached > noise:
             release = _release(j, s, c)
-            if after < release < first:
-                first = release
-        if not reached > control.untouched[j]:
+            if after < release < changes:
+                changes = release
+        first = min(first, changes)
+        # Slip of a node that is open all the time has no force.
+        if changes > 1.0 and not (_presses(0.0, j, s, c) or _presses(1.0, j, s, c)):
             continue
         size = 0.0
         for power in range(PLACE_TERMS):

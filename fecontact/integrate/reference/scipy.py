@@ -122,12 +122,20 @@ def before_break(t: float, end: float) -> float:
 
 def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
     """State and work after a breakpoint at ``end``, with the work of jumps of the drive."""
-    y, m = y.copy(), system.basis.modes
+    y = y.copy()
+    y[system.size] += work_of_jump(system, before_break(t, end), end, y)
+    return y
+
+
+def work_of_jump(system: ContactSystem, before: float, after: float, y: Array) -> float:
+    """Work that the drive puts in where its motions jump between two times, in a state [J]."""
+    work, q = 0.0, y[: system.basis.modes]
     for motion, stiffness, shape in zip(system.drive.motions, system.arrays.drive_stiffness,
                                         system.arrays.drive_shapes, strict=False):
-        old, new = motion.history([before_break(t, end), end])[:, 0]
-        y[system.size] += stiffness * (0.5 * (old + new) - shape @ y[:m]) * (new - old)
-    return y
+        old, new = motion.history([before, after])[:, 0]
+        if new != old:
+            work += stiffness * (0.5 * (old + new) - shape @ q) * (new - old)
+    return float(work)
 
 
 def _step(solver: Any) -> str | None:
@@ -151,16 +159,23 @@ def absolute_tolerances(system: ContactSystem, rtol: float) -> Array:
     resolve it miss stick. Both are divided by the mode's largest motion at any point. Internal
     variables: ``rtol`` times their scales.
     """
-    T = system.basis.T[:, : system.basis.dimension]
-    largest = np.abs(T).max(axis=(0, 1))
-    largest = np.where(largest > 0.0, largest, 1.0)
+    largest = largest_motions(system)
     velocity = min(0.1, 1e5 * rtol) * system.velocity_scale
     return np.concatenate([rtol * system.penetration_scale / largest, velocity / largest,
                            rtol * system.memory_scales])
 
 
+def largest_motions(system: ContactSystem) -> Array:
+    """Largest motion (m,) of each mode at any point; 1 for one that moves none."""
+    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
+    return np.where(largest > 0.0, largest, 1.0)
+
+
 def energy_scale(system: ContactSystem, state: Array) -> float:
-    """Energy at the start, of the drive's springs and of the load over the roughness [J]."""
+    """Energy at the start, of the drive's springs and of the load over the roughness [J].
+
+    Where all these are zero, that of the mode that moves most at the scale of velocities.
+    """
     m, drive = system.basis.modes, system.drive
     q, rate = state[:m], state[m : 2 * m]
     # Rotation may leave modes with a stiffness below zero.
@@ -169,7 +184,8 @@ def energy_scale(system: ContactSystem, state: Array) -> float:
         c * motion.largest**2
         for c, motion in zip(drive.stiffness, drive.motions, strict=True))
     pressed = work_of_loads(system.basis, system.load, system.penetration_scale)
-    return float(start + springs + pressed) or np.inf
+    slow = 0.5 * (system.velocity_scale / largest_motions(system).max()) ** 2
+    return float(start + springs + pressed) or float(slow)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

@@ -12,7 +12,7 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.reference.scipy import energy_scale
+from fecontact.integrate.reference.scipy import energy_scale, largest_motions, work_of_jump
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.blocks import blocks_of
@@ -34,7 +34,7 @@ from fecontact.integrate.shared_nodes.helpers import workers_for
 from fecontact.integrate.shared_nodes.team import ALONE, Team, parts_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.powers import NODE_POWERS, POWER_COUNT
+from fecontact.system.powers import DRIVE, NODE_POWERS, POWER_COUNT
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.
@@ -114,8 +114,7 @@ def start(
     if vary:
         # Derivatives are those of all nodes.
         control.untouched[:] = -np.inf
-        control = control._replace(breaks=np.union1d(
-            _apart(control.breaks, times, times), times[1:-1]))
+        control = control._replace(breaks=_breaks(system, times, times[1:-1])[1])
         columns = len(state)
         if not isinstance(vary, bool):
             above, below, width = vary
@@ -135,7 +134,7 @@ def start(
     looser = _IN_PARTS if in_parts(problem) else _LOOSER
     return Run(
         problem,
-        _progress(system, control, float(times[0]), state),
+        _progress(system, control, times, state),
         room_for(m, n, states, basis.dimension, blocks,
                  _team(m, n, 0 if expanded else workers - 1)),
         Output(times, np.zeros((len(times), len(state))),
@@ -163,7 +162,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
     _require_finite(state)
     output = run.output
     return Run(
-        run.problem, _progress(system, control, float(run.times[0]), state), run.room,
+        run.problem, _progress(system, control, run.times, state), run.room,
         Output(output.times, np.zeros_like(output.states), np.zeros_like(output.work)),
         run.variation, run.watch,
         None if run.series is None else from_state(run.series, system, state),
@@ -186,14 +185,22 @@ def _require_finite(state: Array) -> None:
         raise InputError("The initial state holds values that are not finite.")
 
 
-def _progress(system: ContactSystem, control: Control, time: float, state: Array) -> Progress:
-    """Before the first step, whose length the acceleration at the start limits."""
+def _progress(system: ContactSystem, control: Control, times: Array, state: Array) -> Progress:
+    """Before the first step, whose length the acceleration at the start limits.
+
+    What jumps at the start, but for rounding, has jumped.
+    """
     basis, m = system.basis, system.basis.modes
+    time = _breaks(system, times)[0]
     with np.errstate(over="ignore", invalid="ignore"):
         acceleration = np.abs(system.rhs(time, state)[m : 2 * m]) * control.largest
     first = min(0.1 * control.speed_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * control.longest)
-    return progress_for(state, time, first, m, basis.contact_nodes, basis.dimension)
+    progress = progress_for(state, time, first, m, basis.contact_nodes, basis.dimension)
+    if control.work:
+        progress.work[DRIVE] = work_of_jump(system, float(times[0]),
+                                            float(np.nextafter(time, times[-1])), state)
+    return progress
 
 
 def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: ContactSystem) -> int:
@@ -208,8 +215,7 @@ def control_for(
     work: bool,
 ) -> Control:
     """What limits the steps of a run; see :func:`start`."""
-    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
-    largest = np.where(largest > 0.0, largest, 1.0)
+    largest = largest_motions(system)
     slip_scale, depth, stick_speed, untouched = np.zeros((4, system.basis.contact_nodes))
     for nodes, _, law in system.law_groups("friction"):
         slip_scale[nodes] = law.velocity_scale
@@ -221,30 +227,40 @@ def control_for(
     # What friction remembers fades without force.
     untouched[system.arrays.memory > 0] = -np.inf
     with np.errstate(over="ignore", invalid="ignore"):
-        energy = energy_scale(system, state) if work else np.inf
+        energy = energy_scale(system, state) if work else 0.0
     return Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
         largest=largest, untouched=untouched,
-        breaks=_apart(system.breakpoints(float(times[0]), float(times[-1])), times[[0, -1]],
-                      times),
+        breaks=_breaks(system, times)[1],
         levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), unfelt=first_unfelt.address)
 
 
-def _apart(breaks: ArrayLike, others: Array, times: Array) -> Array:
-    """The ascending breaks, without those that only rounding tells from one before or ``others``.
+def _breaks(
+    system: ContactSystem, times: Array, also: ArrayLike = (),
+) -> tuple[float, Array]:
+    """The last break at the start, or the start; and first and last (k, 2) of those after it.
 
-    No step fits between such: 0.1 + 0.2 and 0.3 are meant to be one time.
+    Breaks that only rounding tells apart are one, for no step fits between such: 0.1 + 0.2 and 0.3
+    are meant to be one time. So are those at the end.
     """
-    close = 1e-14 * max(abs(float(times[0])), abs(float(times[-1])))
-    kept: list[float] = []
-    for one in np.asarray(breaks, dtype=float):
-        if np.abs(others - one).min() > close and not (kept and one - kept[-1] <= close):
-            kept.append(float(one))
-    return np.array(kept)
+    start, end = float(times[0]), float(times[-1])
+    close = 1e-14 * max(abs(start), abs(end))
+    # Those at the very start and end too.
+    jumps = system.breakpoints(float(np.nextafter(start, -np.inf)),
+                               float(np.nextafter(end, np.inf)))
+    groups = [[start]]
+    for one in np.sort(np.concatenate([jumps, np.asarray(also, dtype=float)])):
+        if one - groups[-1][-1] <= close:
+            groups[-1].append(float(one))
+        else:
+            groups.append([float(one)])
+    if len(groups) > 1 and end - groups[-1][-1] <= close:
+        groups[-1].append(end)
+    return groups[0][-1], np.array([[one[0], one[-1]] for one in groups[1:]]).reshape(-1, 2)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

@@ -126,6 +126,8 @@ def _third_difference() -> np.ndarray:
 
 
 _DIFFERENCE = _third_difference()
+# Slip speeds at which creep begins or ends are met to this part of them, in so many trials at most.
+_CLOSE, _MOST_TRIALS = 1e-9, 40
 
 
 @helper
@@ -184,10 +186,11 @@ def _set_powers(step, problem, progress, room):
 
 
 @helper
-def _quadrature_error(h, power):
-    """Estimated error of the work of the system's powers in a step, the largest of them [J]."""
-    largest = 0.0
-    for k in range(POWER_COUNT):
+def _quadrature_error(h, room):
+    """Estimated error of a work in a step, the largest of those of the system and its nodes [J]."""
+    largest, power = 0.0, room.power
+    # What a node loses in creep is what it loses, in parts of the step.
+    for k in range(POWER_COUNT + len(room.creeps)):
         difference = 0.0
         for point in range(4):
             difference += _DIFFERENCE[point] * power[point, k]
@@ -200,17 +203,100 @@ def work_error(step, problem, progress, room):
     """Error of the work in a step; fills ``room.power`` with the powers at the points of it."""
     control = problem.control
     _set_powers(step, problem, progress, room)
-    return _quadrature_error(step.h, room.power) / (
+    return _quadrature_error(step.h, room) / (
         control.rtol * _energy_scale(control, progress, room))
 
 
+@routine
+def set_creeps(step, problem, progress, room):
+    """Fill ``room.creeps`` (n, 4) after :func:`work_error`: whether a node creeps at first, and the
+    parts of the step at which it begins or ceases to; 1 for those that there are not.
+    """
+    near, power, n = room.near, room.power, len(room.creeps)
+    for at in range(near.used[0]):
+        j = near.nodes[at]
+        all_the_time, never = True, True
+        for point in range(4):
+            creep = power[point, POWER_COUNT + n + j]
+            all_the_time = all_the_time and creep == power[point, POWER_COUNT + j]
+            never = never and creep == 0.0
+        row = room.creeps[j]
+        row[0] = 1.0 if all_the_time else 0.0
+        row[1] = row[2] = row[3] = 1.0
+        if all_the_time or never:
+            continue
+        low, slow, passed = 0.0, _above_creep(0.0, j, step, problem, progress, room), 1
+        row[0] = 1.0 if slow < 0.0 else 0.0
+        for point in range(1, 4):
+            high = _POINTS[point]
+            fast = _above_creep(high, j, step, problem, progress, room)
+            if (slow < 0.0) != (fast < 0.0):
+                row[passed] = _passing(low, high, slow, fast, j, step, problem, progress, room)
+                passed += 1
+            low, slow = high, fast
+
+
 @helper
-def work_until(part, h, before, power, out):
-    """Out = work ``before`` the step and in its part, by the cubic through the powers."""
+def _above_creep(part, j, step, problem, progress, room):
+    """Slip speed of node j at a part of the step less that below which it creeps."""
+    s, m = problem.system, len(problem.control.largest)
+    moved = ground_motion(min(step.t + part * step.h, step.latest), s)
+    slip, across = -moved_along(j, moved.speed, moved.second_speed, s), 0.0
+    if in_space(s):
+        across = -moved_across(j, moved.speed, moved.second_speed, s)
+    for i in range(m):
+        v = tableau.one_interpolated(part, m + i, progress.state, room.after, room.dense)
+        slip += s.Tx[j, i] * v
+        if in_space(s):
+            across += s.T2[j, i] * v
+    return (math.hypot(slip, across) if in_space(s) else abs(slip)) - problem.control.stick_speed[j]
+
+
+@helper
+def _passing(low, high, at_low, at_high, j, step, problem, progress, room):
+    """Part of the step, between two, at which node j begins or ceases to creep (Illinois)."""
+    near, last = _CLOSE * problem.control.stick_speed[j], 0
+    part = high
+    for _ in range(_MOST_TRIALS):
+        part = (low * at_high - high * at_low) / (at_high - at_low)
+        found = _above_creep(part, j, step, problem, progress, room)
+        if abs(found) <= near:
+            break
+        if (found < 0.0) == (at_low < 0.0):
+            low, at_low = part, found
+            if last < 0:
+                at_high *= 0.5
+            last = -1
+        else:
+            high, at_high = part, found
+            if last > 0:
+                at_low *= 0.5
+            last = 1
+    return part
+
+
+@helper
+def work_until(part, h, before, room, out):
+    """Out = work ``before`` the step and in its part, by the cubic through the powers.
+
+    In creep a node loses what it loses while it creeps.
+    """
+    power, n = room.power, len(room.creeps)
     w0, w1, w2, w3 = _weight(0, part), _weight(1, part), _weight(2, part), _weight(3, part)
-    for k in range(len(out)):
+    count = len(out) - n
+    for k in range(count):
         out[k] = before[k] + h * (w0 * power[0, k] + w1 * power[1, k] + w2 * power[2, k]
                                   + w3 * power[3, k])
+    for j in range(n):
+        row, k = room.creeps[j], POWER_COUNT + j
+        creeps, low, total = row[0] != 0.0, 0.0, 0.0
+        for place in range(1, 5):
+            high = min(part, row[place]) if place < 4 else part
+            if creeps and high > low:
+                for point in range(4):
+                    total += (_weight(point, high) - _weight(point, low)) * power[point, k]
+            creeps, low = not creeps, high
+        out[count + j] = before[count + j] + h * total
 
 
 @helper

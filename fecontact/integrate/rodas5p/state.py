@@ -50,8 +50,9 @@ class Control(NamedTuple):
     untouched : (n,) array
         Penetration up to which a node has no force, so that it need not be looked at; -inf if
         there is none, or if it has to be looked at all the same.
-    breaks : (k,) array
-        Times to step on to.
+    breaks : (k, 2) array
+        Times to step on to, ascending: the first and the last of those that are one but for
+        rounding.
     levels : (l, n) array
         Penetrations at which normal forces begin or end.
     ground : (5,) array
@@ -86,7 +87,7 @@ class Control(NamedTuple):
     unfelt: int
 
 
-CONTROL = types.NamedTuple([vector] * 9 + [matrix, vector] + [f8] * 5 + [i8] * 2, Control)
+CONTROL = types.NamedTuple([vector] * 8 + [matrix, matrix, vector] + [f8] * 5 + [i8] * 2, Control)
 
 
 class Problem(NamedTuple):
@@ -179,10 +180,12 @@ class Room(NamedTuple):
     are from that. Vectors of the size of the state: the ``stages``, coefficients of the ``dense``
     output, and what the names say; ``nodes`` and ``slots`` (3, d n) for all nodes and the near
     ones, ``given`` and ``load`` for what acts at the time of a stage, ``between`` (2, d n) for the
-    nodes at a point within the step, ``power`` (4, p + 2 n) for a quadrature. ``ends`` to
-    ``places`` serve to look at the course of a step: the nodes at its ends, its coefficients,
-    those of the nodes, and room for what they may do. ``sums`` (2, size, 8) are what stages add to
-    those after them. ``team`` is for systems of many nodes, which threads may share.
+    nodes at a point within the step, ``power`` (4, p + 2 n) for a quadrature, ``creeps`` (n, 4)
+    for where nodes creep in the step, as
+    :func:`fecontact.integrate.rodas5p.error_control.set_creeps` fills it. ``ends`` to ``places``
+    serve to look at the course of a step: the nodes at its ends, its coefficients, those of the
+    nodes, and room for what they may do. ``sums`` (2, size, 8) are what stages add to those after
+    them. ``team`` is for systems of many nodes, which threads may share.
     """
 
     near: Blocks
@@ -202,6 +205,7 @@ class Room(NamedTuple):
     load: Array
     pull_rate: Array
     power: Array
+    creeps: Array
     reduced: stage_solver.Reduced
     scratch: motion.Gradients
     gradients_after: motion.Gradients
@@ -217,8 +221,8 @@ class Room(NamedTuple):
 
 ROOM = types.NamedTuple(
     [BLOCKS, vector] + [matrix] * 2 + [vector] * 6 + [matrix] * 3 + [vector] * 3
-    + [matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5 + [vector]
-    + [block, TEAM], Room)
+    + [matrix, matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5
+    + [vector, block, TEAM], Room)
 
 
 def gradients_for(
@@ -249,7 +253,7 @@ def room_for(
         np.zeros((3, columns)), np.zeros((3, columns)), np.zeros((2, columns)),
         np.zeros(motion.GIVEN),
         np.zeros(modes), np.zeros(modes),
-        np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)),
+        np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)), np.zeros((nodes, 4)),
         stage_solver.reduced_for(modes, nodes, states, dimension),
         gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1),
         gradients_for(nodes, states, dimension),

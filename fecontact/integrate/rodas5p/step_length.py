@@ -1,8 +1,10 @@
-"""Lengths of steps by the errors of those before: predictive control (Gustafsson).
+"""Lengths of steps by the errors of those before, and where they must end.
 
-An error counts by its root e^(-1/5), the factor by which a step would have to change for the
-error that is allowed.
+The control is predictive (Gustafsson). An error counts by its root e^(-1/5), the factor by which a
+step would have to change for the error that is allowed.
 """
+
+import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.integrate.rodas5p.tableau import ORDER
@@ -45,3 +47,16 @@ def next_length(h, root, longest, numbers):
     numbers[LAST_STEP], numbers[LAST_ROOT] = h, min(root, _LARGEST_LAST_ROOT)
     numbers[REJECTED_LAST] = 0.0
     return min(h * factor, longest)
+
+
+@helper
+def next_stop(t, breaks, end):
+    """The next break or the end, the last time before it, and whether it is a break.
+
+    What is given in time may jump at all times from the first to the last of a break: it is
+    approached from below the first, and the step ends at the last.
+    """
+    for k in range(len(breaks)):
+        if t < breaks[k, 1]:
+            return breaks[k, 1], np.nextafter(breaks[k, 0], t), True
+    return end, end, False

@@ -10,6 +10,7 @@ from fecontact.integrate.courses import keep_ends, set_courses, set_ends
 from fecontact.integrate.near_nodes import choose_near, extend_near, set_end
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
+    set_creeps,
     set_scale,
     slip_error,
     state_error,
@@ -41,6 +42,7 @@ from fecontact.integrate.rodas5p.step_length import (
     TIME,
     growth,
     next_length,
+    next_stop,
     root_of,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
@@ -67,12 +69,13 @@ _MOST_AGAIN = 20
 def _start(t, problem, progress, room, output, watch):
     """Prepare the first step of a run, and write its first output."""
     s, control = problem.system, problem.control
-    dynamics.set_given(t, s, room.given, room.load)
+    after = np.nextafter(t, output.times[-1])
+    dynamics.set_given(after, s, room.given, room.load)
     dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
                                     room.nodes, progress.gradients, progress.rate)
     if control.work:
-        set_powers(t, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
-               progress.power[POWER_COUNT:])
+        set_powers(after, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
+                   progress.power[POWER_COUNT:])
     if _watched(watch) or watch.counts[KINKS]:
         begin(t, progress.state, s, control.depth, watch, room.scratch)
     for k in range(len(progress.state)):
@@ -93,12 +96,7 @@ def _aim(t, h, exactly, moved, end, problem, progress, room):
     A step of which one has just failed ends at a kink of the forces that lies ahead.
     """
     control, numbers = problem.control, progress.numbers
-    # The end, or the next break; that is approached from below.
-    stop, is_break = end, False
-    for k in range(len(control.breaks)):
-        if t < control.breaks[k] < stop:
-            stop, is_break = control.breaks[k], True
-    latest = np.nextafter(stop, t) if is_break else stop
+    stop, latest, is_break = next_stop(t, control.breaks, end)
     target = t + h
     if exactly:
         target = min(target, stop)
@@ -274,7 +272,7 @@ def _write(step, reached, problem, progress, room, output, vary):
         part = (output.times[row] - step.t) / step.h
         tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
         if problem.control.work:
-            work_until(part, step.h, progress.work, room.power, output.work[row])
+            work_until(part, step.h, progress.work, room, output.work[row])
         row += 1
     progress.counts[OUTPUTS] = row
 
@@ -283,26 +281,34 @@ def _write(step, reached, problem, progress, room, output, vary):
 def _stop_at(part, step, problem, progress, room):
     """End the run at a part of the step."""
     if problem.control.work:
-        work_until(part, step.h, progress.work, room.power, progress.work)
+        work_until(part, step.h, progress.work, room, progress.work)
     tableau.interpolated(part, progress.state, room.after, room.dense, room.right)
     for k in range(len(progress.state)):
         progress.state[k] = room.right[k]
     progress.counts[STEPS] += 1
 
 
+@helper
+def add_jump(step, state, problem, progress, output):
+    """Add what the drive puts in by jumping at the end of a step, to the outputs there too."""
+    row, times = progress.counts[OUTPUTS] - 1, output.times
+    while row >= 0 and times[row] > step.latest:
+        output.work[row, DRIVE] += drive_jump(step.latest, times[row], state, problem.system)
+        row -= 1
+    progress.work[DRIVE] += drive_jump(step.latest, np.nextafter(step.target, times[-1]), state,
+                                       problem.system)
+
+
 @routine
 def _go_on(step, problem, progress, room, output):
     """Make the end of the step the state of the run."""
     if problem.control.work:
-        work_until(1.0, step.h, progress.work, room.power, progress.work)
+        work_until(1.0, step.h, progress.work, room, progress.work)
         if step.at_break:
-            set_powers(step.target, room.after, problem.system, problem.control.stick_speed,
-                   progress.power[:POWER_COUNT], progress.power[POWER_COUNT:])
-            jump = drive_jump(step.latest, step.target, room.after, problem.system)
-            progress.work[DRIVE] += jump
-            last = progress.counts[OUTPUTS] - 1
-            if output.times[last] == step.target:
-                output.work[last, DRIVE] += jump
+            set_powers(np.nextafter(step.target, output.times[-1]), room.after, problem.system,
+                       problem.control.stick_speed, progress.power[:POWER_COUNT],
+                       progress.power[POWER_COUNT:])
+            add_jump(step, room.after, problem, progress, output)
         else:
             for k in range(len(progress.power)):
                 progress.power[k] = room.power[3, k]
@@ -374,6 +380,8 @@ def advance_by(problem, progress, room, output, vary, watch, most):
         reached = step.target if ends > 1.0 else t + ends * step.h
         if varies:
             keep(vary.variation)
+        if control.work:
+            set_creeps(step, problem, progress, room)
         _write(step, reached, problem, progress, room, output, vary)
         if ends <= 1.0:
             _stop_at(ends, step, problem, progress, room)

@@ -139,8 +139,14 @@ def dense_coefficients(stages, out):
 def interpolated(s, before, after, dense, out):
     """Fill out with the state at the part s of the step."""
     for i in range(len(out)):
-        out[i] = (1.0 - s) * before[i] + s * (after[i] + (1.0 - s) * (
-            dense[0, i] + s * (dense[1, i] + s * dense[2, i])))
+        out[i] = one_interpolated(s, i, before, after, dense)
+
+
+@helper
+def one_interpolated(s, i, before, after, dense):
+    """Entry i of the state at the part s of the step."""
+    return (1.0 - s) * before[i] + s * (after[i] + (1.0 - s) * (
+        dense[0, i] + s * (dense[1, i] + s * dense[2, i])))
 
 
 @helper
