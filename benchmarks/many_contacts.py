@@ -99,7 +99,7 @@ def main(quick: bool = False) -> None:
         print(f"us a node from {n0} to {n1}: {(whole1 - whole0) / (n1 - n0):.3f} all closed, "
               f"{(few1 - few0) / (n1 - n0):.3f} few closed")
     for nodes in sizes:
-        one, two = clock_times(nodes, 5 * pieces, 2 * steps)
+        one, two = clock_times(nodes, 3 * pieces, 5 * steps)
         print(f"{nodes} nodes, all closed, by the clock: one thread {one:.1f} us, two threads "
               f"{two:.1f} us, {one / two:.2f} times as fast")
 

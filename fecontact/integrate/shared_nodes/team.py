@@ -56,7 +56,7 @@ def _parts(nodes):
 
 def parts_for(nodes: int) -> int:
     """Largest number of parts of the nodes of a system; zero if they are not shared."""
-    return _parts.py_func(nodes) if nodes >= SHARED_FROM else 0
+    return int(_parts.py_func(nodes)) if nodes >= SHARED_FROM else 0
 
 
 @helper
