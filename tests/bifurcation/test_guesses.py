@@ -29,18 +29,18 @@ CIRCLE = np.stack([np.cos(TIMES), np.sin(TIMES)], axis=1).reshape(-1)
 
 def orbit(radius):
     """The orbits are circles of radius sqrt(r)."""
-    return np.concatenate([radius * CIRCLE, [np.pi, radius**2]])
+    return np.concatenate([radius * CIRCLE, [np.pi, 2.0, radius**2]])
 
 
 def tangent(radius):
-    return np.concatenate([CIRCLE, [0.0, 2.0 * radius]]) / np.sqrt(1.0 + 4.0 * radius**2)
+    return np.concatenate([CIRCLE, [0.0, 0.0, 2.0 * radius]]) / np.sqrt(1.0 + 4.0 * radius**2)
 
 
 def followed(step, last=0.7):
     """The problem behind four orbits whose radii differ by a step."""
     field = vector_field(stuart_landau, {"r": 0.5, "w": 2.0}, 2)
     problem = CollocationProblem(field, field.values, 0, MESH, 4, CIRCLE.reshape(-1, 2),
-                                 np.ones(4), renewal=0)
+                                 np.ones(5), renewal=0, second=1)
     for k in (3, 2, 1, 0):
         radius = last - k * step
         problem, _, _ = problem.adapted(orbit(radius), tangent(radius))
@@ -80,7 +80,7 @@ def test_what_was_off_of_late_counts():
     """An orbit that lies beside the others spoils the next guesses."""
     problem = followed(0.04)
     beside = orbit(0.74)
-    beside[:-2] += 1e-3 * np.roll(CIRCLE, 2)
+    beside[:-3] += 1e-3 * np.roll(CIRCLE, 2)
     spoilt, _, _ = problem.adapted(beside, tangent(0.74))
     assert problem.off(0.01) < 1e-5
     assert spoilt.off(0.01) > 5e-4

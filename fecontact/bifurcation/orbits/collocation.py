@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation import predictor
-from fecontact.bifurcation.continuation.newton import Solution
+from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
@@ -137,8 +137,9 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     precision : float
         Tolerance of the location of special points, relative to the step. Above 1e-6 normal forms
         are omitted.
-    trail : (2 k, n) array
-        u and tangent of the last points, the latest first; empty before the first step.
+    trail : (k, n) array
+        u and tangent of the last points, the latest first; on branches of the last one, and the
+        derivative of the tangent along the branch. Empty before the first step.
     misses : Misses
         How far guesses of the last point were off.
     sizes : Intervals, optional
@@ -239,8 +240,15 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """Predictor along the tangent, bent as the branch was before."""
         straight = u + step * tangent
-        return straight if not len(self.trail) else predictor.predicted(
-            self.weights(), self.trail, straight, step, self.misses, _MOST_BENT)
+        if len(self.trail) < 3:
+            return straight
+        weights = self.weights()
+        if self.second is not None:
+            return predictor.predicted(weights, self.trail, straight, step, self.misses, _MOST_BENT)
+        # The length of the old tangent changes with mesh and scales.
+        length = step / weighted_norm(weights, self.trail[1])
+        aside = 0.5 * length * length * self.trail[2]
+        return straight if weighted_norm(weights, aside) > _MOST_BENT * step else straight + aside
 
     def off(self, step: float) -> float:
         """See :meth:`Problem.off`."""
@@ -249,12 +257,12 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
     def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
         """The problem for the next step: phase condition at u, periodically a new mesh."""
         behind, misses = self.trail, predictor.UNKNOWN
-        if len(behind):
+        if len(behind) and self.second is None:
+            behind = self._bend(u, tangent)
+        elif len(behind):
             misses = predictor.misses_at(self.weights(), u, behind, self.misses)
-        # Branches are not smooth enough for more than two points.
-        most = 2 * (1 if self.second is None else predictor.MOST_BEHIND)
-        trail = np.concatenate([[u, tangent], behind[:most]]) if len(behind) else np.array(
-            [u, tangent])
+            behind = behind[: 2 * predictor.MOST_BEHIND]
+        trail = np.concatenate([[u, tangent], behind]) if len(behind) else np.array([u, tangent])
         mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
             error = next((error for known, error in self.noted if known is u), None)
@@ -287,6 +295,12 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved[0]),
                           trail=moved if len(self.trail) else moved[:0], calm=0)
         return problem, moved[0], moved[1]
+
+    def _bend(self, u: Array, tangent: Array) -> Array:
+        """Derivative (1, n) of the tangent along a branch, from the last step; (0, n) without."""
+        direction = self.trail[1] / weighted_norm(self.weights(), self.trail[1])
+        length = weighted_product(self.weights(), direction, u - self.trail[0])
+        return (tangent - direction)[None] / length if length > 0.0 else self.trail[:0]
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""

@@ -31,6 +31,7 @@ from fecontact.bifurcation.orbits.curves.kernels import (
     unit_factor,
 )
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 
 # Step of the differences of the Jacobian, in ranges of the states over the orbit.
@@ -225,6 +226,8 @@ def _critical_pair(mu: list[complex], autonomous: bool) -> tuple[int, int]:
     places = [place for place, each in enumerate(mu) if isfinite(each)]
     if autonomous:
         places.remove(min(places, key=lambda place: abs(mu[place] - 1.0)))
+    if len(places) < 2:
+        raise AnalysisError("The multipliers beside the orbit grow beyond all numbers.")
     return min(combinations(places, 2), key=lambda both: abs(mu[both[0]] * mu[both[1]] - 1.0))
 
 
