@@ -91,7 +91,8 @@ def test_normal_form(strong):
 def test_orbits_of_three_periods_on_both_sides(strong, over):
     """Saddles near the point, |e + i f + C R| = |B| sqrt(R) of one R = |w|^2 all along."""
     field, point = strong
-    branch = orbit_branch(field, point, over, bounds=BOX[over], both=True,
+    branch = orbit_branch(field, point, over, method=Collocation(state_tolerance=1e-8),
+                          bounds=BOX[over], both=True,
                           options=ContinuationOptions(largest_step=0.03))
     assert branch.status is {"e": BranchStatus.BOUND, "f": BranchStatus.CLOSED}[over]
     names = {"e": 0.0, "f": 0.0}
