@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 DIAGRAMS = ("branches", "response", "mode")  # plots of whole files
 _TURN, _FREQUENCY = 2.0 * np.pi, "angular_frequency"
 _OUTPUTS = 1001  # of an orbit
+_NEAR = 1e-9  # what rounding may do to a frequency
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,12 @@ def _point(
         raise InputError(f"--at-hz = {choice.at_hz:g} is for branches over an angular frequency, "
                          f"but those of {file} are over {name}; give --at.")
     value = choice.at if choice.at_hz is None else _TURN * choice.at_hz
+    if choice.at_hz is not None:
+        low, high = branch.parameter.min() / _TURN, branch.parameter.max() / _TURN
+        if not low * (1.0 - _NEAR) <= choice.at_hz <= high * (1.0 + _NEAR):
+            raise InputError(f"--at-hz = {choice.at_hz:g}: the branch lies between {low:.6g} and "
+                             f"{high:.6g} Hz; choose a frequency there, or follow it further.")
+        value = float(np.clip(value, branch.parameter.min(), branch.parameter.max()))
     if value is None:
         amplitudes = [float(point.values.get("observed_amplitude", 0.0)) if point.is_orbit else -1.0
                       for point in branch.points]

@@ -215,7 +215,8 @@ def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
             (["phase"], "holds 2 branches of orbits; choose one with --branch: '0 "
                         "(drive.amplitude_x = 2e-05)'"),
             (["phase", "--branch", 2], "has no branch '2'"),
-            (["phase", "--branch", 0, "--at-hz", 99], "has 0 solutions"),
+            (["phase", "--branch", 0, "--at-hz", 99],
+                 "--at-hz = 99: the branch lies between 8 and 13 Hz"),
             (["phase", "--branch", 0, "--at-hz", 9, "--at", 9], "mean the same"),
             (["mode"], "not that of a nonlinear mode"),
             (["phase", "--branch", 0, "--set", "load.normal=1"], "is a stored result")):

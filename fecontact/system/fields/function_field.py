@@ -29,8 +29,8 @@ _WAYS = ("automatic", "complex", "differences")
 # Samples at which the complex step is checked against differences before it is used.
 _SAMPLES = 16
 _NONE = np.zeros(0, dtype=np.int64)
-# States below this are zero.
-_NOTHING = 1e-200
+# States below this part of their scales are zero.
+_NOTHING = 1e-60
 # Most states of a field, against typing errors.
 _MOST_STATES = 100_000
 # Functions that accept complex numbers but are not analytic.
@@ -103,8 +103,8 @@ class FunctionField(VectorField):
     ) -> tuple[Array, Array, Array, Integers]:
         """As :meth:`derivatives`, with counts (d + a,) of failures of the complex step."""
         n, d = x.shape
-        # The complex step would underflow at states beside zero.
-        x = np.where(np.abs(x) < _NOTHING, 0.0, x)
+        # Products of states beside zero would underflow in the complex step.
+        x = np.where(np.abs(x) < _NOTHING * self._scales, 0.0, x)
         f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(active)))
         wrong = np.zeros(d + len(active), dtype=np.int64)
         address, scales, states = self._rates.address, self._scales, self._jacobian is None
