@@ -159,7 +159,8 @@ def _point(
         if not low * (1.0 - _NEAR) <= choice.at_hz <= high * (1.0 + _NEAR):
             raise InputError(f"--at-hz = {choice.at_hz:g}: the branch lies between {low:.6g} and "
                              f"{high:.6g} Hz; choose a frequency there, or follow it further.")
-        value = float(np.clip(value, branch.parameter.min(), branch.parameter.max()))
+        value = float(np.clip(_TURN * choice.at_hz, branch.parameter.min(),
+                              branch.parameter.max()))
     if value is None:
         amplitudes = [float(point.values.get("observed_amplitude", 0.0)) if point.is_orbit else -1.0
                       for point in branch.points]
