@@ -17,6 +17,7 @@ from fecontact import (
 )
 from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
+from fecontact.integrate.rodas5p.driver import start
 from fecontact.laws import JenkinsFriction, LinearContact
 
 
@@ -150,6 +151,26 @@ def test_bad_input():
     with pytest.raises(InputError, match=r"SetValued\(\), not by Scipy\(method='Radau'\)"):
         simulate(drop(), 1.0, initial=START, events=ContactEvents(),
                  solver=Scipy("Radau"))
+
+
+def test_events_of_the_piece_that_is_interrupted_are_kept():
+    """A signal that comes while compiled code runs shows when that has returned."""
+    given = impact_oscillator(2, 9.845), np.zeros(4), np.linspace(0.0, 30.0, 301)
+    run, whole = (start(*given, rtol=1e-6, events=[ContactEvents()], series="never")
+                  for _ in range(2))
+    step = run._advance
+
+    def interrupted(steps):
+        step(steps)
+        raise KeyboardInterrupt
+
+    vars(run)["_advance"] = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        run.advance(2000)
+    whole.advance(2000)
+    assert run.time == whole.time
+    assert len(whole.events) > 10
+    assert np.array_equal(run.events.time, whole.events.time)
 
 
 def test_events_survive_a_checkpoint(tmp_path):

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from test_blocks import stack, system
+from test_blocks import MODES, stack, system
 
 import fecontact as fc
 from fecontact.core.errors import InputError
@@ -69,9 +69,10 @@ def solid():
     return moving, state
 
 
-def bodies():
+def bodies(modes):
     """Four beams on each other and the ground: modes of one move no nodes of the ones apart."""
-    whole = system(stack(80, 70, element_size=0.002), ConstantFriction(0.3, smoothing_slope=1e4))
+    whole = system(stack(80, 70, element_size=0.002, modes=modes),
+                   ConstantFriction(0.3, smoothing_slope=1e4))
     assert whole.basis.contact_nodes == 290
     return whole, np.zeros(whole.size)
 
@@ -82,7 +83,9 @@ CASES = {
     "memory": lambda: (*beam(300, LuGreFriction(0.4, 0.3, 0.01, 2.0, 1e6, 300.0), height=-2e-6),
                        2e-5),
     "space": lambda: (*solid(), 5e-3),
-    "bodies": lambda: (*bodies(), 2e-3),
+    "bodies": lambda: (*bodies(MODES), 2e-3),
+    # Shares of the products end within blocks of the Jacobian, which begin at odd modes.
+    "bodies of 20 modes": lambda: (*bodies(5), 2e-3),
 }
 
 
@@ -279,9 +282,13 @@ def test_number_of_threads(monkeypatch):
     assert helpers.workers_for(10**5, None) == 1
     assert helpers.workers_for(255, 8) == 1
     assert helpers.workers_for(10**4, 8) == 8
+    assert [helpers.workers_for(n, 10**6) for n in (300, 1000, 10**5)] == [4, 4, 16]
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert helpers.workers_for(10**5, None) == 1
     assert helpers.workers_for(10**5, 2) == 2
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "3, 1")
+    assert helpers.workers_for(10**5, None) == 3
 
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, True, "2"])

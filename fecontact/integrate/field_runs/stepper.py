@@ -106,9 +106,12 @@ class FieldSteps:
         InputError
             If an event is not finite.
         """
-        status = step_loop.advance(self.kernel, self.progress, self.room, self.output, self.varied,
-                                   self.watch, most)
-        take_events(self.watch, self.found, self.time)
+        try:
+            status = step_loop.advance(self.kernel, self.progress, self.room, self.output,
+                                       self.varied, self.watch, most)
+        finally:
+            # An interrupt shows when the compiled code has returned, and its events are there.
+            take_events(self.watch, self.found, self.time)
         if self.function is not None and self.function.error is not None:
             raise self.function.error
         if status != RUNNING:

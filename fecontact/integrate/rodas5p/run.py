@@ -141,7 +141,10 @@ class Run:
 
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""
-        with assisted(self.problem, self.progress, self.room):
-            status = self._advance(steps)
-        take_events(self.watch, self.found, self.time)
+        try:
+            with assisted(self.problem, self.progress, self.room):
+                status = self._advance(steps)
+        finally:
+            # An interrupt shows when the compiled code has returned, and its events are there.
+            take_events(self.watch, self.found, self.time)
         return int(status)

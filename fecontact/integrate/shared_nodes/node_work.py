@@ -121,24 +121,29 @@ def _answer_part(begin, end, progress, room):
                                   room.reduced.answers)
 
 
+@helper
+def _cut(mode, left, right):
+    """Where the columns from left to right are cut at a mode: not within fours of them."""
+    return min(left + (max(mode - left, 0) + 3) // 4 * 4, right)
+
+
 @routine
 def _product_part(part, parts, room):
     """Columns of the Jacobian of some modes, the same numbers whatever the parts.
 
-    They are products of fours of modes, and of what is left behind the last four.
+    They are products of fours of modes of a block, and of what is left behind the last four.
     """
     near, w = room.near, room.reduced
     m = len(near.shapes)
-    begin, end = part * (m // 4) // parts * 4, (part + 1) * (m // 4) // parts * 4
-    if part + 1 == parts:
-        end = m
+    begin, end = part * m // parts, (part + 1) * m // parts
     for pair in range(len(near.pairs)):
         top, bottom, left, right = block_at(near.pairs, pair)
         for half in (0, m):
-            first, last = within(left, right, half + begin, half + end)
+            low, high = max(np.int64(left), half), min(np.int64(right), half + m)
+            first, last = _cut(half + begin, low, high), _cut(half + end, low, high)
             if first < last:
                 stage_solver.add_products(
-                    near.shapes, w.answers, (top, bottom, first, last),
+                    near.shapes, w.answers, (top, bottom, np.uint64(first), np.uint64(last)),
                     (np.uint64(near.pairs[pair, 4]), np.uint64(near.pairs[pair, 5])), w.J)
 
 

@@ -11,7 +11,7 @@ from fecontact.core.types import Array, Integers
 # Nodes that are near the other side are shared from so many on, in an even number of parts, of at
 # least so many each where there are more than two: loops over fewer nodes cost more.
 SHARED_FROM, _IN_PART = 256, 250
-_MOST_PARTS, _MOST_OF_MODES = 16, 4
+_MOST_PARTS, MOST_OF_MODES = 16, 4
 # Parts begin at multiples of this, the numbers of a vector instruction.
 _TOGETHER = 8
 
@@ -76,7 +76,7 @@ def parts_of_modes(room):
     """Number of parts of the modes that products are shared by: they give the same numbers."""
     if room.team.helpers == 0:
         return 1
-    return max(1, min(_MOST_OF_MODES, len(room.near.shapes) // 8))
+    return max(1, min(MOST_OF_MODES, len(room.near.shapes) // 8))
 
 
 @helper
