@@ -37,6 +37,11 @@ def masses(**parts):
                          friction=ConstantFriction(0.2, smoothing_slope=10.0), **parts)
 
 
+def test_names_of_parameters_from_an_iterator():
+    assert dict(contact_field(masses(), iter(["friction.friction_coefficient"])).parameters) == {
+        "friction.friction_coefficient": 0.2}
+
+
 def driven(**more):
     return fc.Drive(**{"stiffness_x": 1.0, "stiffness_y": 0.5, "damping_x": 0.2, "amplitude_x": 0.3,
                        "amplitude_y": 0.1, "angular_frequency": 1.3, **more})

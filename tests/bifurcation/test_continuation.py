@@ -121,6 +121,8 @@ def test_events_and_stops():
     assert branch.points[-1].u == pytest.approx([0.1, 0.1**3 - 0.1], rel=1e-12)
     first = continue_branch(CUBIC, start, ContinuationOptions(stop_at="fold"))
     assert [point.kind for point in first.special] == ["fold"]
+    once = continue_branch(CUBIC, start, ContinuationOptions(stop_at=iter(["fold"])))
+    assert once.status is BranchStatus.STOPPED
     plain = continue_branch(CUBIC, start, ContinuationOptions(locate=False, bounds=(-2.0, 2.0)))
     assert plain.special == ()
 

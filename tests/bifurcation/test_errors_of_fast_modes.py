@@ -173,3 +173,27 @@ def test_errors_along_a_curve():
         _, error = true_error(point, clock, point.parameter, point.values["k"], periods=12)
         assert error <= 1.1e-5
         assert 0.5 * error <= point.values["state_error"] <= 2.5 * error
+
+
+def swing(t, x, p, out):
+    # p = [force]; symmetric orbits cross a branch of others.
+    out[0] = x[1]
+    out[1] = p[0] * np.cos(t) - 0.2 * x[1] - x[0] ** 3
+
+
+def test_error_where_branches_cross():
+    """The equations are singular there; on a mesh without the symmetry the orbit is as accurate."""
+    field = vector_field(swing, {"force": 0.5}, 2, period=lambda p: 2.0 * np.pi)
+    branch = orbit_branch(
+        field, settled(field, 60 * 2.0 * np.pi, [0.1, 0.0], 2.0 * np.pi), "force",
+        bounds=(0.1, 12.0), method=Collocation(21),
+        options=ContinuationOptions(points=150, step=0.02, largest_step=0.1))
+    assert branch.message == ""
+    crossing, = branch.of_kind("branch point")
+    problem, u, _ = restored(field, crossing)
+    assert crossing.values["state_error"] <= 2.0 * state_error(problem, u)
+    assert branch.column("state_error").max() <= 1e-5
+    for point in branch.points[::4]:
+        problem, u, _ = restored(field, point)
+        true = on_halves(problem, u)
+        assert 0.5 * true <= point.values["state_error"] <= 2.0 * true

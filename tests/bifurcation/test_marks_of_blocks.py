@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from systems import friction_oscillator, impact_oscillator
 
 from fecontact import Drive, Ground, InputError, Load, PointLoad, simulate
-from fecontact.bifurcation import VectorField, poincare_scan, vector_field
+from fecontact.bifurcation import VectorField, contact_field, poincare_scan, vector_field
 from fecontact.bifurcation.attractors.marks import mark_of
 from fecontact.integrate import Crossing, Rodas5P
 from fecontact.laws import (
@@ -429,3 +429,40 @@ def swing(t, x, p, out):
 def stiffer(t, x, p, out):
     out[0] = x[1]
     out[1] = -2.0 * p[0] * x[0]
+
+
+def on_contact(factor):
+    """A field that asks one of a contact system, whose ground moves ``factor`` times as fast."""
+    def moved(system, speed):
+        return system.with_(**{"ground.speed": factor * speed})
+
+    return Called(contact_field(friction_oscillator(), {"speed": (1e-3, moved)}))
+
+
+def test_contact_fields_within_others():
+    """What they keep while they are used counts for nothing; it holds addresses of this process."""
+    one, other = on_contact(1.0), on_contact(2.0)
+    mark, inner = mark_of([one.spring]), one.spring
+    inner.rates(np.zeros(3), np.zeros((3, inner.dimension)), 1.2 * inner.values)
+    inner.derivatives(np.zeros(3), np.zeros((3, inner.dimension)), inner.values, (0,))
+    assert mark_of([inner]) == mark == mark_of([on_contact(1.0).spring])
+    assert mark_of([], one) == mark_of([], on_contact(1.0)) != mark_of([], other)
+
+
+def test_cached_properties_count_as_if_not_there():
+    class Reach:
+        def __init__(self, limit):
+            self.limit = limit
+
+        @functools.cached_property
+        def half(self):
+            return 0.5 * self.limit
+
+        def __call__(self):
+            return 2.0 * self.half
+
+    used = Called(Spring(Reach(50.0)))
+    mark = mark_of([], used)
+    assert used.spring.reach() == 50.0
+    assert mark == mark_of([], used) == mark_of([], Called(Spring(Reach(50.0))))
+    assert mark != mark_of([], Called(Spring(Reach(60.0))))

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from fecontact import __version__
+from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.core.compiled import CompiledLaw, source_digest
 from fecontact.core.errors import InputError, shown
 from fecontact.system.contact_system import ContactSystem
@@ -137,6 +138,9 @@ class _Marker:
             holder = value.__self__
             yield from map(self.of, (value.__qualname__, getattr(value, "__module__", None), None
                                      if inspect.ismodule(holder) else holder))
+        elif isinstance(value, ParametrisedSystem):
+            # What it has made of these holds addresses, and grows with use.
+            yield from map(self.of, ("systems", value.base, value.parameters, value.setters))
         elif isinstance(value, type):
             yield from self._of_class(value)
         elif inspect.ismodule(value):
@@ -215,8 +219,13 @@ class _Marker:
         if isinstance(kept, str):
             yield self.of(kept)
             return
+        # Cached properties are there only after use.
+        state = [{name: item for name, item in one.items() if not isinstance(
+            inspect.getattr_static(type(value), name, None), functools.cached_property)}
+                 if isinstance(one, dict) else one for one in kept[2:3]]
         # The last three are iterators over items, and a way to set the state.
-        yield from map(self.of, (*kept[:3], *(list(one or ()) for one in kept[3:5]), *kept[5:]))
+        yield from map(self.of, (*kept[:2], *state, *(list(one or ()) for one in kept[3:5]),
+                                 *kept[5:]))
 
 
 def _simple(value: Any) -> list[bytes] | None:

@@ -319,7 +319,9 @@ class ContinuationOptions:
         for name in ("points", "iterations"):
             as_count(getattr(self, name), f"ContinuationOptions: {name}")
         require_flags("ContinuationOptions", locate=self.locate)
-        as_texts(self.stop_at, "ContinuationOptions: stop_at")
+        kinds = as_texts(self.stop_at, "ContinuationOptions: stop_at")
+        if not isinstance(self.stop_at, str):
+            object.__setattr__(self, "stop_at", kinds)  # an iterator gives them once
         require_kind("ContinuationOptions", Mapping, events=self.events)
         for name, event in self.events.items():
             require_kind("ContinuationOptions: events", str, name=name)

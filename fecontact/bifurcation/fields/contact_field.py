@@ -207,5 +207,6 @@ def contact_field(
         If there is no such parameter, or it has a value per node.
     """
     require_kind("contact_field", ContactSystem, system=system)
-    as_texts(parameters, "contact_field: names of parameters")
-    return ContactField(ParametrisedSystem(system, parameters))
+    names = as_texts(parameters, "contact_field: names of parameters")
+    return ContactField(ParametrisedSystem(
+        system, parameters if isinstance(parameters, Mapping) else names))

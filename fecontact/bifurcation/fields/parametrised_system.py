@@ -46,6 +46,8 @@ class ParametrisedSystem:
         The system before any of the parameters is set.
     parameters : dict
         Names and base values.
+    setters : list of functions
+        Each makes a system from a system and a value of the parameter.
     own : frozenset of str
         Names of those that a function of the user sets.
     multilinear : bool
@@ -64,10 +66,10 @@ class ParametrisedSystem:
                  else dict.fromkeys([parameters] if isinstance(parameters, str) else parameters))
         self.base = system
         self.parameters: dict[str, float] = {}
-        self._setters: list[Setter] = []
+        self.setters: list[Setter] = []
         for name, value in given.items():
             self.parameters[name], setter = _parameter(system, name, value)
-            self._setters.append(setter)
+            self.setters.append(setter)
         self.own = frozenset(name for name, value in given.items() if isinstance(value, tuple))
         self.multilinear = not self.own and multilinear(self.parameters, system.drive, system.load)
         self._made: OrderedDict[bytes, ContactSystem] = OrderedDict()
@@ -120,7 +122,7 @@ class ParametrisedSystem:
         made = self.base
         if key == self._known:
             return made
-        for setter, value in zip(self._setters, values.tolist(), strict=True):
+        for setter, value in zip(self.setters, values.tolist(), strict=True):
             made = setter(made, value)
         if made.size != self._size:
             raise InputError(f"The parameters {_named(self.parameters, values)} make a system of "

@@ -168,6 +168,9 @@ _DIFFERENCE = 1e-5  # relative parameter step for the derivative of the forcing 
 # Part of the parameter in the tangent of a branch below which orbits are compared with the nearest
 # one instead of that at the same parameter.
 _LEAST_SHARE = 0.05
+# Singular value of the scaled equations below which, as at branch points, orbits are compared with
+# the nearest one across the branch, and least change of a state, in its scale, for which it counts.
+_LEAST_SINGULAR, _LEAST_CHANGE = 1e-4, 1e-7
 # Step of rough Jacobians that are differenced again, in ranges of the states.
 _FAR = 3e-4
 # Smallest range of a state, in its values and in the scale that its field has.
@@ -343,18 +346,31 @@ class CollocationLinearisation:
     def beside(self, side: Array, tangent: Array) -> Array:
         """Change (n,) of the orbit by a right-hand side (n,), zero in the last rows.
 
-        The parameter stays as it is. Near folds of the branch, which has this tangent, the nearest
-        orbit is taken instead.
+        The parameter stays as it is. Near folds of the branch, which has this tangent, and at
+        branch points the nearest orbit is taken instead.
         """
         weights, last = self.problem.weights(), self._last
         known = last is not None and last[1] == 1.0
         row = last[0] if last is not None and known else weights * tangent
-        change = self.solve(row, side)
+        change = self._off_crossing(row, self.solve(row, side))
         row = weights * tangent / (weights @ tangent**2)
         change -= (row @ change) * tangent
         share = float(row[-1] * tangent[-1])
         change -= change[-1] * row[-1] / (share + _LEAST_SHARE**2) * tangent
         return change
+
+    def _off_crossing(self, row: Array, change: Array) -> Array:
+        """A change of the orbit without that along a branch which crosses there."""
+        problem, d = self.problem, self.problem.field.dimension
+        largest = np.abs(change[: problem.size].reshape(-1, d) / problem.scales[:d]).max()
+        if not _LEAST_CHANGE < largest < np.inf:
+            return change
+        size, across = self.bordered(row).softest(
+            np.concatenate([problem.scales[:d], problem.scales[-problem.common :]]))
+        rows = problem.weights() * across
+        part = float(rows @ change) / float(rows @ across)
+        found: Array = change - part * _LEAST_SINGULAR**2 / (size**2 + _LEAST_SINGULAR**2) * across
+        return found
 
     @cached_property
     def floquet(self) -> Floquet:
