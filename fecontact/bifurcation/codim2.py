@@ -31,7 +31,7 @@ from fecontact.bifurcation.homoclinic.starts import homoclinic_curve
 from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve, orbit_curve
 from fecontact.bifurcation.orbits.curves.errors import with_errors
 from fecontact.core.checks import require_flags, require_kind
-from fecontact.core.errors import InputError, require_finite
+from fecontact.core.errors import InputError, require_finite, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField, require_field
 
@@ -103,7 +103,7 @@ def codim2_curve(
     require_kind("codim2_curve", (str, type(None)), to=to)
     require_flags("codim2_curve", both=both)
     if not (isinstance(keep, str) and keep in ("kind", "period")):
-        raise InputError(f"codim2_curve: keep = {keep!r} must be 'kind' or 'period'.")
+        raise InputError(f"codim2_curve: keep = {shown(keep)} must be 'kind' or 'period'.")
     if keep == "period" and to is not None:
         raise InputError(f"codim2_curve: keep = 'period' takes the orbit itself, and to = {to!r} "
                          f"another curve; leave one of them out.")
