@@ -1,11 +1,8 @@
-"""Threads that help with the contact nodes of a run, and how they wait for each other."""
+"""Threads that help with the contact nodes of a run."""
 
-import ctypes
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from threading import Thread
 from typing import Any
 
@@ -14,8 +11,6 @@ from fecontact.integrate.shared_nodes.team import MOST_OF_MODES, parts_for
 
 # Threads, beyond which more hardly help: a tenth of a step is not shared.
 _MOST = 4
-# Shortest useful sleep [us]; Windows counts milliseconds.
-_PAUSE = 50
 
 
 def workers_for(nodes: int, workers: int | None) -> int:
@@ -66,20 +61,3 @@ def assisted(problem: Any, progress: Any, room: Any) -> Iterator[None]:
         words[LEAVE] = 1
         for helper in helpers:
             helper.join()
-
-
-@cache
-def how_to_wait() -> tuple[int, int, int]:
-    """Addresses of what lets other threads go first and of what sleeps, and how long to sleep.
-
-    In microseconds; on Windows in milliseconds.
-    """
-    if sys.platform == "win32":
-        system = ctypes.WinDLL("kernel32")
-        return _address(system.SwitchToThread), _address(system.Sleep), 1
-    system = ctypes.CDLL(None)
-    return _address(system.sched_yield), _address(system.usleep), _PAUSE
-
-
-def _address(function: object) -> int:
-    return int(ctypes.cast(function, ctypes.c_void_p).value or 0)  # type: ignore[arg-type]

@@ -13,7 +13,6 @@ from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.blocks import block_at, within
 from fecontact.integrate.rodas5p.error_control import add_some_powers, largest_slip_error
-from fecontact.integrate.shared_nodes.helpers import how_to_wait
 from fecontact.integrate.shared_nodes.tasks import (
     DONE,
     END,
@@ -48,6 +47,7 @@ from fecontact.integrate.shared_nodes.team import (
     parts_of,
     parts_of_modes,
 )
+from fecontact.integrate.shared_nodes.waiting import how_to_wait
 from fecontact.system.powers import POWER_COUNT
 
 
