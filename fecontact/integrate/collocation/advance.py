@@ -7,6 +7,7 @@ from numba import types
 
 from fecontact.core.compiled import helper, i8, routine
 from fecontact.core.references import borrowed
+from fecontact.integrate.collocation.columns import propagate_at
 from fecontact.integrate.collocation.courses import (
     first_switch,
     keep_rates,
@@ -48,9 +49,10 @@ from fecontact.integrate.rodas5p.step_loop import (
     RUNNING,
     add_jump,
 )
+from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, write_columns
 from fecontact.system.nodes import ground_motion
 
-ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, COLLOCATION, i8)
+ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, COLLOCATION, VARY, i8)
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.85, 0.1, 2.0
 _POWER = -1.0 / ERROR_POWER
@@ -210,10 +212,13 @@ def _fail(progress):
 
 
 @helper
-def _advance_by(problem, progress, room, output, c, most):
+def _advance_by(problem, progress, room, output, c, vary, most):
     control, numbers, counts = problem.control, progress.numbers, progress.counts
     t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
     smallest = 1e-14 * max(abs(output.times[0]), abs(end))
+    # The derivatives of forces jump where these switch: steps with columns end there exactly.
+    varies = len(vary.variation.columns) > 0
+    at_end = 0.0 if varies else _AT_END
     if counts[STARTED] == 0:
         for k in range(len(progress.state)):
             output.states[0, k] = progress.state[k]
@@ -246,7 +251,7 @@ def _advance_by(problem, progress, room, output, c, most):
         near, part = max(_LOCATED, max(_TIME * abs(t), smallest) / step.h), 2.0
         if again < _MOST_AGAIN:
             part = _switch(step.h, near, solved, moved, problem, progress, c)
-        if part < 1.0 - max(near, _AT_END if error <= 1.0 else 0.0):
+        if part < 1.0 - max(near, at_end if error <= 1.0 else 0.0):
             counts[REJECTIONS] += 1
             whole = max(whole, step.h)
             h, exactly = step.h * part, True
@@ -254,6 +259,10 @@ def _advance_by(problem, progress, room, output, c, most):
             h *= 1.0 + past
             again += 1
             continue
+        if error <= 1.0 and varies:
+            error = max(error, propagate_at(vary.propagate)(
+                step.t, step.h, step.latest, before, problem, progress, room, c, vary)
+                / vary.variation.tolerance)
         if not error <= 1.0:
             _fail(progress)
             h = step.h * (_growth(error) if error < np.inf else _UNSOLVED)
@@ -262,6 +271,11 @@ def _advance_by(problem, progress, room, output, c, most):
                 numbers[TIME], numbers[STEP] = t, h
                 return MINIMUM_STEP if error < np.inf else NOT_FINITE
             continue
+        if varies:
+            keep(vary.variation)
+            if output.times[counts[OUTPUTS]] <= step.target:
+                write_columns(vary.variation, vary.transitions[counts[OUTPUTS]])
+                begin_anew(vary.variation)
         _write(step, problem, progress, output, c)
         _go_on(step, exactly, problem, progress, output, c)
         t, new, ends, exactly = step.target, True, exactly, False
@@ -276,7 +290,11 @@ def _advance_by(problem, progress, room, output, c, most):
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
 
 
-def advance(problem, progress, room, output, collocation, most):
-    """Go on by up to ``most`` attempts at steps, and to an accepted one; returns how it ended."""
+def advance(problem, progress, room, output, collocation, vary, most):
+    """Go on by up to ``most`` attempts at steps, and to an accepted one; returns how it ended.
+
+    Columns of ``vary`` go with the steps as in
+    :func:`fecontact.integrate.rodas5p.step_loop.advance`.
+    """
     return _advance_by(borrowed(problem), borrowed(progress), borrowed(room), borrowed(output),
-                       borrowed(collocation), most)
+                       borrowed(collocation), borrowed(vary), most)

@@ -12,9 +12,12 @@ import numpy as np
 from fecontact.core.compiled import kernel
 from fecontact.core.references import constants
 from fecontact.integrate.collocation.advance import ADVANCE, advance
+from fecontact.integrate.collocation.columns import PROPAGATE, propagate
 from fecontact.integrate.collocation.room import COLLOCATION, collocation_for
 from fecontact.integrate.rodas5p import small_systems
+from fecontact.integrate.rodas5p.small_systems import compiled_address
 from fecontact.integrate.rodas5p.state import Problem
+from fecontact.integrate.rodas5p.variational import VARIATION
 
 
 def advance_for(problem: Problem) -> Any:
@@ -28,14 +31,35 @@ def _advance(modes: int, nodes: int) -> Any:
     return kernel(ADVANCE, constants=constants(fixed_values(modes, nodes)), nogil=True)(advance)
 
 
+def propagate_for(problem: Problem) -> int:
+    """Address of what carries derivatives over a step, for a system of one of the sizes."""
+    nodes, modes = problem.system.Tx.shape
+    return _propagate(modes, nodes)
+
+
+@cache
+def _propagate(modes: int, nodes: int) -> int:
+    known = {**small_systems.values_of_derivatives(modes, nodes), **_of_room(modes, nodes)}
+    return compiled_address(PROPAGATE, propagate, constants(known))
+
+
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all small systems of a size, for each type of tuples."""
+    values = {**small_systems.fixed_values(modes, nodes), **_of_room(modes, nodes)}
+    # Of any number of columns, or none.
+    del values[VARIATION]
+    return values
+
+
+def _of_room(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     room = collocation_for(modes, nodes, 1.0)._asdict()
-    return {**small_systems.fixed_values(modes, nodes), COLLOCATION: {
+    return {COLLOCATION: {
         name: value.shape for name, value in room.items() if isinstance(value, np.ndarray)}}
 
 
 def compile_usual() -> None:
-    """Compile the loops of all sizes."""
+    """Compile the loops of all sizes, and derivatives of steps of the usual ones."""
     for size in small_systems.SIZES:
         _advance(*size)
+    for size in small_systems.USUAL:
+        _propagate(*size)

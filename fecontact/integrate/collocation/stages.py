@@ -76,6 +76,19 @@ def foretell(h, progress, c):
             c.accelerations[i + 1, k] = value
 
 
+@helper
+def set_matrix_rows(i, h, J, c):
+    """Fill the rows of stage i of the linear system for the accelerations, by J = [Jq, Jv]."""
+    m = len(J)
+    for k in range(m):
+        row = i * m + k
+        for other in range(STAGES):
+            by_speed, by_place = h * ONCE[i, other], h * h * TWICE[i, other]
+            for l in range(m):
+                c.matrix[row, other * m + l] = -by_speed * J[k, m + l] - by_place * J[k, l]
+        c.matrix[row, row] += 1.0
+
+
 @routine
 def _improve(h, before, anew, problem, progress, room, c):
     """One iteration of Newton's method; how much it changes, in units of the tolerance.
@@ -92,14 +105,7 @@ def _improve(h, before, anew, problem, progress, room, c):
                                         room.scratch, c.rate)
         if anew:
             stage_solver.assemble(s, blocks, room.scratch, room.reduced)
-            J = room.reduced.J
-            for k in range(m):
-                row = i * m + k
-                for other in range(STAGES):
-                    by_speed, by_place = h * ONCE[i, other], h * h * TWICE[i, other]
-                    for l in range(m):
-                        c.matrix[row, other * m + l] = -by_speed * J[k, m + l] - by_place * J[k, l]
-                c.matrix[row, row] += 1.0
+            set_matrix_rows(i, h, room.reduced.J, c)
         for k in range(m):
             c.right[i * m + k] = c.rate[m + k] - c.accelerations[i + 1, k]
     if anew:

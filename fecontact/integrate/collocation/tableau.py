@@ -78,6 +78,22 @@ def _largest_errors() -> tuple[Array, Array]:
 SPEED_PART, PLACE_PART = _largest_errors()
 
 
+def _extrapolation(point: int, without: int | None) -> Array:
+    """Weights of values at the other points of ``_ALL``, but for one, of what they go on to."""
+    others = [i for i in range(RATE_TERMS) if i not in (point, without)]
+    weights = np.zeros(RATE_TERMS)
+    for i in others:
+        rest = np.array([_ALL[k] for k in others if k != i])
+        weights[i] = np.prod((_ALL[point] - rest) / (_ALL[i] - rest))
+    return weights
+
+
+# What values at the stages go on to at the begin, with the last of them and without it; and what
+# those before the last go on to at the end, with that at the begin and without it.
+TO_BEGIN = np.array([_extrapolation(0, without) for without in (None, STAGES)])
+TO_END = np.array([_extrapolation(STAGES, without) for without in (None, 0)])
+
+
 def _powers() -> tuple[Array, Array, Array]:
     """Matrices from accelerations at the begin and the stages to coefficients of powers of x.
 
@@ -96,6 +112,10 @@ def _powers() -> tuple[Array, Array, Array]:
 RATE_POWERS, SPEED_POWERS, PLACE_POWERS = _powers()
 # From accelerations to those at the places.
 AT_PLACES = np.ascontiguousarray(np.vander(2.0 * PLACES - 1.0, RATE_TERMS, True) @ RATE_POWERS)
+# To the changes of velocities and displacements there, but for the velocity at the begin.
+SPEEDS_AT, PLACES_AT = (
+    np.ascontiguousarray(np.vander(2.0 * PLACES - 1.0, len(table), True) @ table)
+    for table in (SPEED_POWERS, PLACE_POWERS))
 
 
 def _to_bernstein() -> Array:

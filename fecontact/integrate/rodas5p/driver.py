@@ -44,7 +44,7 @@ _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
 # or of this part of the largest that it has been. In parts of steps the error is that of what is
 # kept, else that of a solution of lower order.
-_LOOSER, _IN_PARTS, _FADED = 10.0, 200.0, 0.1
+_LOOSER, _COLLOCATED, _IN_PARTS, _FADED = 10.0, 10.0, 200.0, 0.1
 # Steps of a piece of a run: at first, at least and at most.
 _FEWEST, _MOST_STEPS = 200, 10_000_000
 
@@ -123,15 +123,21 @@ def start(
     problem = Problem(system.arrays, blocks, control)
     expanded = None if vary or collocation == "always" else chosen_series(
         system, state, times, rtol, max_step, events, work, series)
-    collocated = None if vary or expanded else chosen_collocation(
-        system, rtol, events, collocation)
+    collocated = None if expanded else chosen_collocation(system, rtol, events, collocation)
     with_laws = None
     if inline_laws and not (vary or expanded or collocated):
         # Compiled for runs that need it only.
         from fecontact.integrate.inlined_laws.step_loops import advance_with_laws
 
         with_laws = advance_with_laws(system, problem)
-    looser = _IN_PARTS if in_parts(problem) else _LOOSER
+    propagate, looser = 0, _LOOSER
+    if vary and collocated:
+        # Compiled for runs that need it only.
+        from fecontact.integrate.collocation.small_systems import propagate_for as carried_for
+
+        propagate, looser = carried_for(problem), _COLLOCATED
+    elif vary:
+        propagate, looser = propagate_for(problem), _IN_PARTS if in_parts(problem) else _LOOSER
     return Run(
         problem,
         _progress(system, control, times, state),
@@ -143,7 +149,7 @@ def start(
              variation_for(columns, m, n, states, basis.dimension, width,
                            float(vary_rtol or looser * rtol), 1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
-             propagate_for(problem) if vary else 0),
+             propagate),
         watch_for(system, events, bool(vary)),
         expanded, collocated, with_laws)
 

@@ -134,7 +134,7 @@ class Run:
 
             collocate = advance_by(self.problem)
             return lambda steps: collocate(self.problem, self.progress, self.room, self.output,
-                                           self.collocation, steps)
+                                           self.collocation, self.variation, steps)
         step = self.with_laws or advance_for(self.problem, self.variation)
         return lambda steps: step(self.problem, self.progress, self.room, self.output,
                                   self.variation, self.watch, steps)

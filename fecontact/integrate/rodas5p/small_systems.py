@@ -30,6 +30,7 @@ from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Modes and nodes.
 SIZES = tuple((modes, nodes) for modes in (1, 2, 3, 4) for nodes in (1, 2))
+USUAL = ((1, 1), (2, 1), (3, 1), (1, 2), (2, 2))
 
 
 def advance_for(problem: state.Problem, vary: Vary) -> Any:
@@ -85,15 +86,19 @@ def _advance(modes: int, nodes: int) -> Any:
 def _propagate(size: tuple[int, int] | None, parts: bool = False) -> int:
     """Address of what carries derivatives over a step, of modes and nodes of a size or of all."""
     known = "" if size is None else constants(values_of_derivatives(*size))
-    compiled = kernel(PROPAGATE, constants=known, no_cpython_wrapper=True)(
-        propagate_in_parts if parts else propagate)
-    found = compiled.overloads[PROPAGATE.args]
+    return compiled_address(PROPAGATE, propagate_in_parts if parts else propagate, known)
+
+
+def compiled_address(signature: Any, function: Any, known: str) -> int:
+    """Address of a function that is compiled for tuples with ``known`` values."""
+    compiled = kernel(signature, constants=known, no_cpython_wrapper=True)(function)
+    found = compiled.overloads[signature.args]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
 
 
 def compile_usual() -> None:
     """Compile the derivatives of steps of all systems, and of those of the usual sizes."""
-    for size in (None, (1, 1), (2, 1), (3, 1), (1, 2), (2, 2)):
+    for size in (None, *USUAL):
         _propagate(size)
     _propagate(None, True)
 

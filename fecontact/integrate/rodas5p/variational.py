@@ -348,7 +348,7 @@ def _parts(step, scale, x, forced, J, v):
 
 
 @helper
-def _set_accelerations(t, Y, blocks, vary, out):
+def set_accelerations(t, Y, blocks, vary, out):
     """Fill out (m,) with the derivatives of the accelerations to the parameter, at Y and time t.
 
     For a system without memory, whose nodes move as v.nodes says.
@@ -379,7 +379,7 @@ def propagate_in_parts(step, problem, progress, room, vary):
     forced = np.zeros((collocation.STAGES if varies else 0, m))
     if varies:
         dynamics.project(blocks, progress.state, v.nodes[0], v.nodes[1])
-        _set_accelerations(np.nextafter(step.t, np.inf), progress.state, blocks, vary, forced[0])
+        set_accelerations(np.nextafter(step.t, np.inf), progress.state, blocks, vary, forced[0])
     parts, expected = _parts(step, scale, x, forced, room.reduced.J, v)
     if expected > v.tolerance:
         return expected
@@ -392,7 +392,7 @@ def propagate_in_parts(step, problem, progress, room, vary):
             dynamics.set_gradients(Y, s, blocks, ground_motion(now, s), v.nodes, v.inside)
             columns.set_derivatives(s, blocks, v.inside, room.reduced, answers, J[i])
             if varies:
-                _set_accelerations(now, Y, blocks, vary, forced[i])
+                set_accelerations(now, Y, blocks, vary, forced[i])
         collocation.collocate(step.h / parts, J, forced, x)
     for c in range(count):
         largest = v.norms[0, c]

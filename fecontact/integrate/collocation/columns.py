@@ -1,0 +1,238 @@
+r"""Derivatives of a step by collocation to its start and to a parameter.
+
+A column x = [dq, dv] of dy/dy_0, or of dy/dp, has accelerations at the stages that obey the
+derivative of the equations of the step,
+
+.. math::
+
+    \alpha_i = J_q(t_i, y_i) \left(dq + c_i h\, dv + h^2 \sum_l (A^2)_{il} \alpha_l\right)
+        + J_v(t_i, y_i) \left(dv + h \sum_l A_{il} \alpha_l\right)
+        + \partial f / \partial p\, (t_i, y_i)
+
+whose last term is for the column of a parameter only. It is linear: the Jacobians at the solved
+stages make one matrix for all columns. Forces are smooth within a step, as it ends where they
+switch, so that columns are as accurate as the motion. What their course misses within the step,
+which it has through the accelerations at its begin too, is their error.
+"""
+
+import numpy as np
+
+from fecontact.core.compiled import f8, function_at, helper, routine
+from fecontact.core.dense_lu import backward, factorise, forward
+from fecontact.core.references import Reference
+from fecontact.integrate.collocation.courses import look
+from fecontact.integrate.collocation.room import BEGINS, COLLOCATION
+from fecontact.integrate.collocation.stages import (
+    move_back,
+    place_scale,
+    set_matrix_rows,
+    set_stage,
+    speed_scale,
+)
+from fecontact.integrate.collocation.tableau import (
+    AT_PLACES,
+    LOOKS,
+    ONCE,
+    PLACE_PART,
+    PLACES,
+    PLACES_AT,
+    POINTS,
+    SPEED_PART,
+    SPEEDS_AT,
+    STAGES,
+    TO_BEGIN,
+    TO_END,
+    TWICE,
+)
+from fecontact.integrate.rodas5p import dynamics, stage_solver
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p import tableau as rows
+from fecontact.integrate.rodas5p.variational import VARY, set_accelerations
+
+PROPAGATE = f8(f8, f8, f8, f8, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
+               Reference(run_arrays.ROOM), Reference(COLLOCATION), Reference(VARY))
+propagate_at = function_at(PROPAGATE)
+
+
+@routine
+def _linearise(t, Y, moved, problem, room, vary, forced):
+    """Put the derivatives of the accelerations at Y into J, those to the parameter into ``forced``.
+
+    ``moved`` is how the ground moves at time t.
+    """
+    v = vary.variation
+    dynamics.set_gradients(Y, problem.system, problem.blocks, moved, v.nodes, v.inside)
+    stage_solver.assemble(problem.system, problem.blocks, v.inside, room.reduced)
+    if vary.width != 0.0:
+        set_accelerations(t, Y, problem.blocks, vary, forced)
+
+
+@helper
+def _set_rates(i, ahead, J, v):
+    """Put into row i of the stages of each column what its begin makes, the time ``ahead`` later.
+
+    The accelerations of the parameter's column are in the last row of ``v.pushed``.
+    """
+    m, count = len(J), len(v.columns)
+    for c in range(count):
+        x, out = v.columns[c], v.stages[rows.STAGES * c + i]
+        for k in range(m):
+            total = 0.0
+            for l in range(m):
+                total += J[k, l] * (x[l] + ahead * x[m + l]) + J[k, m + l] * x[m + l]
+            out[k] = total
+
+
+@helper
+def _keep_forced(i, v):
+    """Keep what the parameter makes at point i of the step, behind the rates there."""
+    count, m = v.pushed.shape
+    for k in range(m):
+        v.stages[rows.STAGES * (count - 1) + i, m + k] = v.pushed[count - 1, k]
+
+
+@helper
+def _add_forced(begins, ends, v):
+    """Add what the parameter makes to the rates of its column.
+
+    Where forces switch at the begin or the end of the step, the difference between the systems on
+    both sides of the parameter mixes forces from both sides of the switch: there it is what those
+    at the other points go on to.
+    """
+    count, m = v.pushed.shape
+    own = v.stages[rows.STAGES * (count - 1) : rows.STAGES * count]
+    for k in range(m, 2 * m):
+        first, last = 0.0, 0.0
+        for i in range(STAGES + 1):
+            first += TO_BEGIN[ends, i] * own[i, k]
+            last += TO_END[begins, i] * own[i, k]
+        if begins:
+            own[0, k] = first
+        if ends:
+            own[STAGES, k] = last
+        for i in range(STAGES + 1):
+            own[i, k - m] += own[i, k]
+
+
+@routine
+def _set_columns(h, problem, progress, c, v):
+    """Solve for the accelerations of all columns; they and their sizes at the end of the step."""
+    m = c.accelerations.shape[1]
+    speeds = speed_scale(problem, progress)
+    for column in range(len(v.columns)):
+        own = v.stages[rows.STAGES * column : rows.STAGES * (column + 1)]
+        for i in range(STAGES):
+            for k in range(m):
+                c.right[i * m + k] = own[i + 1, k]
+        forward(c.matrix, STAGES * m, c.pivots, c.right)
+        backward(c.matrix, STAGES * m, c.right, c.right)
+        for i in range(STAGES):
+            for k in range(m):
+                own[i + 1, k] = c.right[i * m + k]
+        x, after, size = v.columns[column], v.after[column], v.norms[0, column]
+        for k in range(m):
+            place, speed = 0.0, 0.0
+            for i in range(STAGES):
+                place += TWICE[STAGES - 1, i] * own[i + 1, k]
+                speed += ONCE[STAGES - 1, i] * own[i + 1, k]
+            after[k] = x[k] + h * (x[m + k] + h * place)
+            after[m + k] = x[m + k] + h * speed
+        v.norms[1, column] = max(size, _size(after, speeds, problem, progress))
+
+
+@helper
+def _size(x, speeds, problem, progress):
+    """Size of a column, relative to the scales of the state."""
+    m, size = len(x) // 2, 0.0
+    for k in range(m):
+        size = max(size, abs(x[k]) / place_scale(k, problem, progress))
+        size = max(size, abs(x[m + k]) * problem.control.largest[k] / speeds)
+    return size
+
+
+@routine
+def _error_at(at, h, problem, progress, room, c, v):
+    """Largest error of a column by what its course misses at one of the places, as a part of it."""
+    m, J = c.accelerations.shape[1], room.reduced.J
+    speeds, largest = speed_scale(problem, progress), 0.0
+    g, to_place = SPEED_PART[at] * h, PLACE_PART[at] * h * h
+    for k in range(m):
+        for l in range(m):
+            c.small[k, l] = -g * J[k, m + l] - to_place * J[k, l]
+        c.small[k, k] += 1.0
+    factorise(c.small, m, c.small_pivots)
+    for column in range(len(v.columns)):
+        own = v.stages[rows.STAGES * column : rows.STAGES * (column + 1)]
+        x, y = v.columns[column], v.vectors[0]
+        for k in range(m):
+            place, speed, missing = 0.0, 0.0, 0.0
+            for i in range(STAGES + 1):
+                place += PLACES_AT[at, i] * own[i, k]
+                speed += SPEEDS_AT[at, i] * own[i, k]
+                missing -= AT_PLACES[at, i] * own[i, k]
+            y[k] = x[k] + h * (PLACES[at] * x[m + k] + h * place)
+            y[m + k] = x[m + k] + h * speed
+            c.small_right[k] = missing
+        for k in range(m):
+            total = c.small_right[k]
+            for l in range(2 * m):
+                total += J[k, l] * y[l]
+            c.small_right[k] = total
+        if column == len(v.columns) - 1:
+            for k in range(m):
+                c.small_right[k] += v.pushed[column, k]
+        forward(c.small, m, c.small_pivots, c.small_right)
+        backward(c.small, m, c.small_right, c.small_right)
+        error = 0.0
+        for k in range(m):
+            missing = abs(c.small_right[k])
+            if not missing < np.inf:
+                return np.inf
+            error = max(error, missing * g * problem.control.largest[k] / speeds)
+            error = max(error, missing * to_place / place_scale(k, problem, progress))
+        size = max(_size(x, speeds, problem, progress),
+                   _size(v.after[column], speeds, problem, progress))
+        if error > 0.0:
+            largest = max(largest, error / max(size, v.faded * v.norms[1, column]))
+    return largest
+
+
+def propagate(t, h, latest, before, problem, progress, room, c, vary):
+    """Carry the columns over the step whose stages ``c`` holds; the largest error of one.
+
+    It is relative to the size of the column, or to the part ``faded`` of the largest it has been.
+    The step goes on for the part ``before`` of it after a switch of forces, which its last stage
+    does not feel.
+    """
+    s, v = problem.system, vary.variation
+    count, m = v.pushed.shape
+    J, forced = room.reduced.J, v.pushed[count - 1]
+    v.pushed[count - 1] = 0.0
+    after = np.nextafter(t, np.inf)
+    dynamics.set_given(after, s, room.given, room.load)
+    _linearise(after, progress.state, dynamics.motion_given(room.given), problem, room, vary,
+               forced)
+    _set_rates(0, 0.0, J, v)
+    _keep_forced(0, v)
+    for i in range(STAGES):
+        set_stage(i, h, progress, c)
+        if i == STAGES - 1 and before > 0.0:
+            move_back(before, h, c)
+        _linearise(min(t + POINTS[i] * h, latest), c.y, dynamics.motion_given(c.given[i]), problem,
+                   room, vary, forced)
+        set_matrix_rows(i, h, J, c)
+        _set_rates(i + 1, POINTS[i] * h, J, v)
+        _keep_forced(i + 1, v)
+    if vary.width != 0.0:
+        _add_forced(1 if c.flags[BEGINS] != 0 else 0, 1 if before > 0.0 else 0, v)
+    factorise(c.matrix, STAGES * m, c.pivots)
+    _set_columns(h, problem, progress, c, v)
+    largest = 0.0
+    for at in range(LOOKS):
+        look(at, c)
+        now = min(t + PLACES[at] * h, latest)
+        dynamics.set_given(now, s, room.given, room.load)
+        _linearise(now, c.y, dynamics.motion_given(room.given), problem, room, vary, forced)
+        error = _error_at(at, h, problem, progress, room, c, v)
+        largest = max(largest, error) if error < np.inf else np.inf
+    return largest
