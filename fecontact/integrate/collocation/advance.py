@@ -247,8 +247,12 @@ def _advance_by(problem, progress, room, output, c, vary, most):
             error = moved = step_error(step, problem, progress, room, c)
             if error <= 1.0 and control.work:
                 error = max(error, work_error(step, before, problem, progress, room, c))
-        # A switch nearer to an end is there, as far as the time can tell.
-        near, part = max(_LOCATED, max(_TIME * abs(t), smallest) / step.h), 2.0
+        # A switch nearer to an end is there, as far as the time can tell; that at which the step
+        # before ended is passed.
+        near, part = max(_TIME * abs(t), smallest), 2.0
+        if c.flags[BEGINS] != 0:
+            near = max(near, _LOCATED * numbers[LAST_STEP])
+        near = max(_LOCATED, near / step.h)
         if again < _MOST_AGAIN:
             part = _switch(step.h, near, solved, moved, problem, progress, c)
         if part < 1.0 - max(near, at_end if error <= 1.0 else 0.0):
@@ -261,7 +265,7 @@ def _advance_by(problem, progress, room, output, c, vary, most):
             continue
         if error <= 1.0 and varies:
             error = max(error, propagate_at(vary.propagate)(
-                step.t, step.h, step.latest, before, problem, progress, room, c, vary)
+                step.t, step.h, step.latest, before, near, problem, progress, room, c, vary)
                 / vary.variation.tolerance)
         if not error <= 1.0:
             _fail(progress)

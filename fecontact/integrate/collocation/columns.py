@@ -48,8 +48,13 @@ from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
 from fecontact.integrate.rodas5p.variational import VARY, set_accelerations
+from fecontact.system.kernels import node_forces
+from fecontact.system.nodes import NodeMotion, ground_motion, node_contact, node_motion
 
-PROPAGATE = f8(f8, f8, f8, f8, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
+# A change of a force at once by more than this part of it is a jump.
+_JUMP = 1e-3
+
+PROPAGATE = f8(f8, f8, f8, f8, f8, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
                Reference(run_arrays.ROOM), Reference(COLLOCATION), Reference(VARY))
 propagate_at = function_at(PROPAGATE)
 
@@ -197,12 +202,66 @@ def _error_at(at, h, problem, progress, room, c, v):
     return largest
 
 
-def propagate(t, h, latest, before, problem, progress, room, c, vary):
+@helper
+def _deeper(motion, aside):
+    """A motion of a node that is so much further on the other side."""
+    return NodeMotion(motion.along, motion.height - aside, motion.along_rate, motion.height_rate,
+                      motion.across, motion.across_rate)
+
+
+@helper
+def _contact(j, y, moved, s):
+    """A node against the ground at a state y."""
+    return node_contact(j, node_motion(j, y, s), moved, s)
+
+
+@routine
+def _cross(t, near, problem, c, vary):
+    """Add to the columns at the end of a step what forces that jump there make of them.
+
+    If the penetration u of a node passes a level at the rate u', where the accelerations jump by
+    da, a motion beside it, whose penetration differs by du, passes it by -du / u' later: its
+    velocities differ by da du / u' after both have passed (saltation). The level is passed at the
+    end of the step if the time ``near`` brings the node there.
+    """
+    s, v, levels = problem.system, vary.variation, problem.control.levels
+    m, count = c.accelerations.shape[1], len(v.columns)
+    moved = ground_motion(t, s)
+    for j in range(len(s.gap)):
+        contact = _contact(j, c.after, moved, s)
+        u, rate = contact.penetration, contact.rate
+        reach = near * abs(rate)
+        for level in range(len(levels)):
+            if not abs(u - levels[level, j]) < reach:
+                continue
+            # Both sides of the level, in the order in which they are passed.
+            jump, slip_jump, largest = 0.0, 0.0, 0.0
+            for side in (-1.0, 1.0):
+                aside = levels[level, j] + side * (reach if rate > 0.0 else -reach) - u
+                F, R, _ = node_forces(j, _deeper(node_motion(j, c.after, s), aside), moved,
+                                      c.after[2 * m :], s, v.inside.force[0], v.inside.rates[0])
+                jump += side * F
+                slip_jump += side * R
+                largest = max(largest, abs(F))
+            if abs(jump) < _JUMP * largest:
+                continue
+            for column in range(count):
+                x, ahead = v.after[column], 0.0
+                for k in range(m):
+                    ahead -= s.Ty[j, k] * x[k]
+                if column == count - 1 and vary.width != 0.0:
+                    ahead += (_contact(j, c.after, moved, vary.above).penetration
+                              - _contact(j, c.after, moved, vary.below).penetration) / vary.width
+                for k in range(m):
+                    x[m + k] += (s.Ty[j, k] * jump - s.Tx[j, k] * slip_jump) * ahead / rate
+
+
+def propagate(t, h, latest, before, near, problem, progress, room, c, vary):
     """Carry the columns over the step whose stages ``c`` holds; the largest error of one.
 
     It is relative to the size of the column, or to the part ``faded`` of the largest it has been.
     The step goes on for the part ``before`` of it after a switch of forces, which its last stage
-    does not feel.
+    does not feel, and which is found to the part ``near``.
     """
     s, v = problem.system, vary.variation
     count, m = v.pushed.shape
@@ -235,4 +294,6 @@ def propagate(t, h, latest, before, problem, progress, room, c, vary):
         _linearise(now, c.y, dynamics.motion_given(room.given), problem, room, vary, forced)
         error = _error_at(at, h, problem, progress, room, c, v)
         largest = max(largest, error) if error < np.inf else np.inf
+    if before > 0.0:
+        _cross(min(t + h, latest), near * h, problem, c, vary)
     return largest
