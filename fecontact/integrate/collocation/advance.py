@@ -66,6 +66,9 @@ _AT_END = 1e-3
 _LOCATED, _PAST = 1e-9, 1e-11
 # Parts of the time that rounding does not blur.
 _TIME = 1e-12
+# Where a switch is foretold steps end by this part before it, unless it is so near, in parts of the
+# step before, that it is known exactly.
+_SHORT, _NEXT = 1e-4, 1e-2
 # Attempts at a step that end at a switch.
 _MOST_AGAIN = 6
 
@@ -196,13 +199,17 @@ def _switch(h, near, solved, error, problem, progress, c):
     """First part of a step at which forces switch, as far as it is known, 2 if none.
 
     If the step has failed, that may have been why: its course is wrong then, and the switch is
-    where the motion before would meet it. Unless that is not known either.
+    where the motion before would meet it. Unless that is not known either. Also whether it is
+    known only about, as it is too far ahead.
     """
-    if error > 1.0 and c.flags[BEGINS] == 0:
+    foretold = error > 1.0 and c.flags[BEGINS] == 0
+    if foretold:
         foretell(h, progress, c)
         set_courses(h, progress, c)
-        return first_switch(near, problem, c)
-    return first_switch(near, problem, c) if solved else 2.0
+    elif not solved:
+        return 2.0, False
+    part = first_switch(near, problem, c)
+    return part, foretold and part * h > _NEXT * progress.numbers[LAST_STEP]
 
 
 @helper
@@ -253,11 +260,17 @@ def _advance_by(problem, progress, room, output, c, vary, most):
         if c.flags[BEGINS] != 0:
             near = max(near, _LOCATED * numbers[LAST_STEP])
         near = max(_LOCATED, near / step.h)
+        roughly = False
         if again < _MOST_AGAIN:
-            part = _switch(step.h, near, solved, moved, problem, progress, c)
+            part, roughly = _switch(step.h, near, solved, moved, problem, progress, c)
         if part < 1.0 - max(near, at_end if error <= 1.0 else 0.0):
             counts[REJECTIONS] += 1
             whole = max(whole, step.h)
+            if roughly:
+                # From just before it the switch is found exactly.
+                h, exactly = step.h * part * (1.0 - _SHORT), False
+                again += 1
+                continue
             h, exactly = step.h * part, True
             past = max(_PAST, 1e-3 * _TIME * abs(t) / h)
             h *= 1.0 + past
