@@ -21,7 +21,7 @@ from fecontact.core.compiled import f8, function_at, helper, routine
 from fecontact.core.dense_lu import backward, factorise, forward
 from fecontact.core.references import Reference
 from fecontact.integrate.collocation.courses import look
-from fecontact.integrate.collocation.room import BEGINS, COLLOCATION
+from fecontact.integrate.collocation.room import COLLOCATION
 from fecontact.integrate.collocation.stages import (
     move_back,
     place_scale,
@@ -40,16 +40,21 @@ from fecontact.integrate.collocation.tableau import (
     SPEED_PART,
     SPEEDS_AT,
     STAGES,
-    TO_BEGIN,
-    TO_END,
     TWICE,
 )
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
-from fecontact.integrate.rodas5p.variational import VARY, set_accelerations
+from fecontact.integrate.rodas5p.variational import VARY, add_matrices
+from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import NodeMotion, ground_motion, node_contact, node_motion
+from fecontact.system.nodes import (
+    NodeMotion,
+    ground_motion,
+    node_contact,
+    node_motion,
+    pressing_force,
+)
 
 # A change of a force at once by more than this part of it is a jump.
 _JUMP = 1e-3
@@ -69,14 +74,62 @@ def _linearise(t, Y, moved, problem, room, vary, forced):
     dynamics.set_gradients(Y, problem.system, problem.blocks, moved, v.nodes, v.inside)
     stage_solver.assemble(problem.system, problem.blocks, v.inside, room.reduced)
     if vary.width != 0.0:
-        set_accelerations(t, Y, problem.blocks, vary, forced)
+        _set_forced(t, Y, moved, problem, vary, forced)
+
+
+@helper
+def _law_forces(j, own, here, s):
+    """F and R by the laws of a system at the penetration and slip of ``own``, in its place."""
+    F = normal_at(s.normal[j])(own.penetration, own.rate, s.normal_parameters[j])[0]
+    R = 0.0
+    if F != 0.0:
+        R = friction_at(s.friction[j])(own.slip, pressing_force(j, here, F, s),
+                                       s.friction_parameters[j])[0]
+    return F, R
+
+
+@routine
+def _set_forced(t, Y, moved, problem, vary, out):
+    """Fill out (m,) with the derivatives of the accelerations to the parameter.
+
+    Differences are those of the laws, at the penetrations and slips that are; where these change
+    with the parameter themselves, the derivatives of the forces say what follows. So no
+    difference mixes forces from both sides of a switch.
+    """
+    s, blocks, v, above, below = (problem.system, problem.blocks, vary.variation, vary.above,
+                                  vary.below)
+    w, rate, n, m = v.nodes, v.vectors[3], len(s.gap), len(out)
+    dynamics.set_given(t, above, v.given[0], v.load[0])
+    dynamics.set_given(t, below, v.given[1], v.load[1])
+    moved_above, moved_below = (dynamics.motion_given(v.given[0]),
+                                dynamics.motion_given(v.given[1]))
+    for at in range(n):
+        j = blocks.nodes[at]
+        motion, p = dynamics.motion_of(at, w, s), v.inside.partial[j]
+        own = node_contact(j, motion, moved, s)
+        one, other = (node_contact(j, motion, moved_above, above),
+                      node_contact(j, motion, moved_below, below))
+        F, R = _law_forces(j, own, one, above)
+        F_below, R_below = _law_forces(j, own, other, below)
+        deeper, faster, slip = (one.penetration - other.penetration, one.rate - other.rate,
+                                one.slip - other.slip)
+        F += -F_below - p[0, 1] * deeper - p[0, 3] * faster
+        R += -R_below - p[1, 1] * deeper - p[1, 3] * faster + p[1, 2] * slip
+        w[2, at], w[2, n + at] = -R / vary.width, F / vary.width
+    for i in range(m):
+        rate[i] = 0.0
+        rate[m + i] = (v.load[0, i] - v.load[1, i]) / vary.width
+    dynamics.push(blocks, w[2], rate[m:])
+    add_matrices(Y, blocks, vary, rate)
+    for i in range(m):
+        out[i] = rate[m + i]
 
 
 @helper
 def _set_rates(i, ahead, J, v):
     """Put into row i of the stages of each column what its begin makes, the time ``ahead`` later.
 
-    The accelerations of the parameter's column are in the last row of ``v.pushed``.
+    ``v.pushed`` holds in its last row what the parameter makes in its column, or zero.
     """
     m, count = len(J), len(v.columns)
     for c in range(count):
@@ -86,37 +139,8 @@ def _set_rates(i, ahead, J, v):
             for l in range(m):
                 total += J[k, l] * (x[l] + ahead * x[m + l]) + J[k, m + l] * x[m + l]
             out[k] = total
-
-
-@helper
-def _keep_forced(i, v):
-    """Keep what the parameter makes at point i of the step, behind the rates there."""
-    count, m = v.pushed.shape
-    for k in range(m):
-        v.stages[rows.STAGES * (count - 1) + i, m + k] = v.pushed[count - 1, k]
-
-
-@helper
-def _add_forced(begins, ends, v):
-    """Add what the parameter makes to the rates of its column.
-
-    Where forces switch at the begin or the end of the step, the difference between the systems on
-    both sides of the parameter mixes forces from both sides of the switch: there it is what those
-    at the other points go on to.
-    """
-    count, m = v.pushed.shape
-    own = v.stages[rows.STAGES * (count - 1) : rows.STAGES * count]
-    for k in range(m, 2 * m):
-        first, last = 0.0, 0.0
-        for i in range(STAGES + 1):
-            first += TO_BEGIN[ends, i] * own[i, k]
-            last += TO_END[begins, i] * own[i, k]
-        if begins:
-            own[0, k] = first
-        if ends:
-            own[STAGES, k] = last
-        for i in range(STAGES + 1):
-            own[i, k - m] += own[i, k]
+            if c == count - 1:
+                out[k] += v.pushed[c, k]
 
 
 @routine
@@ -272,7 +296,6 @@ def propagate(t, h, latest, before, near, problem, progress, room, c, vary):
     _linearise(after, progress.state, dynamics.motion_given(room.given), problem, room, vary,
                forced)
     _set_rates(0, 0.0, J, v)
-    _keep_forced(0, v)
     for i in range(STAGES):
         set_stage(i, h, progress, c)
         if i == STAGES - 1 and before > 0.0:
@@ -281,9 +304,6 @@ def propagate(t, h, latest, before, near, problem, progress, room, c, vary):
                    room, vary, forced)
         set_matrix_rows(i, h, J, c)
         _set_rates(i + 1, POINTS[i] * h, J, v)
-        _keep_forced(i + 1, v)
-    if vary.width != 0.0:
-        _add_forced(1 if c.flags[BEGINS] != 0 else 0, 1 if before > 0.0 else 0, v)
     factorise(c.matrix, STAGES * m, c.pivots)
     _set_columns(h, problem, progress, c, v)
     largest = 0.0

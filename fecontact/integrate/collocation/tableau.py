@@ -78,22 +78,6 @@ def _largest_errors() -> tuple[Array, Array]:
 SPEED_PART, PLACE_PART = _largest_errors()
 
 
-def _extrapolation(point: int, without: int | None) -> Array:
-    """Weights of values at the other points of ``_ALL``, but for one, of what they go on to."""
-    others = [i for i in range(RATE_TERMS) if i not in (point, without)]
-    weights = np.zeros(RATE_TERMS)
-    for i in others:
-        rest = np.array([_ALL[k] for k in others if k != i])
-        weights[i] = np.prod((_ALL[point] - rest) / (_ALL[i] - rest))
-    return weights
-
-
-# What values at the stages go on to at the begin, with the last of them and without it; and what
-# those before the last go on to at the end, with that at the begin and without it.
-TO_BEGIN = np.array([_extrapolation(0, without) for without in (None, STAGES)])
-TO_END = np.array([_extrapolation(STAGES, without) for without in (None, 0)])
-
-
 def _powers() -> tuple[Array, Array, Array]:
     """Matrices from accelerations at the begin and the stages to coefficients of powers of x.
 

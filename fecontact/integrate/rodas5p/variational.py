@@ -194,7 +194,7 @@ def _begin_parameter(step, progress, blocks, vary):
 
 
 @helper
-def _add_matrices(x, blocks, vary, out):
+def add_matrices(x, blocks, vary, out):
     """Add to out what the parameter makes of the matrices' accelerations at a state x."""
     above, below, m = vary.above, vary.below, len(vary.variation.none)
     for own in range(len(blocks.own)):
@@ -228,7 +228,7 @@ def _set_pushes(Y, blocks, vary, out):
         out[i] = 0.0
         out[m + i] = (v.load[0, i] - v.load[1, i]) / vary.width
     dynamics.push(blocks, w[2], out[m : 2 * m])
-    _add_matrices(Y, blocks, vary, out)
+    add_matrices(Y, blocks, vary, out)
 
 
 @routine
@@ -246,7 +246,7 @@ def _set_forced(part, Y, u, blocks, vary, out):
         out[k] += part * v.vectors[6, k]
     columns.push(v.between, vary.above, blocks, u, w, out)
     dynamics.push(blocks, w[2], out[m : 2 * m])
-    _add_matrices(u, blocks, vary, out)
+    add_matrices(u, blocks, vary, out)
 
 
 @helper
@@ -348,7 +348,7 @@ def _parts(step, scale, x, forced, J, v):
 
 
 @helper
-def set_accelerations(t, Y, blocks, vary, out):
+def _set_accelerations(t, Y, blocks, vary, out):
     """Fill out (m,) with the derivatives of the accelerations to the parameter, at Y and time t.
 
     For a system without memory, whose nodes move as v.nodes says.
@@ -379,7 +379,7 @@ def propagate_in_parts(step, problem, progress, room, vary):
     forced = np.zeros((collocation.STAGES if varies else 0, m))
     if varies:
         dynamics.project(blocks, progress.state, v.nodes[0], v.nodes[1])
-        set_accelerations(np.nextafter(step.t, np.inf), progress.state, blocks, vary, forced[0])
+        _set_accelerations(np.nextafter(step.t, np.inf), progress.state, blocks, vary, forced[0])
     parts, expected = _parts(step, scale, x, forced, room.reduced.J, v)
     if expected > v.tolerance:
         return expected
@@ -392,7 +392,7 @@ def propagate_in_parts(step, problem, progress, room, vary):
             dynamics.set_gradients(Y, s, blocks, ground_motion(now, s), v.nodes, v.inside)
             columns.set_derivatives(s, blocks, v.inside, room.reduced, answers, J[i])
             if varies:
-                set_accelerations(now, Y, blocks, vary, forced[i])
+                _set_accelerations(now, Y, blocks, vary, forced[i])
         collocation.collocate(step.h / parts, J, forced, x)
     for c in range(count):
         largest = v.norms[0, c]
