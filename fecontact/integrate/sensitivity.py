@@ -149,7 +149,7 @@ def sensitivity(
         return _differences(system, times, state, parameter, solver, float(rtol), max_step)
     vary = True if parameter is None else _moved(system, parameter)
     run = start(system, state, times, rtol=float(rtol), max_step=max_step, work=False,
-                vary=vary, vary_rtol=derivative_rtol)
+                vary=vary, vary_rtol=derivative_rtol, collocation=solver.collocation)
     result = finish(run)
     if result != step_loop.FINISHED:
         raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = {t_end:.9g}: "
