@@ -65,7 +65,10 @@ def keys(
 def demo(
     folder: Annotated[Path, Parameter(help="Folder of the results.")] = Path("demo-output"), /,
 ) -> int:
-    """Run two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
+    """Run three studies from geometry to movie.
+
+    A beam on wavy ground, a pendulum on a stop, and a solid pad on a belt.
+    """
     from fecontact.cli.demo import run_demo
 
     return run_demo(folder)
