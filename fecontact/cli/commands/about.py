@@ -65,10 +65,7 @@ def keys(
 def demo(
     folder: Annotated[Path, Parameter(help="Folder of the results.")] = Path("demo-output"), /,
 ) -> int:
-    """Run three studies from geometry to movie.
-
-    A beam on wavy ground, a pendulum on a stop, and a solid pad on a belt.
-    """
+    """Run three studies, geometry to movie: a beam on wavy ground, a pendulum, a solid pad."""
     from fecontact.cli.demo import run_demo
 
     return run_demo(folder)
