@@ -386,8 +386,8 @@ def test_help_comes_at_once_and_version_is_said():
     assert command("--version").stdout.strip().count(".") == 2
     failed = command("run", "none.toml")
     assert (failed.returncode, failed.stdout) == (1, "")
-    assert failed.stderr == ("error: none.toml does not exist; fecontact init writes a study to start "
-                             "from.\n")
+    assert failed.stderr == ("error: none.toml does not exist; fecontact init writes a study "
+                             "to start from.\n")
 
 
 @pytest.mark.parametrize(("tokens", "message"), [
