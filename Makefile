@@ -1,7 +1,8 @@
-# Targets that need the package set everything up themselves, once: see $(READY).
+# Targets that need the package set everything up themselves, once: see $(BASIC) and $(READY).
 
 VENV   := .venv
 BIN    := $(VENV)/bin
+BASIC  := $(VENV)/.installed
 READY  := $(VENV)/.ready
 RUNS   := $(VENV)/.compiled-for-runs
 ALL    := $(VENV)/.compiled
@@ -19,7 +20,7 @@ help: ## list the targets
 
 setup: $(READY) $(ALL) $(SYSTEM) ## install everything into .venv
 
-demo: $(READY) $(RUNS) $(SYSTEM) ## three studies from geometry to movie, into demo-output/
+demo: $(BASIC) $(RUNS) $(SYSTEM) ## three studies from geometry to movie, into demo-output/
 	@$(BIN)/fecontact demo demo-output
 
 test-fast: $(READY) $(ALL) $(SYSTEM) ## run the tests that take seconds
@@ -67,14 +68,21 @@ $(BIN)/python:
 	echo "Making $(VENV) with $$($$python --version)"; \
 	$$python -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-$(READY): pyproject.toml | $(BIN)/python
+# What runs need; tools of development take as long again.
+$(BASIC): pyproject.toml | $(BIN)/python
 	@echo "Installing fecontact and what it needs"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
 	@touch $@
 
-$(RUNS): | $(READY)
-	@echo "Compiling its kernels for runs"
-	@$(BIN)/python .ci/compile runs
+$(READY): pyproject.toml | $(BIN)/python
+	@echo "Installing fecontact, what it needs, and the tools of its developers"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@ $(BASIC)
+
+$(RUNS): | $(BASIC)
+	@echo "Compiling its kernels for runs, on two cores"
+	@$(BIN)/python .ci/compile bodies & bodies=$$!; \
+	  $(BIN)/python .ci/compile motions && wait $$bodies
 	@touch $@
 
 $(ALL): | $(READY)

@@ -4,7 +4,7 @@ import sys
 import warnings
 from typing import Any
 
-from cyclopts import CycloptsError
+from cyclopts import CycloptsError, UnusedCliTokensError
 
 from fecontact.cli.app import app
 from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code
@@ -48,7 +48,7 @@ def _execute(tokens: list[str]) -> int:
         return int(app.meta(tokens, exit_on_error=False, print_error=False,
                             result_action="return_value") or 0)
     except CycloptsError as error:
-        return fail(str(error).replace("\n", " "), 2)
+        return fail(_wrong_line(error), 2)
     except FecontactError as error:
         if debug:
             raise
@@ -71,6 +71,15 @@ def _execute(tokens: list[str]) -> int:
             raise
         return fail(f"this should not happen ({type(error).__name__}: {error}); run it again "
                     f"with --debug and report what it prints.", 1)
+
+
+def _wrong_line(error: CycloptsError) -> str:
+    """What is wrong with a command line, and where its arguments are explained."""
+    command = " ".join(("fecontact", *(error.command_chain or ())))
+    message = str(error)
+    if isinstance(error, UnusedCliTokensError):
+        message = f"{command} takes no more arguments: {' '.join(error.unused_tokens or ())}."
+    return f"{message} `{command} --help` lists what there is."
 
 
 def _was_interrupted(error: BaseException | None) -> bool:

@@ -52,7 +52,8 @@ def law_help(name: str) -> str:
              if name.lower() in (law, cls.__name__.lower())]
     if not found:
         known = {law for _, law, _ in laws}
-        raise InputError(f"There is no law '{name}'{nearest(name, known)}; there are: "
+        own = "; a law of your own is FILE.py:CLASS" * (":" in name)
+        raise InputError(f"There is no law '{name}'{nearest(name, known)}{own}; there are: "
                          f"{choices(known)}.")
     return "\n\n".join(f"{inspect.getdoc(cls)}\n\nIn a study file:\n\n{_example(kind, law, cls)}"
                        for kind, law, cls in found)

@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.analysis.histories import Point, usual_component
 from fecontact.analysis.receptance import Place, receptance
+from fecontact.cli.orbit_files import DIAGRAMS, OrbitChoice, holds_branches
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots import analysis
@@ -93,6 +94,33 @@ KINDS: dict[str, Draw] = {
     "friction_work": lambda run, c, path: analysis.plot_friction_work(run, path=path),
     "receptance": _receptance,
 }
+
+
+def require_kind_of_plot(kind: str | None, file: Path, choice: OrbitChoice) -> str:
+    """The kind of a plot of a file, or of an orbit of it where one is chosen.
+
+    Raises
+    ------
+    InputError
+        If there is no such plot, of such a file; the message lists those that there are.
+    """
+    of_runs, diagrams = choices(KINDS), choices(DIAGRAMS)
+    whole = holds_branches(file) and choice == OrbitChoice()
+    known = (f"{diagrams} of the whole file, and of an orbit: {of_runs}" if whole
+             else of_runs)
+    if kind is None:
+        raise InputError(f"Say what to plot: `fecontact plot {file} KIND`, with one of {known}.")
+    if kind in DIAGRAMS and not holds_branches(file):
+        raise InputError(f"The plot '{kind}' is one of files NAME-branch.h5 and NAME-response.h5, "
+                         f"which fecontact branch and response write, but {file} holds a run; "
+                         f"its plots are: {known}.")
+    if kind in DIAGRAMS and choice != OrbitChoice():
+        raise InputError(f"The plot '{kind}' is one of the whole file, without --branch, --at, "
+                         f"--at-hz and --which; plots of an orbit are: {of_runs}.")
+    if kind not in KINDS and kind not in DIAGRAMS:
+        near = nearest(kind, (*KINDS, *(DIAGRAMS if holds_branches(file) else ())))
+        raise InputError(f"There is no plot '{kind}'{near}; there are: {known}.")
+    return kind
 
 
 def redraw(

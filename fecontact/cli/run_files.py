@@ -25,6 +25,9 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
         from fecontact.core.tables import parsed
         from fecontact.study.study import Study
     study = Study.read(file)
+    if study.preload is not None:
+        with loading():
+            import fecontact.system.quasistatic.loading  # noqa: F401
     values: dict[str, Any] = {}
     for change in changes or ():
         name, equals, text = (part.strip() for part in change.partition("="))

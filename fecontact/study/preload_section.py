@@ -7,7 +7,6 @@ from fecontact.core.errors import InputError
 from fecontact.core.units import Unit
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.history import LoadHistory
-from fecontact.system.quasistatic.loading import load_history
 from fecontact.system.quasistatic.path import LoadPath
 
 
@@ -56,6 +55,9 @@ class PreloadSettings(LoadPath):
 
     def load(self, system: ContactSystem) -> LoadHistory:
         """The loading of a system along this path."""
+        # Its kernels are compiled for studies that need them only.
+        from fecontact.system.quasistatic.loading import load_history
+
         given: dict[str, Any] = {entry.name: getattr(self, entry.name)
                                  for entry in fields(LoadPath)}
         return load_history(system, LoadPath(**given), tangential_ratio=self.tangential_ratio,

@@ -174,7 +174,8 @@ class Study(Summarised, StudyModels):
             # Compare names without suffix: equal suffixes would make all file names look similar.
             others = [other.stem for other in path.parent.glob("*.toml")]
             hint = nearest(path.stem, others).replace("'?", ".toml'?")
-            raise InputError(f"{path} does not exist{hint}.") from None
+            raise InputError(f"{path} does not exist{hint}; fecontact init writes a study to start "
+                             f"from.") from None
         except (OSError, UnicodeDecodeError):
             raise InputError(f"{path} cannot be read as a study; give a text file in "
                              f"TOML.") from None

@@ -220,6 +220,14 @@ MISTAKES = [
     (["render", "bad.toml"], "bad.toml is not valid TOML"),
     (["render", "text.msh"], "text.msh is not an HDF5 file"),
     (["export", "none.vtkhdf"], "none.vtkhdf does not exist"),
+    (["plot", "none.vtkhdf"], "fecontact plot none.vtkhdf KIND`, with one of 'contact_map', "),
+    (["plot", "none-branch.h5"], "KIND`, with one of 'branches', 'mode', 'response' of the whole"),
+    (["plot", "none-branch.h5", "--at", "3"], "KIND`, with one of 'contact_map', "),
+    (["plot", "none-branch.h5", "branhces"], "(did you mean 'branches'?)"),
+    (["plot", "none-branch.h5", "mode", "--at-hz", "3"], "without --branch, --at, --at-hz"),
+    (["plot", "none.vtkhdf", "histroy"], "(did you mean 'history'?)"),
+    (["plot", "none.vtkhdf", "response"], "is one of files NAME-branch.h5 and NAME-response.h5"),
+    (["laws", "mine.txt:Own"], "a law of your own is FILE.py:CLASS"),
     (["init", "study.txt"], "study.txt must end in .toml"),
     (["init", "tiny.toml/x.toml"], "The folder tiny.toml cannot be written"),
     (["demo", "tiny.toml/x"], "The folder tiny.toml/x cannot be written"),
@@ -378,7 +386,27 @@ def test_help_comes_at_once_and_version_is_said():
     assert command("--version").stdout.strip().count(".") == 2
     failed = command("run", "none.toml")
     assert (failed.returncode, failed.stdout) == (1, "")
-    assert failed.stderr == "error: none.toml does not exist.\n"
+    assert failed.stderr == ("error: none.toml does not exist; fecontact init writes a study "
+                             "to start from.\n")
+
+
+@pytest.mark.parametrize(("tokens", "message"), [
+    (["run"], "`fecontact run --help` lists"),
+    (["mesh", "a.toml", "b"], "fecontact mesh takes no more arguments: b. `fecontact mesh --help`"),
+    (["rum", "a.toml"], "`fecontact --help` lists"),
+])
+def test_invalid_command_lines_name_the_help(tokens, message, cli):
+    code, _, err = cli(*tokens)
+    assert code == 2
+    assert message in err
+
+
+def test_studies_without_preload_need_no_kernels_of_it():
+    loaded = subprocess.run(
+        [sys.executable, "-c", "import sys, fecontact.study.study; print(*sys.modules)"],
+        capture_output=True, text=True, check=True).stdout.split()
+    assert "fecontact.study.preload_section" in loaded
+    assert "fecontact.system.quasistatic.march" not in loaded
 
 
 def test_output_into_a_pipe_that_closes(study):

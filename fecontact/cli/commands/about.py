@@ -65,7 +65,7 @@ def keys(
 def demo(
     folder: Annotated[Path, Parameter(help="Folder of the results.")] = Path("demo-output"), /,
 ) -> int:
-    """Run two studies from geometry to movie: a beam on wavy ground, a pendulum on a stop."""
+    """Run three studies, geometry to movie: a beam on wavy ground, a pendulum, a solid pad."""
     from fecontact.cli.demo import run_demo
 
     return run_demo(folder)

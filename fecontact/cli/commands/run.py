@@ -160,10 +160,10 @@ def render(
 
 def plot(
     file: RunFile,
-    kind: Annotated[str, Parameter(
-        help="history, phase, contact_map, energies, modes, spectrum, density, spectrogram, "
+    kind: Annotated[str | None, Parameter(show_default=False, help=(
+        "history, phase, contact_map, energies, modes, spectrum, density, spectrogram, "
         "poincare, friction_work or receptance; of files NAME.h5 also branches, response or "
-        "mode.")],
+        "mode."))] = None,
     /,
     *,
     set_: Changes = None,
@@ -197,19 +197,20 @@ def plot(
         plotted,
         stored_orbit_or_run,
     )
+    from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw, require_kind_of_plot
     from fecontact.cli.run_files import require_stored
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.output.plots.figure import styled
 
+    chosen = OrbitChoice(branch, at, at_hz, which)
+    kind = require_kind_of_plot(kind, file, chosen)
     if kind in DIAGRAMS and holds_branches(file):
         require_stored(file, set_)
         target = output or file.with_name(f"{file.stem}-{kind}.png")
         with output_folder(target.parent), waiting("Drawing"), styled(style or {}):
             echo_written(plotted(file, kind, target))
         return
-    stored = stored_orbit_or_run(file, trust, set_, OrbitChoice(branch, at, at_hz, which))
-    from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw
-
+    stored = stored_orbit_or_run(file, trust, set_, chosen)
     choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
                          highest_hz)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")

@@ -100,7 +100,7 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
 
     path = as_path(path, "a file of results")
     if not path.is_file():
-        raise InputError(f"{path} does not exist.")
+        raise InputError(f"{path} does not exist; give a file that fecontact wrote.")
     try:
         file = h5py.File(path, "r")
     except OSError:
