@@ -30,7 +30,7 @@ _FEW = 8
 _STEPS_PER_CALL = 2000
 # Longest step in periods of the excitation, where it is the only thing given in time.
 _PERIOD_PART = 0.125
-# Change of a signal between neighbouring times, in parts of its largest value, that is a jump.
+# Change of a signal within rounding of a time, in parts of its largest value, that is a jump.
 _JUMP = 1e-9
 # Errors of velocities count relative to this part of what drive and loads bring about.
 _DRIVEN = 1e-3
@@ -231,10 +231,7 @@ def start(
 
 
 def _stops(system: ContactSystem, start: float, end: float) -> Array:
-    """Times (k,) after the start and up to the end, at which steps end: breaks of what is given.
-
-    Where signals jump right after their break, that is the next number.
-    """
+    """Breaks (k,) up to the end; where signals jump right after one, the next number instead."""
     found = np.array(system.breakpoints(float(np.nextafter(start, -np.inf)),
                                         float(np.nextafter(end, np.inf))), dtype=float)
     near = np.stack([np.nextafter(found, -np.inf), found, np.nextafter(found, np.inf)])
@@ -243,8 +240,7 @@ def _stops(system: ContactSystem, start: float, end: float) -> Array:
         value, rate = signal.history(near.ravel()).T.reshape(2, 3, -1)
         steepest = np.abs(rate).max(axis=0) * np.diff(near, axis=0).max(axis=0)
         jumps |= np.abs(np.diff(value, axis=0)) > 2.0 * steepest + _JUMP * signal.largest
-    at, after = jumps
-    stops = np.union1d(found[at | ~after], near[2, after])
+    stops = np.union1d(found[jumps[0] | ~jumps[1]], near[2, jumps[1]])
     return stops[(stops > start) & (stops <= end)]
 
 
