@@ -5,6 +5,7 @@ remedy.
 """
 
 import difflib
+import sys
 from collections.abc import Iterable
 from numbers import Real
 
@@ -51,7 +52,7 @@ _LEAST, _MOST = 1e-60, 1e60
 def require_positive(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a number from 1e-60 to 1e60."""
     for name, value in values.items():
-        if not (_is_number(value) and 0.0 < value < float("inf")):
+        if not (_is_number(value) and 0.0 < value <= sys.float_info.max):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number above "
                              f"zero.")
         if not _LEAST <= value <= _MOST:
@@ -62,7 +63,7 @@ def require_positive(owner: str, **values: float) -> None:
 def require_not_negative(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a finite number of at least zero."""
     for name, value in values.items():
-        if not (_is_number(value) and 0.0 <= value < float("inf")):
+        if not (_is_number(value) and 0.0 <= value <= sys.float_info.max):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number, zero or "
                              f"above.")
 
@@ -72,7 +73,8 @@ def require_finite(owner: str, **values: float) -> None:
     for name, value in values.items():
         if not _is_number(value):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number.")
-        if not abs(value) < float("inf"):
+        # Whole numbers may be larger than any other.
+        if not abs(value) <= sys.float_info.max:
             raise InputError(f"{owner}: {name} = {shown(value)} must be finite.")
 
 

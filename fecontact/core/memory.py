@@ -34,6 +34,8 @@ def require_memory(name: str, count: float, each: float, remedy: str = "") -> No
         Alternative to taking fewer, for the end of the message.
     """
     free = available_memory()
+    # Whole numbers may be larger than any other.
+    count = min(count, sys.float_info.max)
     if count * each <= free:
         return
     fits = int(float(f"{0.9 * free / each:.2g}"))

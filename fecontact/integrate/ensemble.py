@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import as_count, as_floats, require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, listed, span
@@ -34,6 +35,9 @@ from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import MOVING, Moving, in_time, state_size
 from fecontact.system.forcing_period import forcing_period
+
+# Most periods of an excitation, before states count and after.
+_MOST_PERIODS = 10**15
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -296,11 +300,14 @@ def strobe(
             ("transient_periods", transient_periods, 0), ("keep", keep, 1)):
         if not (isinstance(value, Integral) and value >= least):
             raise InputError(f"{name} = {value!r} must be a whole number from {least} on.")
+        if value > _MOST_PERIODS:
+            raise InputError(f"{name} = {text_of(value)} must be at most {_MOST_PERIODS}: floating-"
+                             f"point numbers cannot tell the periods behind apart.")
     given = [systems] if isinstance(systems, MOVING) else list(systems)
     if period is None:
         periods = np.array([forcing_period(system) for system in given])
     else:
-        periods = np.array(period, dtype=float)
+        periods = as_floats(period, "period")
         if not (np.isfinite(periods).all() and (periods > 0.0).all()):
             raise InputError(f"period = {period!r} must be above zero and finite.")
     counts = np.arange(transient_periods, transient_periods + keep, dtype=float)

@@ -1,5 +1,6 @@
 """Derivatives of a motion with respect to its initial state and a parameter."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensemble import Ensemble, ensemble
 from fecontact.integrate.initial_state import Initial, initial_state
@@ -18,14 +19,21 @@ from fecontact.integrate.rodas5p.variational import MOVE
 from fecontact.integrate.simulate import output_times, require_max_step
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, require_solver
 from fecontact.integrate.trajectory import Status
+from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
 
+EndsAt = Callable[[Array], Array]
+Sides = tuple[bool, bool]
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
 # Largest change of ground velocity, relative to the velocity scale of friction.
 _SLIP = 0.05
 # Change of the state for a difference of runs, in parts of its largest value.
 _DIFFERENCE = 1e-5
+# Derivatives by differences to both sides may be so far apart, in parts of the largest or of 1, and
+# so many times the tolerance. Others are formed anew with changes that are smaller by a factor;
+# where the ends of runs are smooth, they come at least so much closer.
+_APART, _COARSE, _FINER, _CLOSER = 1e-3, 1e3, 30.0, 0.5
 # Steps between two output times at which states are looked at for their largest values.
 _BETWEEN = 16
 
@@ -47,6 +55,8 @@ class Sensitivity:
     sided : (2, K - 1, size, size) array or None
         The transitions by differences to one side, above and below the state, where runs are
         differenced. Where a jump of their ends lies near, they are far apart.
+    note : str
+        Which derivatives by differences are none, as those to both sides are apart; else empty.
     """
 
     times: Array
@@ -54,6 +64,7 @@ class Sensitivity:
     transitions: Array
     forced: Array | None
     sided: Array | None = None
+    note: str = ""
 
     @property
     def monodromy(self) -> Array:
@@ -106,7 +117,9 @@ def sensitivity(
     With SetValued, forces and velocities jump. Its runs locate the jumps, so that the end of a run
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives
     are central differences of this function, which contain the saltation at the jumps, of relative
-    accuracy 1e-6. Each costs two runs.
+    accuracy 1e-6. Each costs two runs. At a start that touches a rigid stop they are differences
+    into the open, with the saltation of an impact at once. A ModelWarning tells of those to one
+    side that are apart, as at the very moment in which a body breaks away: there are none then.
 
     Parameters
     ----------
@@ -145,15 +158,27 @@ def sensitivity(
     require_max_step(max_step)
     require_solver(solver)
     state = initial_state(system, initial, t_start)
+    found = differentiated(system, times, state, parameter, solver, float(rtol), derivative_rtol,
+                           max_step)
+    if found.note:
+        warnings.warn(found.note, ModelWarning, stacklevel=2)
+    return found
+
+
+def differentiated(
+    system: ContactSystem, times: Array, state: Array, parameter: Parameter | None, solver: Solver,
+    rtol: float, derivative_rtol: float | None = None, max_step: float | None = None,
+) -> Sensitivity:
+    """As :func:`sensitivity`, from a state and without its warning."""
     if not isinstance(solver, Rodas5P):
-        return _differences(system, times, state, parameter, solver, float(rtol), max_step)
+        return _differences(system, times, state, parameter, solver, rtol, max_step)
     vary = True if parameter is None else _moved(system, parameter)
-    run = start(system, state, times, rtol=float(rtol), max_step=max_step, work=False,
+    run = start(system, state, times, rtol=rtol, max_step=max_step, work=False,
                 vary=vary, vary_rtol=derivative_rtol, collocation=solver.collocation)
     result = finish(run)
     if result != step_loop.FINISHED:
-        raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = {t_end:.9g}: "
-                            f"{ENDS[result].value}")
+        raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = "
+                            f"{times[-1]:.9g}: {ENDS[result].value}")
     columns = run.variation.transitions[1:].transpose(0, 2, 1)
     size = len(state)
     return Sensitivity(times, run.states, np.ascontiguousarray(columns[:, :, :size]),
@@ -173,24 +198,118 @@ def _differences(
     parts = np.linspace(0.0, 1.0, _BETWEEN + 1)[:-1]
     close = np.append((times[:-1, None] + np.diff(times)[:, None] * parts).reshape(-1), times[-1])
     found = _states(ensemble(system, close, initial=state[None], **settings))[0]
-    states = found[::_BETWEEN]
+    # An impact at the start belongs to the first piece.
+    states = np.vstack([state, found[_BETWEEN::_BETWEEN]])
     largest = np.abs(found).reshape(len(close), 2, -1).max(axis=(0, 2))
     moves = np.repeat(_DIFFERENCE * np.where(largest > 0.0, largest, 1.0), size // 2)
     spans = np.stack([times[:-1], times[1:]], axis=1)
     aside = np.concatenate([np.diag(moves), -np.diag(moves)])
     ends = _states(ensemble(system, np.repeat(spans, 2 * size, axis=0), **settings, initial=(
         states[:-1, None] + aside).reshape(-1, size)))[:, -1].reshape(pieces, 2, size, size)
-    columns = (ends[:, 0] - ends[:, 1]) / (2.0 * moves[:, None])
+    columns = ((ends[:, 0] - ends[:, 1]) / (2.0 * moves[:, None])).swapaxes(1, 2)
     sided = np.stack([ends[:, 0] - states[1:, None], states[1:, None] - ends[:, 1]]) / (
         moves[:, None])
+    sided = sided.swapaxes(2, 3)
+    settings["rtol"] = max(settings["rtol"] / _FINER, 1e-12)
+    allowed, doubtful = max(_APART, _COARSE * rtol), []
+
+    def looked_at(piece: int, ends_at: EndsAt, apart: float, move: float, open_: Sides,
+                  what: str) -> tuple[Array, Array]:
+        derivative, quotients, certain = _closer(ends_at, moves, apart, allowed, open_)
+        if not certain:
+            doubtful.append(f"to {what} from t = {times[piece]:.6g} to {times[piece + 1]:.6g} s")
+        return derivative / move, quotients / move
+
+    for piece in range(pieces):
+        for i in range(size):
+            apart = _apart(ends[piece, 0, i], states[piece + 1], ends[piece, 1, i], moves)
+            if apart <= allowed:
+                continue
+            change = moves[i] * np.eye(size)[i]
+
+            def from_beside(offsets: Array, piece: int = piece, change: Array = change) -> Array:
+                return _states(ensemble(
+                    system, np.tile(spans[piece], (len(offsets), 1)), **settings,
+                    initial=states[piece] + offsets[:, None] * change))[:, -1]
+
+            columns[piece, :, i], sided[:, piece, :, i] = looked_at(
+                piece, from_beside, apart, float(moves[i]),
+                _open_sides(system, solver, float(times[piece]), states[piece], change), f"y[{i}]")
     forced = None
     if parameter is not None:
-        above, below, width = _moved(system, parameter, False)
+        system_at, value = _function_of(system, parameter)
+        above, below, width = _systems_beside(system_at, value, MOVE * (abs(value) or 1.0))
         ends = _states(ensemble([above] * pieces + [below] * pieces, np.tile(spans, (2, 1)),
                                 initial=np.tile(states[:-1], (2, 1)), **settings))[:, -1]
         forced = (ends[:pieces] - ends[pieces:]) / width
-    return Sensitivity(times, states, np.ascontiguousarray(columns.transpose(0, 2, 1)), forced,
-                       sided.swapaxes(2, 3))
+        for piece in range(pieces):
+            apart = _apart(ends[piece], states[piece + 1], ends[pieces + piece], moves)
+            # At a limit of its range the parameter moves to one side alone.
+            if apart <= allowed or width < 1.5 * MOVE * (abs(value) or 1.0):
+                continue
+
+            def at_parameter(offsets: Array, piece: int = piece) -> Array:
+                return _states(ensemble(
+                    [system_at(value + 0.5 * width * offset) for offset in offsets], spans[piece],
+                    initial=states[piece], **settings))[:, -1]
+
+            forced[piece], _ = looked_at(piece, at_parameter, apart, 0.5 * width, (True, True),
+                                         "the parameter")
+    return Sensitivity(times, states, columns, forced, sided, _note(doubtful))
+
+
+def _apart(above: Array, middle: Array, below: Array, moves: Array) -> float:
+    """How far derivatives to both sides are apart, in parts of the largest or of 1.
+
+    By the ends of runs from both sides and between, and the changes of the states.
+    """
+    size = max(1.0, float((np.abs(above - below) / moves).max()) / 2.0)
+    return float((np.abs(above - 2.0 * middle + below) / moves).max()) / size
+
+
+def _closer(
+    ends_at: EndsAt, moves: Array, apart: float, allowed: float, open_: Sides,
+) -> tuple[Array, Array, bool]:
+    """Derivative (d,) of the ends of runs at offset 0, those to both sides (2, d); if there is one.
+
+    By smaller offsets than one, of which the sides were apart. Where one side alone is open, the
+    derivative is that to this side.
+    """
+    h = 1.0 / _FINER
+    middle, above, below, far_above, far_below = ends_at(h * np.array([0.0, 1.0, -1.0, 2.0, -2.0]))
+    sided = np.stack([above - middle, middle - below]) / h
+    if _apart(above, middle, below, h * moves) <= max(allowed, _CLOSER * apart):
+        return sided.mean(axis=0), sided, True
+    if open_[0] != open_[1]:
+        side = 0 if open_[0] else 1
+        near, far = sided[side], np.stack([far_above - middle, middle - far_below])[side] / (2 * h)
+        size = max(1.0, float(np.abs(near / moves).max()))
+        if float(np.abs((near - far) / moves).max()) <= allowed * size:
+            derivative = 2.0 * near - far
+            return derivative, np.stack([derivative, derivative]), True
+    return sided.mean(axis=0), sided, False
+
+
+def _open_sides(
+    system: ContactSystem, solver: Solver, time: float, state: Array, change: Array,
+) -> Sides:
+    """Whether a state that is changed one way and the other reaches no deeper into rigid stops."""
+    if getattr(solver, "restitution", None) is None:
+        return True, True
+    deep = system.contact_history(np.full(3, time), state + np.array([[0.0], [1.0], [-1.0]]) * (
+        change))[:, :, kernels.PENETRATION]
+    margin = 1e-3 * np.abs(deep[1:] - deep[0]).max(initial=0.0)
+    deeper = (np.maximum(deep[1:], 0.0) > np.maximum(deep[0], 0.0) + margin).any(axis=1)
+    return not deeper[0], not deeper[1]
+
+
+def _note(doubtful: list[str]) -> str:
+    if not doubtful:
+        return ""
+    return (f"Differences of set-valued runs to one side are apart from those to the other, "
+            f"{'; '.join(doubtful)}: there is no derivative, for a body breaks away, strikes or "
+            f"comes to rest at the start or the end, or an event appears or vanishes nearby; begin "
+            f"or end elsewhere.")
 
 
 def _states(found: Ensemble) -> Array:
@@ -202,9 +321,18 @@ def _states(found: Ensemble) -> Array:
 
 
 def _moved(
-    system: ContactSystem, parameter: Parameter, smooth: bool = True,
+    system: ContactSystem, parameter: Parameter,
 ) -> tuple[ContactSystem, ContactSystem, float]:
     """The system with the parameter increased and decreased, and the difference of both."""
+    system_at, value = _function_of(system, parameter)
+    move = MOVE * (abs(value) or 1.0)
+    return _systems_beside(system_at, value, move * _slip_limit(system, system_at, value, move))
+
+
+def _function_of(
+    system: ContactSystem, parameter: Parameter,
+) -> tuple[Callable[[float], ContactSystem], float]:
+    """The system as a function of the parameter, and its value."""
     if isinstance(parameter, str):
         name, value = parameter, system.parameter(parameter)
         value = 0.0 if value is None else value
@@ -213,20 +341,19 @@ def _moved(
                              f"and a value.")
         value = float(value)
 
-        def system_at(at: float) -> ContactSystem:
-            return system.with_(**{name: at})
-    else:
-        if not (isinstance(parameter, tuple) and len(parameter) == 2 and callable(parameter[0])
-                and isinstance(parameter[1], Real)):
-            raise InputError(f"parameter = {parameter!r} must be the dotted name of a number, or a "
-                             f"function of a system and a value, and the value: (function, 0.5).")
-        function, value = parameter
+        return (lambda at: system.with_(**{name: at})), value
+    if not (isinstance(parameter, tuple) and len(parameter) == 2 and callable(parameter[0])
+            and isinstance(parameter[1], Real)):
+        raise InputError(f"parameter = {parameter!r} must be the dotted name of a number, or a "
+                         f"function of a system and a value, and the value: (function, 0.5).")
+    function, number = parameter
+    return (lambda at: function(system, at)), number
 
-        def system_at(at: float) -> ContactSystem:
-            return function(system, at)
 
-    move = MOVE * (abs(value) or 1.0)
-    move *= _slip_limit(system, system_at, value, move) if smooth else 1.0
+def _systems_beside(
+    system_at: Callable[[float], ContactSystem], value: float, move: float,
+) -> tuple[ContactSystem, ContactSystem, float]:
+    """The systems above and below a value of the parameter, and the difference of both."""
     try:
         return system_at(value + move), system_at(value - move), 2.0 * move
     except InputError:

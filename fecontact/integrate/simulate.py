@@ -1,5 +1,6 @@
 """Time integration of a contact system."""
 
+import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
@@ -9,14 +10,15 @@ from typing import Any, overload
 import numpy as np
 
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
+from fecontact.core.errors import shown as text_of
 from fecontact.core.memory import require_memory
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike
-from fecontact.integrate.events import AnyEvent, as_events
+from fecontact.integrate.events import AnyEvent, ContactEvents, Event, as_events
 from fecontact.integrate.field_runs.field_run import FieldRun, field_state, run_field
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
-from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.integrate.trajectory import Solution, Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time
 from fecontact.system.fields.vector_field import VectorField
@@ -138,6 +140,7 @@ def simulate(
     m = system.basis.modes
     with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:
         found = solver.run(Task(system, state, times, float(rtol), max_step, watched, tell))
+    _require_finite_events(watched, system, found)
     states = found.states
     trajectory = Trajectory(
         system, found.time, states[:, :m], states[:, m : 2 * m], found.work, found.status,
@@ -151,6 +154,28 @@ def simulate(
     _warn_of_active_friction(trajectory, rtol)
     warn_of_limits(trajectory.limits_exceeded, "In this run")
     return trajectory
+
+
+def _require_finite_events(
+    events: Sequence[AnyEvent], system: ContactSystem, found: Solution
+) -> None:
+    """Raise InputError where a user's function is not a number at some output times."""
+    own = [one for one in events if not isinstance(one, ContactEvents)]
+    some = np.unique(np.linspace(0, len(found.time) - 1, _LOOKS).astype(int))
+    for number, one in enumerate(own):
+        if not isinstance(one, Event):
+            continue
+        row = one.row(system)
+        for k in some.tolist():
+            try:
+                with np.errstate(all="ignore"):
+                    value = one.kernel.python(float(found.time[k]), found.states[k], row)
+            except (ArithmeticError, ValueError):
+                value = np.nan
+            if not np.isfinite(value) and np.isfinite(found.states[k]).all():
+                raise InputError(f"'event {number}' is not a finite number at t = "
+                                 f"{found.time[k]:.6g} s; its function g(t, y, p) must be finite "
+                                 f"for every state.")
 
 
 def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
@@ -237,9 +262,9 @@ def require_rodas(solver: Solver) -> None:
 def require_max_step(max_step: Any) -> None:
     """Raise InputError unless ``max_step`` is None or a finite time above zero."""
     if max_step is not None and not (isinstance(max_step, Real) and not isinstance(max_step, bool)
-                                     and 0.0 < float(max_step) < np.inf):
-        raise InputError(f"max_step = {max_step!r} must be a finite time above zero [s]; leave it "
-                         f"out for steps as long as the tolerance allows.")
+                                     and max_step <= sys.float_info.max and not max_step <= 0.0):
+        raise InputError(f"max_step = {text_of(max_step)} must be a finite time above zero [s]; "
+                         f"leave it out for steps as long as the tolerance allows.")
 
 
 def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
@@ -251,8 +276,9 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
         If they are not ascending from ``t_start`` to ``t_end``.
     """
     if not (all(isinstance(time, Real) and not isinstance(time, bool) for time in (t_start, t_end))
-            and -np.inf < t_start < t_end < np.inf):
-        raise InputError(f"t_end = {t_end!r} must be a finite time after t_start = {t_start!r}.")
+            and -sys.float_info.max <= t_start < t_end <= sys.float_info.max):
+        raise InputError(f"t_end = {text_of(t_end)} must be a finite time after t_start = "
+                         f"{text_of(t_start)}.")
     latest = max(abs(t_start), abs(t_end))
     if t_end - t_start < max(_SHORTEST, _SPACINGS * float(np.spacing(latest))):
         raise InputError(f"t_end = {t_end!r} is too close to t_start = {t_start!r}: "
@@ -269,7 +295,7 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
         return times
     try:
         times = np.array(outputs, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         times = np.zeros(0)
     if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0.0).all() or (
             times[0] != t_start or times[-1] != t_end):

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.core.checks import as_count, as_floats, as_path, require_kind
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.trajectory import Solution, Status
@@ -220,8 +220,10 @@ class SetValued(Solver):
     def __post_init__(self) -> None:
         for name in ("restitution", "tangential_restitution"):
             value = getattr(self, name)
-            if value is not None and not (isinstance(value, Real) and 0.0 <= float(value) <= 1.0):
-                raise InputError(f"SetValued: {name} = {value!r} must be a number from 0 to 1.")
+            if value is not None and not (isinstance(value, Real) and not value < 0.0
+                                          and value <= 1.0):
+                raise InputError(f"SetValued: {name} = {shown(value)} must be a number from 0 "
+                                 f"to 1.")
         if self.impact_law not in self.impact_laws:
             raise InputError(f"SetValued: impact_law = {self.impact_law!r} must be one of "
                              f"{choices(self.impact_laws)}"

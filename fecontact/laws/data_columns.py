@@ -20,7 +20,7 @@ def numbers(owner: str, name: str, given: Any, least: int = 0) -> tuple[float, .
     """
     try:
         array = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty((0, 0))
     if array.ndim != 1 or isinstance(given, str):
         raise InputError(f"{owner}: {name} = {_short(given)} must be a list of numbers.")

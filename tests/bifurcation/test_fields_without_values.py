@@ -129,7 +129,8 @@ def test_error_of_an_orbit_without_rates_between_its_points():
     branch = driven_branch(gap, state_tolerance=None)
     assert branch.column("state_error").tolist() == [np.inf]
     said = ("The states of 1 of 1 orbits are less accurate than state_tolerance = 1e-05, and at "
-            "the parameter 1 the field is not finite between the Gauss points: allow more than "
+            "the parameter 1 without bound, as the field is not finite between the Gauss points or "
+            "the equations about the orbit are singular: allow more than "
             "most_intervals = 16.")
     branch = driven_branch(gap, most_intervals=16)
     assert branch.message == said

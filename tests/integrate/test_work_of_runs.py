@@ -8,7 +8,7 @@ from systems import mass_in_plane
 
 import fecontact as fc
 from fecontact import Drive, Ground, simulate
-from fecontact.integrate import Rodas5P
+from fecontact.integrate import CVODE, Rodas5P, Scipy, SetValued
 from fecontact.integrate.reference.scipy import energy_scale
 from fecontact.laws import (
     ConstantFriction,
@@ -16,10 +16,14 @@ from fecontact.laws import (
     LinearContact,
     PrescribedForce,
     Step,
+    signal,
 )
 
 STEPS = Rodas5P(series="never", collocation="never")
 LONG = Rodas5P(series="never", collocation="always")
+SOLVERS = [STEPS, LONG, SetValued(), SetValued(scheme="stepping"), SetValued(restitution=0.5),
+           Scipy("Radau"), Scipy("LSODA"), CVODE()]
+NAMES = ["rodas5p", "collocation", "events", "stepping", "stops", "radau", "lsoda", "cvode"]
 
 
 # Jumps -------------------------------------------------------------------------------------------
@@ -32,7 +36,7 @@ def pulled(first, second):
                     motion_y=Step(second, 2e-3)))
 
 
-@pytest.mark.parametrize("solver", [STEPS, LONG], ids=["rodas5p", "collocation"])
+@pytest.mark.parametrize("solver", SOLVERS, ids=NAMES)
 @pytest.mark.parametrize(("first", "second", "begin", "end"), [
     (0.3, 0.3, 0.0, 1.0),
     (0.3, 0.1 + 0.2, 0.0, 1.0),
@@ -43,6 +47,7 @@ def pulled(first, second):
     (0.3, 0.3, 0.3, 1.0),
     (0.3, 0.3 - np.spacing(0.3), 0.0, 0.3),
     (0.3, 0.3, 0.0, 0.1 + 0.2),
+    (0.3, 0.3, 0.0, 0.3),
     (0.3, 0.5, 0.0, 0.1 + 0.2),
 ], ids=str)
 @pytest.mark.parametrize("outputs", [[], [0.3], [0.1 + 0.2]], ids=["apart", "first", "second"])
@@ -59,11 +64,46 @@ def test_jumps_that_only_rounding_tells_apart_both_do_work(first, second, begin,
     wanted = sum(0.5 * c * shift**2 * ((times >= at) & (at > begin)) for c, shift, at in (
         (800.0, 1e-3, first), (200.0, 2e-3, second)))
     assert run.work[:, 0] == pytest.approx(wanted, rel=1e-12, abs=1e-16)
-    assert run.energies.imbalance < 1e-7
+    close = 1e-7 if isinstance(solver, Rodas5P) else 1e-5
+    assert run.energies.imbalance < close
     for axis, (at, shift, w) in enumerate(((first, 1e-3, 20.0), (second, 2e-3, 10.0))):
         since = np.maximum(times - at, 0.0)
         assert run.displacement("B")[:, axis] == pytest.approx(
-            shift * (1.0 - np.cos(w * since)), abs=1e-6 * shift)
+            shift * (1.0 - np.cos(w * since)), abs=10.0 * close * shift)
+
+
+@signal
+def _later(t, p):
+    return (p[1] if t > p[0] else 0.0), 0.0
+
+
+class Later(Step):
+    """A step that has not yet happened at its own time."""
+
+    kernel = _later
+
+
+@pytest.mark.parametrize("kind", [Step, Later])
+@pytest.mark.parametrize("solver", SOLVERS, ids=NAMES)
+def test_runs_do_not_depend_on_where_they_are_divided(kind, solver):
+    """Jumps at 0.3 s while the mass moves: work, state and balance of one run and of two."""
+    system = pulled(0.1, 0.3).with_(drive=Drive(
+        stiffness_x=800.0, stiffness_y=200.0, motion_x=kind(0.3, 1e-3),
+        motion_y=Step(0.1, 2e-3)))
+    start = np.array([1e-3, 0.0, 0.02, 0.0])
+    whole, first = (simulate(system, end, initial=start, outputs=4, rtol=1e-8, solver=solver)
+                    for end in (0.9, 0.3))
+    second = simulate(system, 0.9, t_start=0.3, initial=first.states[-1], outputs=3, rtol=1e-8,
+                      solver=solver)
+    close = 1e-6 if isinstance(solver, Rodas5P) else 2e-5
+    scale = np.abs(whole.work).max()
+    assert whole.work[1, 0] == pytest.approx(first.work[-1, 0], rel=1e-5) or kind is Later
+    assert first.work[-1, 0] + second.work[-1, 0] == pytest.approx(
+        whole.work[-1, 0], abs=close * scale)
+    assert second.states[-1] == pytest.approx(
+        whole.states[-1], abs=close * np.abs(whole.states).max())
+    for run in (whole, first, second):
+        assert run.energies.imbalance < close
 
 
 # Creep -------------------------------------------------------------------------------------------

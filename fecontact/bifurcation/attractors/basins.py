@@ -1,5 +1,6 @@
 """Basins of attraction on a plane of initial states."""
 
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -173,8 +174,8 @@ def basins(
                              "the excitation before states count, and no transient.")
         as_count(transient_periods, "basins: transient_periods", 0)
     elif transient_periods is not None or not (
-            isinstance(transient, Real) and 0.0 < transient < np.inf):
-        raise InputError(f"basins: transient = {transient!r} must be a time above zero [s] "
+            isinstance(transient, Real) and 0.0 < transient <= sys.float_info.max):
+        raise InputError(f"basins: transient = {transient!r:.80} must be a time above zero [s] "
                          f"before passages of the section count, without transient_periods.")
     settle = _Settle(moving, solver, rtol, keep, transient_periods, float(transient or 0.0),
                      section, tolerance, np.abs(states).max(axis=0))

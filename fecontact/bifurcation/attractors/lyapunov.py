@@ -1,5 +1,6 @@
 """Lyapunov exponents: mean growth rates of small differences."""
 
+import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -115,7 +116,7 @@ def lyapunov_exponents(
     size = state_size(moving)
     require_positive("lyapunov_exponents", duration=duration, rtol=rtol,
                      **({} if interval is None else {"interval": interval}))
-    if not (isinstance(transient, Real) and 0.0 <= transient < np.inf):
+    if not (isinstance(transient, Real) and 0.0 <= transient <= sys.float_info.max):
         raise InputError(f"transient = {transient!r} must be zero or above [s].")
     if as_count(count, "count") > size:
         raise InputError(f"count = {count} must be a whole number from 1 to {size}.")

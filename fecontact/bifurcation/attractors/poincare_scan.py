@@ -1,5 +1,6 @@
 """Poincare sections of runs over a parameter, swept up and down."""
 
+import sys
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -139,12 +140,13 @@ def poincare_scan(
         raise InputError("poincare_scan: transient is the time before passages of a section "
                          "count; give a section too, or transient_periods.")
     if section is not None and (transient_periods is not None or not (
-            isinstance(transient, Real) and 0.0 < transient < np.inf)):
-        raise InputError(f"poincare_scan: transient = {transient!r} must be a time above zero [s] "
-                         f"before passages of the section count, without transient_periods.")
+            isinstance(transient, Real) and 0.0 < transient <= sys.float_info.max)):
+        raise InputError(f"poincare_scan: transient = {transient!r:.80} must be a time above "
+                         f"zero [s] before passages of the section count, without "
+                         f"transient_periods.")
     try:
         points = np.array(values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         points = np.empty(0)
     if points.ndim != 1 or not len(points) or not np.isfinite(points).all() or (
             (np.diff(points) <= 0.0).any()):

@@ -100,8 +100,8 @@ class Intervals:
         worst = max(poor, key=_error_of)
         much = (f"off by up to {_error_of(worst):.1e} at the parameter {worst.parameter:.6g}"
                 if np.isfinite(_error_of(worst)) else
-                f"and at the parameter {worst.parameter:.6g} the field is not finite between the "
-                f"Gauss points")
+                f"and at the parameter {worst.parameter:.6g} without bound, as the field is not "
+                f"finite between the Gauss points or the equations about the orbit are singular")
         return (f"The states of {len(poor)} of {len(points)} orbits are less accurate than "
                 f"state_tolerance = {self.tolerance:g}, {much}: {reason}.")
 

@@ -310,9 +310,12 @@ def require_same(
         for segment in sided:
             if segment is None:
                 return
-            product = segment[side, 0] @ product
-        apart = np.abs(np.linalg.eigvals(product)[:, None] - multipliers)
-        error = float(apart[linear_sum_assignment(apart)].max())
+            with np.errstate(over="ignore", invalid="ignore"):
+                product = segment[side, 0] @ product
+        error = np.inf
+        if np.isfinite(product).all() and np.isfinite(multipliers).all():
+            apart = np.abs(np.linalg.eigvals(product)[:, None] - multipliers)
+            error = float(apart[linear_sum_assignment(apart)].max())
         if not error <= _APART * max(1.0, float(np.abs(multipliers).max())):
             warnings.warn(f"At {where} the multipliers of the set-valued orbit cannot be told: by "
                           f"differences to one side they are {error:.1g} away, for an event "

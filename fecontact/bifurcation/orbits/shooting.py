@@ -20,7 +20,7 @@ from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensemble import ensemble
-from fecontact.integrate.sensitivity import Sensitivity, sensitivity
+from fecontact.integrate.sensitivity import Sensitivity, differentiated
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
@@ -361,10 +361,9 @@ class ShootingLinearisation:
             return problem.field.system(beside)
 
         def run(start: Array, begin: float, end: float) -> Sensitivity:
-            return sensitivity(self._system, float(end), t_start=float(begin), initial=start,
-                               parameter=(lambda _, value: moved(value), float(self.u[-1])),
-                               solver=problem.solver, rtol=problem.rtol,
-                               derivative_rtol=problem.derivative_rtol)
+            return differentiated(self._system, np.array([begin, end]), start,
+                                  (lambda _, value: moved(value), float(self.u[-1])),
+                                  problem.solver, problem.rtol, problem.derivative_rtol)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             return list(pool.map(run, problem.starts(self.u), self._times[:-1], self._times[1:]))

@@ -30,6 +30,8 @@ _FEW = 8
 _STEPS_PER_CALL = 2000
 # Longest step in periods of the excitation, where it is the only thing given in time.
 _PERIOD_PART = 0.125
+# Change of a signal within rounding of a time, in parts of its largest value, that is a jump.
+_JUMP = 1e-9
 # Errors of velocities count relative to this part of what drive and loads bring about.
 _DRIVEN = 1e-3
 # How runs end before their last output time.
@@ -195,7 +197,7 @@ def start(
     solid = system.basis.dimension == 3
     course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
-        np.array(system.breakpoints(float(times[0]), float(times[-1])), dtype=float),
+        _stops(system, float(times[0]), float(times[-1])),
         _floor(system, state, times, longest), rtol, longest)
     if longest == default and scheme == "events" and restitution is None:
         most = np.inf if max_step is None else float(max_step)
@@ -226,6 +228,20 @@ def start(
         run = partial(run_steps, problem, limits, course, output, workspace,
                       stepping_room(problem, in_space() if solid else IN_PLANE))
     return Run(run, course, output, found, scheme)
+
+
+def _stops(system: ContactSystem, start: float, end: float) -> Array:
+    """Breaks (k,) up to the end; where signals jump right after one, the next number instead."""
+    found = np.array(system.breakpoints(float(np.nextafter(start, -np.inf)),
+                                        float(np.nextafter(end, np.inf))), dtype=float)
+    near = np.stack([np.nextafter(found, -np.inf), found, np.nextafter(found, np.inf)])
+    jumps = np.zeros((2, len(found)), dtype=bool)
+    for signal in (*system.drive.motions, *system.load.signals.values()) if len(found) else ():
+        value, rate = signal.history(near.ravel()).T.reshape(2, 3, -1)
+        steepest = np.abs(rate).max(axis=0) * np.diff(near, axis=0).max(axis=0)
+        jumps |= np.abs(np.diff(value, axis=0)) > 2.0 * steepest + _JUMP * signal.largest
+    stops = np.union1d(found[jumps[0] | ~jumps[1]], near[2, jumps[1]])
+    return stops[(stops > start) & (stops <= end)]
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:

@@ -40,25 +40,27 @@ def integrate(
 
     # CVODE's arrays are read-only, which the compiled functions do not accept.
     def rhs(t: float, y: Array, out: Array) -> None:
-        out[:] = rate(min(t, latest), y.copy())
+        out[:] = rate(min(max(t, after), latest), y.copy())
 
     def jacobian(t: float, y: Array, out: Array, into: Array) -> None:
         into[:] = derivative(t, y.copy())
 
-    t, y = float(times[0]), np.concatenate([state, np.zeros(len(tolerance) - len(state))])
-    result = np.empty((len(times), len(y)))
-    result[0] = y
-    done, status = 1, Status.FINISHED
+    pieces, t = scipy.smooth_pieces(system, times), float(times[0])
+    result = np.empty((len(times), len(tolerance)))
+    done, y = scipy.pass_break(system, t, pieces[0].begin, times, 0, result,
+                               np.concatenate([state, np.zeros(len(tolerance) - len(state))]))
+    status = Status.FINISHED
     longest = scipy.longest_step(system, times, max_step)
-    latest = t
+    after = latest = t
     try:
-        for end in [*system.breakpoints(t, float(times[-1])), float(times[-1])]:
+        for piece in pieces:
+            t, after, end = piece.begin, piece.after, piece.end
             solver = CVODE(rhs, jacfn=jacobian, method="BDF", rtol=rtol, atol=tolerance,
                            max_step=longest, max_num_steps=100_000)
             latest = scipy.before_break(t, end)
             solver.init_step(t, y)
             while t < end and status is Status.FINISHED:
-                target = min(float(times[done]), end)
+                target = min(float(times[done]), end) if done < len(times) else end
                 try:
                     step = solver.step(target, tstop=end)
                 except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
@@ -68,15 +70,14 @@ def integrate(
                     status, counts["message"] = Status.FAILED, str(step.message)
                     break
                 t, y = target, np.array(step.y, dtype=float)
-                if t == times[done]:
+                if t == times[done] and t < end:
                     result[done] = y
                     done += 1
                 if progress is not None:
                     progress(t)
-            if t == end and done < len(times):
-                y = scipy.jumped(system, float(np.nextafter(t, times[0])), t, y)
-                if times[done - 1] == t:
-                    result[done - 1] = y
+            if status is not Status.FINISHED:
+                break
+            done, y = scipy.pass_break(system, latest, piece.until, times, done, result, y)
     except KeyboardInterrupt:
         status = Status.INTERRUPTED
     size, statistics = len(state), {**counts, "seconds": clock.perf_counter() - begin}

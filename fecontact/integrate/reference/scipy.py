@@ -2,11 +2,11 @@
 
 import time as clock
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import right_hand_side
@@ -35,22 +35,24 @@ def integrate(
     begin = clock.perf_counter()
     size, extra = len(state), len(POWERS)
     rhs, jacobian, tolerance, counts = with_work(system, state, rtol)
-    ends = [*system.breakpoints(float(times[0]), float(times[-1])), float(times[-1])]
+    pieces = smooth_pieces(system, times)
+    longest = longest_step(system, times, max_step)
 
-    def started(t: float, y: Array) -> Any:
-        end = ends.pop(0)
-        latest = before_break(t, end)
+    def started(y: Array) -> Any:
+        begin, end = pieces[0].begin, pieces[0].end
+        latest = before_break(begin, end)
         return getattr(scipy.integrate, method)(
-            lambda t, y: rhs(min(t, latest), y), t, y, end, jac=jacobian, rtol=rtol,
-            atol=tolerance, max_step=longest_step(system, times, max_step))
+            lambda t, y: rhs(min(max(t, pieces[0].after), latest), y), begin, y, end,
+            jac=jacobian, rtol=rtol, atol=tolerance, max_step=longest)
 
-    solver = started(float(times[0]), np.concatenate([state, np.zeros(extra)]))
     result = np.empty((len(times), size + extra))
-    result[0] = solver.y
-    done, steps, stalled = 1, 0, 0
+    done, y = pass_break(system, float(times[0]), pieces[0].begin, times, 0, result,
+                         np.concatenate([state, np.zeros(extra)]))
+    solver = started(y)
+    steps, stalled = 0, 0
     status = Status.FINISHED
     try:
-        while done < len(times):
+        while pieces:
             before = solver.t
             message = _step(solver)
             # LSODA repeats steps that do not advance time forever.
@@ -62,16 +64,18 @@ def integrate(
                 counts["message"] = message
                 break
             steps += 1
-            reached = done + int(np.searchsorted(times[done:], solver.t, side="right"))
-            if solver.status == "finished" and not ends:
-                reached = len(times)
+            ended = solver.status == "finished"
+            reached = done + int(np.searchsorted(times[done:], solver.t,
+                                                 side="left" if ended else "right"))
             if reached > done:
                 result[done:reached] = solver.dense_output()(times[done:reached]).T
                 done = reached
-            if solver.status == "finished" and ends:
-                solver = started(solver.t, jumped(system, solver.t_old, solver.t, solver.y))
-                if times[done - 1] == solver.t:
-                    result[done - 1] = solver.y
+            if ended:
+                last = pieces.pop(0)
+                done, y = pass_break(system, before_break(last.begin, last.end), last.until, times,
+                                     done, result, solver.y)
+                if pieces:
+                    solver = started(y)
             if progress is not None:
                 progress(float(solver.t))
     except KeyboardInterrupt:
@@ -115,16 +119,80 @@ def with_work(
     return rhs, jacobian, tolerance, counts
 
 
+class Piece(NamedTuple):
+    """A time in which all that is given is smooth: ``begin`` to ``end``, then breaks ``until``.
+
+    Signals are as ``after`` the break at its begin from there on.
+    """
+
+    begin: float
+    after: float
+    end: float
+    until: float
+
+
+def breaks(
+    system: ContactSystem, times: Array, also: ArrayLike = (),
+) -> tuple[float, Array]:
+    """The last break at the start, or the start; and first and last (k, 2) of those after it.
+
+    Breaks that only rounding tells apart are one, for no step fits between such: 0.1 + 0.2 and 0.3
+    are meant to be one time. So are those at the end.
+    """
+    start, end = float(times[0]), float(times[-1])
+    close = _close(times)
+    # Those at the very start and end too.
+    jumps = system.breakpoints(float(np.nextafter(start, -np.inf)),
+                               float(np.nextafter(end, np.inf)))
+    groups = [[start]]
+    for one in np.sort(np.concatenate([jumps, np.asarray(also, dtype=float)])):
+        if one - groups[-1][-1] <= close:
+            groups[-1].append(float(one))
+        else:
+            groups.append([float(one)])
+    if len(groups) > 1 and end - groups[-1][-1] <= close:
+        groups[-1].append(end)
+    return groups[0][-1], np.array([[one[0], one[-1]] for one in groups[1:]]).reshape(-1, 2)
+
+
+def _close(times: Array) -> float:
+    """Times that are no farther apart than this are one [s]."""
+    return 1e-14 * max(abs(float(times[0])), abs(float(times[-1])))
+
+
+def smooth_pieces(system: ContactSystem, times: Array) -> list[Piece]:
+    """Pieces of a run, from its start or the last break there to its end."""
+    first, groups = breaks(system, times)
+    end = float(times[-1])
+    if not len(groups) or groups[-1, 1] < end:
+        groups = np.vstack([groups, [end, end]])
+    begins = np.append(first, groups[:-1, 1])
+    return [Piece(float(begin), float(np.nextafter(begin, end)), float(low), float(high))
+            for begin, (low, high) in zip(begins, groups, strict=True)]
+
+
 def before_break(t: float, end: float) -> float:
     """The last time before a breakpoint at ``end``, where signals may jump, of a step from t."""
     return float(np.nextafter(end, t))
 
 
-def jumped(system: ContactSystem, t: float, end: float, y: Array) -> Array:
-    """State and work after a breakpoint at ``end``, with the work of jumps of the drive."""
-    y = y.copy()
-    y[system.size] += work_of_jump(system, before_break(t, end), end, y)
-    return y
+def pass_break(
+    system: ContactSystem, before: float, until: float, times: Array, done: int, result: Array,
+    y: Array,
+) -> tuple[int, Array]:
+    """Fill the rows of outputs from ``done`` on that lie at breaks; how many are done, and y after.
+
+    At the breaks from ``before`` to ``until`` jumps of the drive do work, and nothing moves.
+    """
+    def jumped(after: float) -> Array:
+        moved = y.copy()
+        moved[system.size] += work_of_jump(system, before, after, y)
+        return moved
+
+    while done < len(times) and times[done] <= until + _close(times):
+        result[done] = jumped(float(times[done]))
+        done += 1
+    return done, jumped(float(np.nextafter(until, times[-1])))
 
 
 def work_of_jump(system: ContactSystem, before: float, after: float, y: Array) -> float:

@@ -8,11 +8,16 @@ from typing import Any, Protocol
 import numpy as np
 
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array
 from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.reference.scipy import energy_scale, largest_motions, work_of_jump
+from fecontact.integrate.reference.scipy import (
+    breaks,
+    energy_scale,
+    largest_motions,
+    work_of_jump,
+)
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.blocks import blocks_of
@@ -114,7 +119,7 @@ def start(
     if vary:
         # Derivatives are those of all nodes.
         control.untouched[:] = -np.inf
-        control = control._replace(breaks=_breaks(system, times, times[1:-1])[1])
+        control = control._replace(breaks=breaks(system, times, times[1:-1])[1])
         columns = len(state)
         if not isinstance(vary, bool):
             above, below, width = vary
@@ -197,7 +202,7 @@ def _progress(system: ContactSystem, control: Control, times: Array, state: Arra
     What jumps at the start, but for rounding, has jumped.
     """
     basis, m = system.basis, system.basis.modes
-    time = _breaks(system, times)[0]
+    time = breaks(system, times)[0]
     with np.errstate(over="ignore", invalid="ignore"):
         acceleration = np.abs(system.rhs(time, state)[m : 2 * m]) * control.largest
     first = min(0.1 * control.speed_scale / max(float(acceleration.max()), 1e-300),
@@ -238,35 +243,11 @@ def control_for(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
         largest=largest, untouched=untouched,
-        breaks=_breaks(system, times)[1],
+        breaks=breaks(system, times)[1],
         levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), unfelt=first_unfelt.address)
-
-
-def _breaks(
-    system: ContactSystem, times: Array, also: ArrayLike = (),
-) -> tuple[float, Array]:
-    """The last break at the start, or the start; and first and last (k, 2) of those after it.
-
-    Breaks that only rounding tells apart are one, for no step fits between such: 0.1 + 0.2 and 0.3
-    are meant to be one time. So are those at the end.
-    """
-    start, end = float(times[0]), float(times[-1])
-    close = 1e-14 * max(abs(start), abs(end))
-    # Those at the very start and end too.
-    jumps = system.breakpoints(float(np.nextafter(start, -np.inf)),
-                               float(np.nextafter(end, np.inf)))
-    groups = [[start]]
-    for one in np.sort(np.concatenate([jumps, np.asarray(also, dtype=float)])):
-        if one - groups[-1][-1] <= close:
-            groups[-1].append(float(one))
-        else:
-            groups.append([float(one)])
-    if len(groups) > 1 and end - groups[-1][-1] <= close:
-        groups[-1].append(end)
-    return groups[0][-1], np.array([[one[0], one[-1]] for one in groups[1:]]).reshape(-1, 2)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:

@@ -253,10 +253,10 @@ def vector_field(
                          f"for each state.")
     period_of = _period_of(period)
     rates = compile_law(kernels.RATES, _FORM, function)
-    _ = rates.address
+    _require_compiled(rates, "function")
     given = None if jacobian is None else compile_law(kernels.JACOBIAN, _FORM, jacobian)
     if given is not None:
-        _ = given.address
+        _require_compiled(given, "jacobian")
     required = differentiation == "complex"
     complex_rates = None
     if differentiation != "differences":
@@ -270,6 +270,16 @@ def vector_field(
         if required:
             raise InputError(told)
     return FunctionField(rates, given, None, parameters, names, typical, period_of)
+
+
+def _require_compiled(function: CompiledLaw, name: str) -> None:
+    """Raise InputError, which speaks of no law, unless the function can be compiled."""
+    try:
+        _ = function.address
+    except InputError as error:
+        what = str(error).replace("The law ", f"vector_field: the {name} ")
+        raise InputError(what.replace("a compiled law", "a compiled function").replace(
+            "check parameters in __post_init__ of the law's class, and return", "return")) from None
 
 
 def _state_names(states: int | Iterable[str]) -> tuple[str, ...]:

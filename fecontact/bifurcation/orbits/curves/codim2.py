@@ -272,7 +272,11 @@ class CurveLinearised:
         """Change (n,) of the orbit by a right-hand side, to the nearest one of the curve."""
         row = self.problem.weights() * tangent / (self.problem.weights() @ tangent**2)
         change = self.solve(row if self._last is None else self._last[0], side)
-        return change - (row @ change) * tangent
+        if not np.isfinite(change).all():
+            # The last row may be across the curve; where this one fails too, nothing is known.
+            change = self.solve(row, side)
+        with np.errstate(invalid="ignore"):
+            return change - (row @ change) * tangent
 
 
 def orbit_curve(
