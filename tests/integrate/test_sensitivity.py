@@ -8,6 +8,7 @@ import scipy.linalg
 from systems import friction_oscillator, impact_oscillator
 
 from fecontact import AnalysisError, Drive, Ground, InputError, sensitivity, simulate
+from fecontact.integrate import Rodas5P
 from fecontact.laws import IwanFriction, LuGreFriction, Sine
 
 SMOOTH = {"friction.smoothing_slope": 3e3}
