@@ -74,22 +74,30 @@ def conditions(course: Course, rates: list[float]) -> Iterator[Condition]:
         yield from of_phase(course, i, rate)
 
 
-def of_phase(course: Course, i: int, rate: float) -> Iterator[Condition]:
-    """The conditions of one phase; ``rate`` is that of what vanishes at its end."""
+def of_phase(
+    course: Course, i: int, rate: float, what: int | None = None, event: int | None = None
+) -> Iterator[Condition]:
+    """The conditions of one phase; ``rate`` is that of what vanishes at its end.
+
+    With ``what`` and ``event`` those that can be of this kind; what others need is not computed.
+    """
     phase, T, duration = course.phases[i], course.period, float(course.durations[i])
-    yield Condition(duration / T, DURATION, i, phase.event, duration)
+    if what in (None, DURATION):
+        yield Condition(duration / T, DURATION, i, phase.event, duration)
     # What vanishes at both ends of a phase has no rate where the phase has no duration.
-    if phase.event != PERIOD and not abs(duration) < _NO_RATE[phase.order] * T:
+    if what in (None, RATE) and phase.event != PERIOD and not (
+            abs(duration) < _NO_RATE[phase.order] * T):
         scale = scales_of(phase, course.margins)[phase.event] * (duration / T) ** phase.order
         yield Condition(float(-rate * T / scale), RATE, i, phase.event, duration)
-    if duration > 0.0:
-        yield from _within(course, i)
-    yield from _at_begin(course, i)
-    if phase.strike is not None:
+    if what in (None, WITHIN) and duration > 0.0:
+        yield from _within(course, i, event)
+    if what in (None, BEGIN, CROSSING):
+        yield from _at_begin(course, i)
+    if what in (None, STRIKE) and phase.strike is not None:
         begin = float(course.begins[i])
         state = course.motion.run(begin, np.array([duration]), course.starts[i], phase)[0][-1]
-        for event, left in course.motion.strike_left(begin + duration, state, phase):
-            yield Condition(left, STRIKE, i, event, duration)
+        for struck, left in course.motion.strike_left(begin + duration, state, phase):
+            yield Condition(left, STRIKE, i, struck, duration)
 
 
 def sampled(course: Course, i: int, after: Array) -> Array:
@@ -103,15 +111,15 @@ def sampled(course: Course, i: int, after: Array) -> Array:
     return motion.observed(begin + after, states, phase)[0] / scales_of(phase, course.margins)
 
 
-def _within(course: Course, i: int) -> Iterator[Condition]:
-    """The least value within a phase of each margin that has a minimum there."""
+def _within(course: Course, i: int, only: int | None = None) -> Iterator[Condition]:
+    """The least value within a phase of each margin, or of one, that has a minimum there."""
     duration = float(course.durations[i])
     # Without an event, what is at the end is at the begin again.
     parts = _PARTS if course.phases[i].event != PERIOD else np.append(_PARTS[:-1], _ONCE_MORE)
     times = duration * parts
     found = sampled(course, i, times)
     phase = course.phases[i]
-    for event in range(found.shape[1]):
+    for event in range(found.shape[1]) if only is None else (only,):
         column = found[:, event]
         between = phase.order and event == phase.event and duration < _SHORT * course.period
         if between or not np.isfinite(column).all():

@@ -11,10 +11,16 @@ from fecontact.bifurcation.continuation.points import DiscontinuityPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, sizes_of
 from fecontact.bifurcation.events.borders import beyond
 from fecontact.bifurcation.events.branches import FITS, nothing_left
-from fecontact.bifurcation.events.conditions import DURATION, Condition, Course, of_phase
+from fecontact.bifurcation.events.conditions import (
+    DURATION,
+    RATE,
+    Condition,
+    Course,
+    of_phase,
+)
 from fecontact.bifurcation.events.linearisation import EventLinearisation
 from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventOrbit
-from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Phase, Strike
+from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, Strike
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.core.errors import AnalysisError, InputError
@@ -86,20 +92,22 @@ class BorderCurve(Problem):
         """Relative size of Newton steps below which rounding dominates."""
         return 1e-8
 
-    def left(self, orbit: EventOrbit, u: Array, start: Array, begin: float, tau: float) -> float:
+    def left(
+        self, orbit: EventOrbit, u: Array, start: Array, begin: float, tau: float, motion: Motion
+    ) -> float:
         """What the condition has left, for a phase with another start, begin and duration."""
-        i, motion = self.phase, orbit.motion(u)
+        i = self.phase
         begins, starts = orbit.begins(u).copy(), orbit.starts(u).copy()
         durations = orbit.durations(u).copy()
         starts[i], begins[i], durations[i] = start, begin, tau
         course = Course(motion, orbit.phases, begins, starts, durations, orbit.margins)
         phase, rate = orbit.phases[i], 0.0
-        if phase.event != PERIOD:
+        if self.what == RATE:
             state = motion.run(begin, np.array([tau]), start, phase)[0][-1]
             slopes = motion.margin_slopes(begin + tau, state, phase, phase.event)
             rates = motion.observed(np.array([begin + tau]), state[None], phase)[1][0]
             rate = float(slopes[: len(rates)] @ rates + slopes[len(rates)])
-        found = [each.left for each in of_phase(course, i, rate)
+        found = [each.left for each in of_phase(course, i, rate, self.what, self.event)
                  if (each.what, each.event) == (self.what, self.event)]
         if not found:
             raise AnalysisError("The orbit does not come near its border any more.")
@@ -156,10 +164,11 @@ class BorderLinearisation:
         moved = np.zeros(d + 4) if offset is None else offset
         u[-2:] += moved[-2:]
         orbit, known = problem.along_first(u)
+        motion = orbit.motion(known) if moved[-2:].any() else self.orbit.motion
         i = problem.phase
         return problem.left(orbit, known, orbit.starts(known)[i] + moved[:d],
                             float(orbit.begins(known)[i] + moved[d]),
-                            float(orbit.durations(known)[i] + moved[d + 1]))
+                            float(orbit.durations(known)[i] + moved[d + 1]), motion)
 
     @cached_property
     def matrix(self) -> Array:

@@ -78,6 +78,21 @@ def pivot_rows(factors: CondensedFactors) -> int:
     return int((groups * (size - d) + (groups - 1) * d) * lanes + len(factors.top) * d)
 
 
+def with_left_ends(factors: CondensedFactors, left: Array) -> CondensedFactors:
+    """Factors of the same intervals with other coefficients (N, d, d) of their left ends.
+
+    They share the inner nodes, which keep their equations: only ends of intervals are solved for.
+    """
+    local = factors.local.copy()
+    local[:, :, : left.shape[1]] = left
+    made = factors._replace(
+        local=local, chain=_aligned(*factors.chain.shape[:3]),
+        chain_order=np.empty_like(factors.chain_order), top=np.empty_like(factors.top),
+        top_pivots=np.empty_like(factors.top_pivots), end=np.empty_like(factors.end))
+    chain_intervals(made)
+    return made
+
+
 def _aligned(groups: int, rows: int, columns: int) -> Array:
     """Allocate (groups, rows, columns, 8), each group of eight numbers in one cache line."""
     size = groups * rows * columns * WIDTH

@@ -318,6 +318,11 @@ class CollocationLinearisation:
     def _phase(self) -> "Border":
         return Border(self.factors, self.problem.phase_border)
 
+    def forget_borders(self) -> None:
+        """Reduce borders anew, after other factors were given."""
+        self._last = None
+        self.__dict__.pop("_phase", None)
+
     def with_rows(self, rows: list[Array]) -> Bordered:
         """The matrix [[G_u], [row], [row], ...]."""
         borders = [self._phase] if self.problem.autonomous else []

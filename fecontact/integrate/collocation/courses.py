@@ -236,12 +236,15 @@ def _presses(x, j, s, c):
 
 
 @routine
-def _release(j, s, c):
-    """Part of the step at which a normal force that is there at one end begins or ends, else 2."""
+def _release(high, j, s, c):
+    """Part of the step up to x = ``high`` at which a normal force begins or ends, else 2.
+
+    It is there at the begin or at x = ``high``, and not at the other.
+    """
     presses = _presses(-1.0, j, s, c)
-    if presses == _presses(1.0, j, s, c):
+    if presses == _presses(high, j, s, c):
         return 2.0
-    low, high = -1.0, 1.0
+    low = -1.0
     while high - low > _RESOLVED:
         middle = 0.5 * (low + high)
         if _presses(middle, j, s, c) == presses:
@@ -277,16 +280,22 @@ def first_switch(after, problem, c):
             reached += abs(line[power])
         # Levels are 1e100 where a force never ends: each is taken from the same number.
         centre, noise = line[0], max(_NOISE * size, c.tolerance * control.depth[j])
+        presses, high = _presses(-1.0, j, s, c), 1.0
         for level in range(levels + 1):
             here = control.levels[level, j] if level < levels else control.depth[j]
             line[0] = centre - here
             found = _first_change(after, noise, c)
-            # In a gap there is no law whose character could change.
-            if level == levels and found < 2.0 and not _presses(2.0 * found - 1.0, j, s, c):
-                continue
+            # In a gap there is no law whose character could change, but where the force is there at
+            # one of two passages it begins or ends between them.
+            while level == levels and found < 2.0 and not _presses(2.0 * found - 1.0, j, s, c):
+                if presses:
+                    high = min(high, 2.0 * found - 1.0)
+                found = _first_change(found, noise, c)
+            if level == levels and found < 2.0 and not presses:
+                high = min(high, 2.0 * found - 1.0)
             changes = min(changes, found)
         if reached > noise:
-            release = _release(j, s, c)
+            release = _release(high, j, s, c)
             if after < release < changes:
                 changes = release
         first = min(first, changes)

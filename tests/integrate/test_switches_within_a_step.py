@@ -1,0 +1,48 @@
+"""Where the force of a node begins or ends within a step by collocation."""
+
+import numpy as np
+import pytest
+from systems import mass_in_y
+
+from fecontact.core.compiled import f8, kernel
+from fecontact.integrate.collocation.courses import first_switch
+from fecontact.integrate.collocation.room import COLLOCATION, collocation_for
+from fecontact.integrate.rodas5p import driver
+from fecontact.integrate.rodas5p.state import PROBLEM
+from fecontact.laws import RoughSurface
+
+STIFFNESS, HEIGHT = 1e6, 1e-5
+
+
+@kernel(f8(f8, PROBLEM, COLLOCATION))
+def found(after, problem, c):
+    return first_switch(after, problem, c)
+
+
+def zero(damping, x):
+    """Force over c R_Z for the penetration R_Z (1/2 + 2 x^2), where it is not negative."""
+    part, speed = 0.5 + 2.0 * x * x, 8.0 * x
+    return part - 0.5 + damping * speed if part > 1.0 else part**2 / 2.0 + damping * part * speed
+
+
+@pytest.mark.parametrize(("damping", "switch"), [
+    # Opens before the depth is passed, closes below it: 2 x + 8 b = 0.
+    (0.16, -0.64),
+    # Open at the begin, closes below the depth: x^2 + 8 b x + 1/4 = 0.
+    (0.3, -1.2 + np.sqrt(1.44 - 0.25)),
+    # Pressed throughout: the first passage of the depth.
+    (0.01, -0.5)])
+def test_depth_passed_twice(damping, switch):
+    """The penetration falls below the depth of the law and returns within one step of 1 s.
+
+    ``damping`` is that of the law over its stiffness [s].
+    """
+    system = mass_in_y(normal=RoughSurface(STIFFNESS, HEIGHT, damping * STIFFNESS))
+    run = driver.start(system, np.zeros(2), np.array([0.0, 1.0]), rtol=1e-9, series="never")
+    c, row = collocation_for(1, 1, 1e-9), float(run.problem.system.Ty[0, 0])
+    gap = float(run.problem.system.gap[0])
+    c.places[0, 0], c.places[2, 0] = -(0.5 * HEIGHT + gap) / row, -2.0 * HEIGHT / row
+    c.rates[1, 0] = -8.0 * HEIGHT / row
+    if switch != -0.5:
+        assert zero(damping, switch) == pytest.approx(0.0, abs=1e-12)
+    assert found(1e-9, run.problem, c) == pytest.approx(0.5 * (switch + 1.0), abs=1e-12)
