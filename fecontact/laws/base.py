@@ -217,6 +217,9 @@ class FrictionLaw(NodeLaw):
         """Number s of internal variables per node; zero for laws without memory."""
         return 0
 
+    # Whether the scales of internal variables and slip velocity are those under 1 N.
+    scales_with_force: ClassVar[bool] = False
+
     @property
     def state_scale(self) -> Array:
         """Scale (s,) of each internal variable, for tolerances."""

@@ -24,7 +24,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
 from fecontact.system.arrays import excited, system_arrays
-from fecontact.system.friction_memory import bristle_history
+from fecontact.system.friction_memory import bristle_history, memory_scales, velocity_scale
 from fecontact.system.gap import Gap, gap_values
 from fecontact.system.interfaces import (
     Interface,
@@ -40,7 +40,7 @@ from fecontact.system.interfaces import (
     sliding_speed,
     system_fields,
 )
-from fecontact.system.loads import load_summary, require_motion
+from fecontact.system.loads import force_scale, load_summary, require_motion
 from fecontact.system.nodes import SystemArrays
 
 NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a rough "
@@ -273,20 +273,20 @@ class ContactSystem(Summarised):
         """Smallest characteristic penetration of the normal laws [m]."""
         return min(law.penetration_scale for _, _, law in self.law_groups("normal"))
 
+    @cached_property
+    def force_scale(self) -> float:
+        """Scale of the forces for tolerances, 1 N at most [N]."""
+        return force_scale(self.basis, self.drive, self.load, self.law_groups("normal"))
+
     @property
     def velocity_scale(self) -> float:
         """Smallest slip velocity over which a friction force rises [m/s]."""
-        return min(law.velocity_scale for _, _, law in self.law_groups("friction"))
+        return min(velocity_scale(law, self.force_scale) for *_, law in self.law_groups("friction"))
 
     @property
     def memory_scales(self) -> Array:
         """Scale (n s,) of each internal variable of the state."""
-        scales = np.ones((self.basis.contact_nodes, self.memory))
-        for nodes, _, law in self.law_groups("friction"):
-            # In space both components of a vector have its scale.
-            scale = np.repeat(law.state_scale, self.basis.dimension - 1)
-            scales[nodes, : len(scale)] = scale
-        return scales.reshape(-1)
+        return memory_scales(self.basis, self.memory, self.law_groups("friction"), self.force_scale)
 
     def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
         """Times between two [s] at which drive, loads or ground motion have kinks, ascending."""

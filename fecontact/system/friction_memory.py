@@ -1,10 +1,14 @@
 """Internal variables of friction with memory: what they store, and steady ones."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numba import types
 
 from fecontact.core.compiled import block, f8, kernel, matrix, vector
 from fecontact.core.types import Array
+from fecontact.laws.base import FrictionLaw
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
     SYSTEM,
@@ -72,3 +76,19 @@ def settled(t: float, y: Array, arrays: SystemArrays) -> Array:
     if arrays.memory.any():
         _settle(t, state, arrays)
     return state
+
+
+def velocity_scale(law: FrictionLaw, force: float) -> float:
+    """Slip velocity of a law over which friction rises, with a scale of forces [N]; in m/s."""
+    return law.velocity_scale * (force if law.scales_with_force else 1.0)
+
+
+def memory_scales(basis: ModalBasis, memory: int, laws: Iterable[tuple[slice, Array, FrictionLaw]],
+                  force: float) -> Array:
+    """Scales (n s,) of s internal variables of each node, with a scale of forces [N]."""
+    scales = np.ones((basis.contact_nodes, memory))
+    for nodes, _, law in laws:
+        # In space both components of a vector have its scale.
+        scale = np.repeat(law.state_scale, basis.dimension - 1)
+        scales[nodes, : len(scale)] = scale * (force if law.scales_with_force else 1.0)
+    return scales.reshape(-1)

@@ -1,6 +1,6 @@
 """Loads of a system as modal forces."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,12 +8,14 @@ import numpy as np
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import listed, quantity
+from fecontact.laws.base import NormalLaw
 from fecontact.laws.excitation import (
     AXES,
     BOUNDARY_STRESSES,
     Drive,
     Load,
 )
+from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.laws.signals.base import Signal
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -107,6 +109,30 @@ def work_of_loads(basis: ModalBasis, load: Load, depth: float) -> float:
     largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
     moved = np.divide(depth, largest, out=np.zeros(basis.modes), where=largest > 0.0)
     return float(abs(load.normal) * depth + np.abs(constant) @ moved)
+
+
+# Forces count as at most the first and at least the second in scales of tolerances [N].
+_LARGEST_FORCE, _LEAST_FORCE = 1.0, 1e-9
+
+
+def force_scale(basis: ModalBasis, drive: Drive, load: Load,
+                laws: Iterable[tuple[slice, Array, NormalLaw]]) -> float:
+    """Scale of the forces on a body for tolerances, 1 N or below [N].
+
+    It is the sum of the magnitudes of its loads, of what springs of the drive pull at the largest
+    drive displacements, and of prescribed normal forces; 1 N if there are none.
+    """
+    largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
+    total = sum(float(np.sum(law.force)) for _, _, law in laws if isinstance(law, PrescribedForce))
+    total += sum(c * motion.largest for c, motion in
+                 zip(drive.stiffness, drive.motions, strict=True))
+    for part in acting_loads(basis, load):
+        value = part.value.largest if isinstance(part.value, Signal) else abs(part.value)
+        row = np.divide(part.row, largest, out=np.zeros(basis.modes), where=largest > 0.0)
+        total += value * float(np.linalg.norm(row))
+    if not total > 0.0:
+        return _LARGEST_FORCE
+    return float(np.clip(total, _LEAST_FORCE, _LARGEST_FORCE))
 
 
 def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:

@@ -39,6 +39,7 @@ from fecontact.integrate.shared_nodes.helpers import workers_for
 from fecontact.integrate.shared_nodes.team import ALONE, Team, parts_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.friction_memory import velocity_scale
 from fecontact.system.powers import DRIVE, NODE_POWERS, POWER_COUNT
 
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
@@ -229,7 +230,7 @@ def control_for(
     largest = largest_motions(system)
     slip_scale, depth, stick_speed, untouched = np.zeros((4, system.basis.contact_nodes))
     for nodes, _, law in system.law_groups("friction"):
-        slip_scale[nodes] = law.velocity_scale
+        slip_scale[nodes] = velocity_scale(law, system.force_scale)
         if work and not law.memory:
             stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
     for nodes, _, law in system.law_groups("normal"):

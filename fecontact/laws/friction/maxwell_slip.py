@@ -94,6 +94,8 @@ class _MaxwellSlip(LimitedFriction):
     friction_coefficient: NotNegative = 0.55
     relaxation_time: Annotated[Positive, Unit("s")] = 1e-7
 
+    scales_with_force: ClassVar[bool] = True
+
     @property
     def shares(self) -> tuple[Array, Array]:
         """Fractions (s,) of the stiffness k, and of the limit mu F, that the elements have.
@@ -124,7 +126,8 @@ class _MaxwellSlip(LimitedFriction):
     def state_scale(self) -> Array:
         """Deflections (s,) [m] at which the elements slide under 1 N on the whole face.
 
-        The smallest of all nodes; for coefficient zero the same as for one.
+        The smallest of all nodes; for coefficient zero the same as for one. A system whose loads
+        are below 1 N takes the part that they are of it.
         """
         mu = np.where(np.greater(self.friction_coefficient, 0.0), self.friction_coefficient, 1.0)
         nodes = np.size(self.stiffness)
