@@ -8,6 +8,11 @@ RUNS   := $(VENV)/.compiled-for-runs
 ALL    := $(VENV)/.compiled
 SYSTEM := $(VENV)/.system-libraries
 
+# What the tables of README and docs are made of: scripts, and their arguments after plus signs.
+BENCHMARKS := integrator integrator+a+b+c+--tight integrator+--inline-laws many_contacts shooting \
+  continuation harmonic ensemble nonsmooth bodies solids contact_kernels laws sweep output \
+  eigen eigen+--solids reduction+1 reduction+--solid
+
 # Tests start many processes, and pytest rewrites their files: what Python keeps of this saves time.
 export PYTHONDONTWRITEBYTECODE :=
 
@@ -37,7 +42,10 @@ check: $(READY) ## ruff and mypy
 	@$(BIN)/mypy
 
 bench: $(READY) $(ALL) $(SYSTEM) ## run the benchmarks
-	@for file in benchmarks/[a-z]*.py; do echo "$$file"; $(BIN)/python "$$file" || exit 1; done
+	@for run in $(BENCHMARKS); do \
+	  name=$${run%%+*}; echo "benchmarks/$$name.py$$(echo "$${run#$$name}" | tr + ' ')"; \
+	  $(BIN)/python benchmarks/$$name.py $$(echo "$${run#$$name}" | tr + ' ') || exit 1; \
+	done
 
 docs: $(READY) $(ALL) $(SYSTEM) ## build the site into build/site/html
 	@$(BIN)/python docs/site/build.py

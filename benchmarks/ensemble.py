@@ -2,8 +2,8 @@
 
 Usage: python benchmarks/ensemble.py [values] [periods] [--problem b] [--quick]
 
-1000 values of the drive's frequency, 300 periods each, states once a period, if not told
-otherwise; the peer is numbalsoda, called in a compiled loop over the same values with the
+Values of the drive's frequency, some periods of each, states once a period: if not told otherwise
+24 values and 60 periods of (f), then 64 and 100 of (b). The peer is numbalsoda, called in a compiled loop over the same values with the
 package's own compiled right-hand side. Errors are those after three periods, before chaos has
 its way: the median over the values of the largest deviation of a displacement, relative to its
 largest value there, from a run at rtol = 1e-11.
@@ -30,7 +30,8 @@ from fecontact.integrate import strobe
 Array = NDArray[np.float64]
 
 LEVELS = (1e-3, 1e-4, 1e-5, 1e-6)
-# Lowest and highest frequency of the drive [rad/s].
+# Values and periods; lowest and highest frequency of the drive [rad/s].
+USUAL = {"f": (24, 60), "b": (64, 100)}
 RANGES = {"f": (5.0, 80.0), "b": (10.0, 16.0), "b2": (10.0, 16.0)}
 
 
@@ -95,8 +96,15 @@ def own(name: str, values: Array, workers: int) -> Callable[[float, int], Array]
     return solve
 
 
-def main(count: int = 1000, periods: int = 300, quick: bool = False, name: str = "f") -> None:
-    """Print the table; quickly of a few values and two tolerances."""
+def main(count: int = 0, periods: int = 0, quick: bool = False, name: str = "") -> None:
+    """Print the table of a problem, or of the usual two; quickly of few values, two tolerances."""
+    if not name:
+        for name in USUAL:
+            print(f"({name})")
+            main(count, periods, quick, name)
+        return
+    usual = USUAL.get(name, USUAL["b"])
+    count, periods = count or usual[0], periods or usual[1]
     tolerances = (1e-4, 1e-5, 1e-6, 1e-7)
     if quick:
         count, periods, tolerances = 4, 5, tolerances[1:3]
@@ -132,7 +140,7 @@ def main(count: int = 1000, periods: int = 300, quick: bool = False, name: str =
 
 if __name__ == "__main__":
     words = [word for word in sys.argv[1:] if word != "--quick"]
-    problem = "f"
+    problem = ""
     if "--problem" in words:
         place = words.index("--problem")
         problem = words[place + 1]

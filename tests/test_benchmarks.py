@@ -1,5 +1,7 @@
 """Every benchmark runs in its short form, and the answers whose times it takes are right."""
 
+import re
+
 import pytest
 from scripts_for_tests import ROOT, check_numbers, run_script
 
@@ -37,6 +39,13 @@ HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_pr
 
 def test_every_benchmark_is_here():
     assert {path.stem for path in (ROOT / "benchmarks").glob("*.py")} == set(BENCHMARKS) | HELPERS
+
+
+def test_make_bench_runs_every_benchmark():
+    written = (ROOT / "Makefile").read_text().replace("\\\n", " ")
+    runs = re.search(r"^BENCHMARKS := (.*)$", written, re.MULTILINE)
+    assert runs is not None
+    assert {run.partition("+")[0] for run in runs[1].split()} == set(BENCHMARKS) | {"integrator"}
 
 
 @pytest.mark.parametrize("name", BENCHMARKS)
