@@ -3,10 +3,10 @@
 Usage: python benchmarks/ensemble.py [values] [periods] [--problem b] [--quick]
 
 Values of the drive's frequency, some periods of each, states once a period: if not told otherwise
-24 values and 60 periods of (f), then 64 and 100 of (b). The peer is numbalsoda, called in a compiled loop over the same values with the
-package's own compiled right-hand side. Errors are those after three periods, before chaos has
-its way: the median over the values of the largest deviation of a displacement, relative to its
-largest value there, from a run at rtol = 1e-11.
+24 values and 60 periods of (f), then 64 and 100 of (b). The peer is numbalsoda, called in a
+compiled loop over the same values with the package's own compiled right-hand side. Errors are
+those after three periods, before chaos has its way: the median over the values of the largest
+deviation of a displacement, relative to its largest value there, from a run at rtol = 1e-11.
 
 Problem (f) is the impact oscillator of two modes, whose motion is expanded in power series;
 ``--problem b`` is the friction oscillator of one mode, ``--problem b2`` that of two: stick and

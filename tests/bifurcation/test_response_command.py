@@ -201,7 +201,8 @@ def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
     assert cli("response", file)[0] == 0
     stored = file.parent / "results" / "block-response.h5"
     for kind in ("phase", "energies", "response"):
-        assert cli("plot", stored, kind, "--branch", 1, "--at-hz", 9.8)[0] == 0
+        place = () if kind == "response" else ("--branch", 1, "--at-hz", 9.8)
+        assert cli("plot", stored, kind, *place)[0] == 0
         assert stored.with_name(f"block-response-{kind}.png").stat().st_size > 10_000
     assert cli("report", stored, "-o", "page.html")[0] == 0
     shown = []

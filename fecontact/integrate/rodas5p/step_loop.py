@@ -10,6 +10,7 @@ from fecontact.integrate.courses import keep_ends, set_courses, set_ends
 from fecontact.integrate.near_nodes import choose_near, extend_near, set_end
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
+    forget_open,
     set_creeps,
     set_scale,
     slip_error,
@@ -90,7 +91,7 @@ def _watched(watch):
 
 
 @routine
-def _aim(t, h, exactly, moved, end, problem, progress, room):
+def _aim(t, h, exactly, smallest, moved, end, problem, progress, room):
     """The next step to try, of about the length h, or ``exactly`` that, but not past a break.
 
     A step of which one has just failed ends at a kink of the forces that lies ahead.
@@ -112,8 +113,8 @@ def _aim(t, h, exactly, moved, end, problem, progress, room):
                                   room.nodes, reach)
         # Nearer ones are left to the error control, lest steps shrink without end.
         if 1e-3 * limit < kink < 0.9 * reach:
-            # Rather a little too far than too short.
-            target = min(t + 1.0003 * kink, stop)
+            # Rather a little too far than too short, and on by more than rounding.
+            target = min(max(t + 1.0003 * kink, t + 100.0 * smallest), stop)
             caution = limit
         numbers[CAUTIOUS] = 0.0
     return Step(t, target - t, target, latest, moved, caution, is_break and target == stop)
@@ -204,6 +205,8 @@ def _error_at_end(step, end, problem, progress, room):
     """
     s, control = problem.system, problem.control
     error = state_error(control, progress, room)
+    if error > 1.0 and len(control.memory_scale) > 0 and forget_open(step, problem, room):
+        error = state_error(control, progress, room)
     if error <= 1.0:
         if step.at_break:
             dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.load)
@@ -344,7 +347,7 @@ def advance_by(problem, progress, room, output, vary, watch, most):
             dynamics.set_given(np.nextafter(t, end), s, room.given, room.load)
             moved = dynamics.motion_given(room.given)
             choose_near(h, problem, progress, room)
-        step = _aim(t, h, exactly, moved, end, problem, progress, room)
+        step = _aim(t, h, exactly, smallest, moved, end, problem, progress, room)
         _attempt(step, new, end, problem, progress, room)
         new = False
 
