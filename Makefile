@@ -17,6 +17,8 @@ BENCHMARKS := integrator integrator+a+b+c+--tight integrator+--inline-laws many_
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
+# Targets share $(VENV), and compiling takes two cores of itself: none run at the same time.
+.NOTPARALLEL:
 .PHONY: help setup demo test test-fast test-slow check bench docs validation clean
 
 help: ## list the targets

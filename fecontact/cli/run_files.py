@@ -25,9 +25,6 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
         from fecontact.core.tables import parsed
         from fecontact.study.study import Study
     study = Study.read(file)
-    if study.preload is not None:
-        with loading():
-            import fecontact.system.quasistatic.loading  # noqa: F401
     values: dict[str, Any] = {}
     for change in changes or ():
         name, equals, text = (part.strip() for part in change.partition("="))
@@ -41,7 +38,12 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
             values[name] = text
         except (RecursionError, ValueError):
             parsed(f"value = {text}", f"--set {name}")
-    return study.with_(**values) if values else study
+    if values:
+        study = study.with_(**values)
+    if study.preload is not None:
+        with loading():
+            import fecontact.system.quasistatic.loading  # noqa: F401
+    return study
 
 
 def require_same_study(study: "Study", file: Path, *free: str) -> None:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import as_count, as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
+from fecontact.core.memory import require_memory
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, listed, span
@@ -299,7 +300,7 @@ def strobe(
     for name, value, least in (
             ("transient_periods", transient_periods, 0), ("keep", keep, 1)):
         if not (isinstance(value, Integral) and value >= least):
-            raise InputError(f"{name} = {value!r} must be a whole number from {least} on.")
+            raise InputError(f"{name} = {text_of(value)} must be a whole number from {least} on.")
         if value > _MOST_PERIODS:
             raise InputError(f"{name} = {text_of(value)} must be at most {_MOST_PERIODS}: floating-"
                              f"point numbers cannot tell the periods behind apart.")
@@ -309,7 +310,9 @@ def strobe(
     else:
         periods = as_floats(period, "period")
         if not (np.isfinite(periods).all() and (periods > 0.0).all()):
-            raise InputError(f"period = {period!r} must be above zero and finite.")
+            raise InputError(f"period = {text_of(period)} must be above zero and finite.")
+    # Times of a run are made from these.
+    require_memory("keep", int(keep), 16.0)
     counts = np.arange(transient_periods, transient_periods + keep, dtype=float)
     first = 1 if transient_periods else 0
     if transient_periods:

@@ -159,7 +159,7 @@ def simulate(
 def _require_finite_events(
     events: Sequence[AnyEvent], system: ContactSystem, found: Solution
 ) -> None:
-    """Raise InputError where a user's function is not a number at some output times."""
+    """Raise InputError where a user's function is not a number at some of the output times."""
     own = [one for one in events if not isinstance(one, ContactEvents)]
     some = np.unique(np.linspace(0, len(found.time) - 1, _LOOKS).astype(int))
     for number, one in enumerate(own):

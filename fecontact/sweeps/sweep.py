@@ -265,6 +265,9 @@ def _compute(
         progress(done, failed, total)
     if not missing:
         return
+    if work.study.preload is not None:
+        # Compiled once, before there are workers.
+        import fecontact.system.quasistatic.loading  # noqa: F401
     with opened(executor, workers) as pool:
         bases = Bases(work.study, store, missing)
         waiting = deque(bases.first())

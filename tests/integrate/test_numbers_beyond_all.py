@@ -6,7 +6,7 @@ from systems import friction_oscillator, lorenz_field, mass_in_y
 
 import fecontact as fc
 from fecontact import Event, InputError, event, simulate
-from fecontact.bifurcation import periodic_motion, poincare_scan, vector_field
+from fecontact.bifurcation import lyapunov_exponents, periodic_motion, poincare_scan, vector_field
 from fecontact.bifurcation.orbits.floquet import require_same
 from fecontact.integrate import Rodas5P, SetValued, strobe
 from fecontact.laws import Step, Tabulated
@@ -24,6 +24,10 @@ HUGE = 10**400
     lambda s: strobe(s, transient_periods=HUGE, keep=1),
     lambda s: strobe(s, transient_periods=1, keep=HUGE),
     lambda s: strobe(s, transient_periods=1, keep=1, period=HUGE),
+    # Below the most periods, but more than memory has room for.
+    lambda s: strobe(s, transient_periods=1, keep=10**14),
+    lambda s: strobe(s, transient_periods=-10**5000, keep=1),
+    lambda s: lyapunov_exponents(s, duration=1.0, transient=-10**5000),
     lambda s: poincare_scan(s, "drive.angular_frequency", [13.0, HUGE], transient_periods=1),
     lambda s: poincare_scan(s, "drive.angular_frequency", [13.0], transient_periods=HUGE),
     lambda s: periodic_motion(s, transient=HUGE),

@@ -9,6 +9,8 @@ import fecontact as fc
 from fecontact import Status
 from fecontact.bifurcation import Axis, basins
 from fecontact.integrate import ContactEvents, Crossing, SetValued, strobe
+from fecontact.integrate.nonsmooth import driver
+from fecontact.integrate.nonsmooth.problem import EVENTS, GOING_ON
 from fecontact.laws import ConstantFriction, LinearContact, RoughSurface
 
 UPWARDS = [[0.0], [1.0], [0.0]]
@@ -152,3 +154,26 @@ def test_basins_of_stick_slip_and_steady_sliding():
                    section=Crossing("B", "x", 0.5, sense="falling"), solver=STATIC)
     labels = found.label
     assert labels[0, 0] == labels[1, 1] != labels[2, 0] == labels[2, 1]
+
+
+def test_a_run_that_does_not_go_on_ends_though_its_events_fill_their_table(monkeypatch):
+    """Every call ends with a full table, at the same moment: no single one sees too many."""
+    begun, calls = driver.start, []
+
+    def start(*given, **options):
+        run = begun(*given, **options)
+
+        def go(most):
+            calls.append(most)
+            assert len(calls) < 100
+            outcome = run.go(1) if len(calls) < 10 else GOING_ON
+            run.course.counts[EVENTS] += 70
+            return outcome
+
+        return run._replace(go=go)
+
+    monkeypatch.setattr(driver, "start", start)
+    run = fc.simulate(belt(), 30.0, initial=[0.5, 0.2], solver=STATIC, events=ContactEvents())
+    assert run.status is Status.MINIMUM_STEP
+    # Nine of them go on.
+    assert len(calls) == 12

@@ -1,5 +1,8 @@
 """The section [preload] of a study, the command ``preload`` and runs that start at its end."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -177,3 +180,29 @@ def test_keys_of_solids_are_refused_for_plane_bodies(file):
         "steps = 10", "steps = 10\ntravel_y = [0.0, 1e-6, 0.0, 0.0]"))
     with pytest.raises(InputError, match=r"\[preload\]: travel_y is for solids"):
         Study.read(file).load_history()
+
+
+# Refuses to start workers, and tells what was there before.
+SWEPT = """
+import sys
+from fecontact import Study, sweep
+
+class Refused(Exception):
+    pass
+
+def refuse(*given):
+    raise Refused("fecontact.system.quasistatic.march" in sys.modules)
+
+vars(sys.modules["fecontact.sweeps.sweep"])["opened"] = refuse
+try:
+    sweep(Study.read(sys.argv[1]), {"load.normal": [400.0, 500.0]})
+except Refused as told:
+    print(told)
+"""
+
+
+def test_kernels_are_there_before_workers_of_a_sweep_start(file):
+    """Otherwise each of them would compile them."""
+    done = subprocess.run([sys.executable, "-c", SWEPT, str(file)], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout == "True\n"

@@ -17,6 +17,7 @@ from fecontact.bifurcation.attractors.labels import Settled
 from fecontact.bifurcation.attractors.marks import mark_of
 from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
+from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
@@ -175,7 +176,7 @@ def basins(
         as_count(transient_periods, "basins: transient_periods", 0)
     elif transient_periods is not None or not (
             isinstance(transient, Real) and 0.0 < transient <= sys.float_info.max):
-        raise InputError(f"basins: transient = {transient!r:.80} must be a time above zero [s] "
+        raise InputError(f"basins: transient = {text_of(transient)} must be a time above zero [s] "
                          f"before passages of the section count, without transient_periods.")
     settle = _Settle(moving, solver, rtol, keep, transient_periods, float(transient or 0.0),
                      section, tolerance, np.abs(states).max(axis=0))

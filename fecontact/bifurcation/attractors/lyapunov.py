@@ -16,6 +16,7 @@ from fecontact.core.errors import (
     ModelWarning,
     require_positive,
 )
+from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -117,7 +118,7 @@ def lyapunov_exponents(
     require_positive("lyapunov_exponents", duration=duration, rtol=rtol,
                      **({} if interval is None else {"interval": interval}))
     if not (isinstance(transient, Real) and 0.0 <= transient <= sys.float_info.max):
-        raise InputError(f"transient = {transient!r} must be zero or above [s].")
+        raise InputError(f"transient = {text_of(transient)} must be zero or above [s].")
     if as_count(count, "count") > size:
         raise InputError(f"count = {count} must be a whole number from 1 to {size}.")
     state, time = start_state(moving, initial, 0.0), float(transient)

@@ -15,6 +15,7 @@ from fecontact.bifurcation.attractors.blocks import Found, Place, work_off
 from fecontact.bifurcation.attractors.marks import mark_of
 from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
+from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensemble import ensemble, is_many, strobe
@@ -141,7 +142,7 @@ def poincare_scan(
                          "count; give a section too, or transient_periods.")
     if section is not None and (transient_periods is not None or not (
             isinstance(transient, Real) and 0.0 < transient <= sys.float_info.max)):
-        raise InputError(f"poincare_scan: transient = {transient!r:.80} must be a time above "
+        raise InputError(f"poincare_scan: transient = {text_of(transient)} must be a time above "
                          f"zero [s] before passages of the section count, without "
                          f"transient_periods.")
     try:

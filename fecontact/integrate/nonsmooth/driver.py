@@ -17,23 +17,20 @@ from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
 from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
+from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between_events, stops_of
 from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_kernels import FOUND
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import POWER_COUNT
 
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
 _STEPS_PER_CALL = 2000
-# Longest step in periods of the excitation, where it is the only thing given in time.
-_PERIOD_PART = 0.125
-# Change of a signal within rounding of a time, in parts of its largest value, that is a jump.
-_JUMP = 1e-9
-# Errors of velocities count relative to this part of what drive and loads bring about.
-_DRIVEN = 1e-3
+# Changes of contact in a row without any time between them after which a run is stuck, and the time
+# that rounding adds to each, in parts of the times of the run.
+_MOST_AT_ONCE, _ROUNDING = 200, 1e-14
 # How runs end before their last output time.
 _EARLY = {kinds.STUCK: Status.MINIMUM_STEP, kinds.DIVERGED: Status.NOT_FINITE,
           kinds.PARADOX: Status.PARADOX, kinds.UNSOLVED: Status.IMPACT_UNSOLVED,
@@ -128,10 +125,17 @@ def integrate_set_valued(
     counts, reached, times = course.counts, course.clock, output.times
     n, m, solid = system.basis.contact_nodes, system.basis.modes, system.basis.dimension == 3
     outcome, ended = kinds.GOING_ON, Status.FINISHED
+    since, before = float(times[0]), 0
+    still = _ROUNDING * max(abs(float(times[0])), abs(float(times[-1])))
     try:
         while outcome == kinds.GOING_ON:
             outcome = run.go(_STEPS_PER_CALL)
             found.empty()
+            # A call that ends as the table of events is full does not know of those before.
+            if reached[kinds.TIME] - since > _MOST_AT_ONCE * still:
+                since, before = float(reached[kinds.TIME]), int(counts[kinds.EVENTS])
+            elif outcome == kinds.GOING_ON and counts[kinds.EVENTS] - before > _MOST_AT_ONCE:
+                outcome = kinds.STUCK
             if progress is not None:
                 progress(float(reached[kinds.TIME]))
     except KeyboardInterrupt:
@@ -197,11 +201,11 @@ def start(
     solid = system.basis.dimension == 3
     course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
-        _stops(system, float(times[0]), float(times[-1])),
-        _floor(system, state, times, longest), rtol, longest)
+        stops_of(system, float(times[0]), float(times[-1])),
+        floor_of(system, state, times, longest), rtol, longest)
     if longest == default and scheme == "events" and restitution is None:
         most = np.inf if max_step is None else float(max_step)
-        limits = limits._replace(longest=min(_longest_between_events(system, times), most))
+        limits = limits._replace(longest=min(longest_between_events(system, times), most))
     output = kinds.Output(times, np.empty((len(times), len(course.state))),
                           np.empty((len(times), len(course.carried))),
                           np.empty((len(times), system.basis.contact_nodes)))
@@ -228,20 +232,6 @@ def start(
         run = partial(run_steps, problem, limits, course, output, workspace,
                       stepping_room(problem, in_space() if solid else IN_PLANE))
     return Run(run, course, output, found, scheme)
-
-
-def _stops(system: ContactSystem, start: float, end: float) -> Array:
-    """Breaks (k,) up to the end; where signals jump right after one, the next number instead."""
-    found = np.array(system.breakpoints(float(np.nextafter(start, -np.inf)),
-                                        float(np.nextafter(end, np.inf))), dtype=float)
-    near = np.stack([np.nextafter(found, -np.inf), found, np.nextafter(found, np.inf)])
-    jumps = np.zeros((2, len(found)), dtype=bool)
-    for signal in (*system.drive.motions, *system.load.signals.values()) if len(found) else ():
-        value, rate = signal.history(near.ravel()).T.reshape(2, 3, -1)
-        steepest = np.abs(rate).max(axis=0) * np.diff(near, axis=0).max(axis=0)
-        jumps |= np.abs(np.diff(value, axis=0)) > 2.0 * steepest + _JUMP * signal.largest
-    stops = np.union1d(found[jumps[0] | ~jumps[1]], near[2, jumps[1]])
-    return stops[(stops > start) & (stops <= end)]
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:
@@ -411,38 +401,3 @@ def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
         raise InputError(f"scheme = 'events' needs independent slip velocities, but the "
                          f"{len(moving)} different ones depend on fewer modes; use 'stepping'.")
     return scheme
-
-
-def _longest_between_events(system: ContactSystem, times: Array) -> float:
-    """Longest step [s] of an event-driven run with compliant contact."""
-    if not system.prescribed_motion.constant or system.ground.wavy:
-        return longest_step(system, times)
-    start, end = float(times[0]), float(times[-1])
-    return min((end - start) / 50.0, _PERIOD_PART * system.shortest_period(start, end))
-
-
-def _floor(system: ContactSystem, state: Array, times: Array, longest: float) -> Array:
-    """Values (2 m + p + n,) below which the error is not measured relative to the state."""
-    m, n = system.basis.modes, system.basis.contact_nodes
-    arrays, drive = system.arrays, system.drive
-    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
-    largest = np.where(largest > 0.0, largest, 1.0)
-    depth = system.penetration_scale
-    fastest = system.prescribed_motion.largest_speed(float(times[0]), float(times[-1]))
-    speed = max(0.01 * fastest,
-                depth / longest)
-    # Velocities that drive and loads bring about in each mode, within a step where it is slow.
-    springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
-    pushes = [(springs, [motion.largest for motion in drive.motions[: len(springs)]]),
-              (arrays.load_shapes, [signal.largest for signal in system.load.signals.values()])]
-    push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
-    slowest = np.maximum(np.diag(arrays.stiffness), 1.0 / longest**2)
-    driven = push / np.sqrt(slowest)
-    energy = (0.5 * state[m : 2 * m] @ state[m : 2 * m]
-              + 0.5 * abs(state[:m] @ system.arrays.stiffness @ state[:m])
-              + work_of_loads(system.basis, system.load, depth)
-              + sum(0.5 * c * motion.largest**2 for c, motion in zip(
-                  drive.stiffness, drive.motions, strict=True))
-              + 0.5 * driven @ driven)
-    return np.concatenate([depth / largest, np.maximum(speed / largest, _DRIVEN * driven),
-                           np.full(POWER_COUNT + n, energy or 0.5 * speed**2)])
