@@ -111,10 +111,11 @@ def _aim(t, h, exactly, smallest, moved, end, problem, progress, room):
         kink = dynamics.next_kink(progress.state, progress.rate, problem.system, problem.blocks,
                                   progress.gradients, control.depth, control.slow, moved,
                                   room.nodes, reach)
-        # Nearer ones are left to the error control, lest steps shrink without end.
-        if 1e-3 * limit < kink < 0.9 * reach:
-            # Rather a little too far than too short, and on by more than rounding.
-            target = min(max(t + 1.0003 * kink, t + 100.0 * smallest), stop)
+        # Nearer ones are left to the error control, lest steps shrink without end, and those that
+        # rounding does not tell from here.
+        if max(1e-3 * limit, 100.0 * smallest) < kink < 0.9 * reach:
+            # Rather a little too far than too short.
+            target = min(t + 1.0003 * kink, stop)
             caution = limit
         numbers[CAUTIOUS] = 0.0
     return Step(t, target - t, target, latest, moved, caution, is_break and target == stop)
