@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from systems import mass_in_plane
 
-from fecontact import Drive, Ground, Load, sensitivity, simulate
+from fecontact import (
+    ContactSystem,
+    Drive,
+    Ground,
+    Load,
+    basis_from_matrices,
+    sensitivity,
+    simulate,
+)
 from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
@@ -14,7 +22,7 @@ from fecontact.bifurcation import (
     lyapunov_exponents,
     orbit_branch,
 )
-from fecontact.integrate import Rodas5P
+from fecontact.integrate import ContactEvents, Rodas5P
 from fecontact.integrate.field_runs.saltation import jumping_nodes
 from fecontact.laws import (
     ConstantFriction,
@@ -65,6 +73,25 @@ def test_touch_down_on_a_dashpot(ground, settings, relative, outputs):
     found = sensitivity(system, T, initial=START, outputs=outputs, **settings)
     assert found.states.shape == (outputs, 4)
     assert off(found.monodromy, differences(system, START)) < relative
+
+
+def test_touch_downs_of_several_nodes():
+    """Six modes and three nodes are too many for steps by collocation."""
+    random = np.random.default_rng(3)
+    rows = np.zeros((5, 3, 6))
+    rows[:, :2] = 0.3 * random.normal(size=(5, 2, 6))
+    rows[:, 1, 0] = 1.0
+    modes = basis_from_matrices(
+        np.eye(6), np.diag([0.0, 2e3, 5e3, 2e4, 4e4, 7e4]),
+        {"contact": rows[:3], "B": rows[3], "C": rows[4]}, damping=np.diag([1.0, 2, 3, 4, 5, 6]))
+    system = ContactSystem(modes, normal=LinearContact(2e4, 30.0),
+                           friction=ConstantFriction(0.3, smoothing_slope=1e2),
+                           ground=Ground(speed=0.05), load=Load(20.0))
+    start = np.concatenate([[1e-3], np.zeros(5), [-0.1], np.zeros(5)])
+    run = simulate(system, T, initial=start, outputs=2, rtol=1e-10, events=[ContactEvents()])
+    assert run.events.kind.count("touch-down") >= 3
+    found = sensitivity(system, T, initial=start, rtol=1e-10)
+    assert off(found.monodromy, differences(system, start)) < 1e-5
 
 
 @pytest.mark.parametrize("settings", [{"solver": NEVER}, {}], ids=["Rodas5P", "collocation"])

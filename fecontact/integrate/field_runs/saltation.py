@@ -11,12 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
+from fecontact.core.compiled import i8, kernel, matrix, vector
 from fecontact.core.types import Array
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.reference.scipy import largest_motions
 from fecontact.integrate.rodas5p.driver import finish, start
+from fecontact.laws.base import NormalLaw
+from fecontact.laws.signatures import normal_at
 from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
 
@@ -51,25 +55,36 @@ class Passage:
         return np.asarray(columns + self.jump[:, None] * ahead)
 
 
+@kernel(types.void(i8, vector, vector, matrix, vector))
+def _fill_forces(law, u, v, p, out):
+    """Fill out (n,) with F of nodes at penetrations u and rates v."""
+    for j in range(len(u)):
+        out[j] = normal_at(law)(u[j], v[j], p[j])[0]
+
+
 def jumping_nodes(system: ContactSystem) -> NDArray[np.bool_]:
     """Whether the normal force (n,) of each node jumps where it begins or ends, at some rate."""
     found = np.zeros(system.basis.contact_nodes, dtype=np.bool_)
     for nodes, share, law in system.law_groups("normal"):
-        table, near = law.table(share), _ASIDE * law.penetration_scale
-        onsets = law.onsets(len(share))
-        for j, p in enumerate(table):
-            found[nodes.start + j] = any(
-                _jumps(law.kernel.python, float(level), near, rate, p)
-                for level in onsets[:, j] for rate in (
-                    -system.velocity_scale, system.velocity_scale))
+        near, speed = _ASIDE * law.penetration_scale, system.velocity_scale
+        for level in law.onsets(len(share)):
+            for rate in (-speed, speed):
+                found[nodes] |= _jumps(law, level, near, np.full(len(share), rate),
+                                       law.table(share))
     return found
 
 
-def _jumps(force: object, level: float, near: float, rate: float, p: Array) -> bool:
-    assert callable(force)
-    far, close = (abs(force(level + by, rate, p)[0] - force(level - by, rate, p)[0])
-                  for by in (near, _CLOSER * near))
-    return bool(close > _JUMPS * far)
+def _jumps(
+    law: NormalLaw, level: Array, near: float, rate: Array, table: Array,
+) -> NDArray[np.bool_]:
+    """Whether forces (n,) differ across a level as much as from a thousand times closer to it."""
+    def across(by: float) -> Array:
+        out = np.empty((2, len(level)))
+        for row, side in zip(out, (by, -by), strict=True):
+            _fill_forces(law.kernel.address, level + side, rate, table, row)
+        return np.abs(out[0] - out[1])
+
+    return np.asarray(across(_CLOSER * near) > _JUMPS * across(near))
 
 
 def passages(
