@@ -11,7 +11,9 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate.collocation.room import chosen_collocation
 from fecontact.integrate.ensemble import Ensemble, ensemble
+from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish, start
@@ -28,6 +30,8 @@ Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
 # Largest change of ground velocity, relative to the velocity scale of friction.
 _SLIP = 0.05
+# Largest change of penetrations, relative to their scale, and at how many times it is looked at.
+_DEPTH, _SOMETIMES = 1e-4, 9
 # Change of the state for a difference of runs, in parts of its largest value.
 _DIFFERENCE = 1e-5
 # Derivatives by differences to both sides may be so far apart, in parts of the largest or of 1, and
@@ -112,7 +116,8 @@ def sensitivity(
     The computed steps themselves are differentiated (discrete sensitivities), at fixed step sizes;
     second derivatives of laws are found by finite differences, of relative accuracy 1e-8. With more
     than four modes or two nodes, and no memory, the linear equation of the derivatives is solved
-    along the computed motion instead. Forces are continuous: contact and stick need no jumps.
+    along the computed motion instead. Where a node touches down with a force that jumps, as that of
+    :class:`fecontact.laws.LinearContact` with damping, derivatives contain the saltation.
 
     With SetValued, forces and velocities jump. Its runs locate the jumps, so that the end of a run
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives
@@ -172,17 +177,31 @@ def differentiated(
     """As :func:`sensitivity`, from a state and without its warning."""
     if not isinstance(solver, Rodas5P):
         return _differences(system, times, state, parameter, solver, rtol, max_step)
-    vary = True if parameter is None else _moved(system, parameter)
-    run = start(system, state, times, rtol=rtol, max_step=max_step, work=False,
-                vary=vary, vary_rtol=derivative_rtol, collocation=solver.collocation)
+    vary = True if parameter is None else _moved(system, parameter, times, state)
+    passed: list[Passage] = []
+    if chosen_collocation(system, rtol, (), solver.collocation) is None:
+        passed = passages(system, state, times, rtol, max_step,
+                          None if isinstance(vary, bool) else vary)
+    run = start(system, state, with_passages(times, passed), rtol=rtol, max_step=max_step,
+                work=False, vary=vary, vary_rtol=derivative_rtol, collocation=solver.collocation)
     result = finish(run)
     if result != step_loop.FINISHED:
         raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = "
                             f"{times[-1]:.9g}: {ENDS[result].value}")
-    columns = run.variation.transitions[1:].transpose(0, 2, 1)
-    size = len(state)
-    return Sensitivity(times, run.states, np.ascontiguousarray(columns[:, :, :size]),
-                       None if parameter is None else columns[:, :, size].copy())
+    columns, states, size = run.transitions[1:], run.states, len(state)
+    if passed:
+        columns = joined(columns, times, passed)
+        states = states[np.searchsorted(run.times, times)]
+    forced = None if parameter is None else columns[:, :, size].copy()
+    if passed and not isinstance(vary, bool) and _deeper(vary[0], vary[1], times, state) > 0.0:
+        # Differences at a state would mix forces from both sides of a jump.
+        above, below, width = vary
+        pieces, spans = len(times) - 1, np.stack([times[:-1], times[1:]], axis=1)
+        ends = _states(ensemble([above] * pieces + [below] * pieces, np.tile(spans, (2, 1)),
+                                initial=np.tile(states[:-1], (2, 1)), solver=solver,
+                                rtol=max(1e-3 * rtol, 1e-12), max_step=max_step))[:, -1]
+        forced = (ends[:pieces] - ends[pieces:]) / width
+    return Sensitivity(times, states, np.ascontiguousarray(columns[:, :, :size]), forced)
 
 
 def _differences(
@@ -321,12 +340,14 @@ def _states(found: Ensemble) -> Array:
 
 
 def _moved(
-    system: ContactSystem, parameter: Parameter,
+    system: ContactSystem, parameter: Parameter, times: Array, state: Array,
 ) -> tuple[ContactSystem, ContactSystem, float]:
     """The system with the parameter increased and decreased, and the difference of both."""
     system_at, value = _function_of(system, parameter)
     move = MOVE * (abs(value) or 1.0)
-    return _systems_beside(system_at, value, move * _slip_limit(system, system_at, value, move))
+    return _systems_beside(system_at, value, move * min(
+        _slip_limit(system, system_at, value, move),
+        _depth_limit(system, system_at, value, move, times, state)))
 
 
 def _function_of(
@@ -378,6 +399,28 @@ def _slip_limit(
         return 1.0
     scales = [law.velocity_scale for _, _, law in system.law_groups("friction")]
     return float(min(1.0, _SLIP * min(scales) / shift)) if shift > 0.0 and scales else 1.0
+
+
+def _depth_limit(
+    system: ContactSystem, system_at: Callable[[float], ContactSystem], value: float, move: float,
+    times: Array, state: Array,
+) -> float:
+    """Factor that keeps changes of penetrations small relative to the scale of the normal laws.
+
+    A gap of zero has no size of its own of which a part could be taken.
+    """
+    above, below, _ = _systems_beside(system_at, value, move)
+    shift = _deeper(above, below, times, state)
+    return min(1.0, _DEPTH * system.penetration_scale / shift) if shift > 0.0 else 1.0
+
+
+def _deeper(above: ContactSystem, below: ContactSystem, times: Array, state: Array) -> float:
+    """Largest difference of penetrations at a state [m], at times from the first to the last."""
+    sometimes = np.linspace(times[0], times[-1], _SOMETIMES)
+    states = np.tile(state, (_SOMETIMES, 1))
+    one, other = (of.contact_history(sometimes, states)[:, :, kernels.PENETRATION]
+                  for of in (above, below))
+    return float(np.abs(one - other).max(initial=0.0))
 
 
 def _passing(system: ContactSystem) -> Array:

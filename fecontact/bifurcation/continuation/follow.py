@@ -56,8 +56,9 @@ def continue_branch(
         end = end if whole else End(BranchStatus.POINTS)
         turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
         points = [*turned, *points]
-    message = " ".join(filter(None, (end.message, problem.note(points))))
-    return Branch(name, tuple(points), end.status, message, header.attributes)
+    branch = Branch(name, tuple(points), end.status, end.message, header.attributes)
+    message = " ".join(filter(None, (end.message, problem.note(branch.points))))
+    return replace(branch, message=message)
 
 
 def regular(points: Iterable[BranchPoint]) -> int:

@@ -15,6 +15,7 @@ from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     Problem,
 )
+from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
 from fecontact.bifurcation.harmonic.compiled.arrays import TOLERANCE, Equations
@@ -303,8 +304,10 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         return found
 
     def note(self, points: Sequence[BranchPoint]) -> str:
-        """Where multipliers are lost, if they are asked for."""
-        return "" if self.stability is None else super().note(points)
+        """Where multipliers are lost or miss jumps of forces, if they are asked for."""
+        if self.stability is None:
+            return ""
+        return " ".join(filter(None, (super().note(points), missed_jumps(self.field, points))))
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""

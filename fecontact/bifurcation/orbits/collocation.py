@@ -10,6 +10,7 @@ from fecontact.bifurcation.continuation import predictor
 from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.mesh import carry_over, equidistributed, extremes
@@ -189,6 +190,11 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
                 "maximum": high, "state_error": error}
+
+    def note(self, points: Sequence[BranchPoint]) -> str:
+        """Where multipliers are lost, or miss jumps of forces."""
+        missed = missed_jumps(self.field, points) if self.second is None else ""
+        return " ".join(filter(None, (super().note(points), missed)))
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""

@@ -28,8 +28,10 @@ class LinearContact(NormalLaw):
     .. math:: F = \max(0,\ c u + d v), \qquad u > 0
 
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
-    It is the rough surface in the limit R_Z -> 0. With damping the force jumps at first contact;
-    a rough surface has no such jump.
+    It is the rough surface in the limit R_Z -> 0. With damping the force jumps at first contact,
+    and derivatives of the motion with it (saltation; see :func:`fecontact.sensitivity`);
+    multipliers of orbits by collocation and harmonic balance miss that. A rough surface has no
+    such jump.
 
     Parameters
     ----------

@@ -1,0 +1,37 @@
+"""Orbits whose multipliers miss jumps of the normal force at touch-down."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.integrate.field_runs.saltation import jumping_nodes, touch_down_on_jumps
+from fecontact.system.fields.vector_field import VectorField
+
+# Samples of an orbit among which a touch-down is looked for.
+_SAMPLES = 400
+
+
+def missed_jumps(field: VectorField, points: Sequence[BranchPoint]) -> str:
+    """Which orbits of a branch have multipliers without the saltation at touch-downs, if any.
+
+    Multipliers come from Jacobians along the orbit, in which a jump of the force does not show.
+    """
+    if not isinstance(field, ContactField):
+        return ""
+    missed = sum(_touches_down(field, point) for point in points)
+    if not missed:
+        return ""
+    return (f"The multipliers of {missed} of {len(points)} orbits miss jumps of the normal force "
+            f"at touch-down, as of LinearContact with damping, and so do their stability and "
+            f"special points: follow them with method = Shooting().")
+
+
+def _touches_down(field: ContactField, point: BranchPoint) -> bool:
+    system = field.system(point.parameter_values(field))
+    if not jumping_nodes(system).any():
+        return False
+    motion = point.orbit(field, samples=_SAMPLES)
+    return touch_down_on_jumps(system, np.ascontiguousarray(motion.times),
+                               np.ascontiguousarray(motion.states))
