@@ -112,8 +112,8 @@ def sensitivity(
     Runs by collocation (see Rodas5P) solve its derivative at the stages of each step; where the
     normal force jumps at touch-down, as by LinearContact with damping, derivatives jump with it.
     Else the computed steps are differentiated, at fixed step sizes, with second derivatives of laws
-    by finite differences; with more than four modes or two nodes, and no memory, the linear equation
-    of the derivatives is solved along the motion. Both take forces as continuous: jumps are left out.
+    by differences; with more than four modes or two nodes, and no memory, the linear equation
+    of the derivatives is solved along the motion. Both take forces as continuous, without jumps.
 
     With SetValued, forces and velocities jump. Its runs locate the jumps, so that the end of a run
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives

@@ -29,8 +29,8 @@ from fecontact.laws import (
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
 
-from test_friction_laws import every_law  # noqa: E402
-from test_normal_laws import LAWS as NORMAL_LAWS  # noqa: E402
+from test_friction_laws import every_law
+from test_normal_laws import LAWS as NORMAL_LAWS
 
 LONG, STEPS = Rodas5P(collocation="always"), Rodas5P(series="never", collocation="never")
 GRAVITY = 9.81
