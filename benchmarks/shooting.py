@@ -5,9 +5,9 @@
 A run over 50 ms, from the stuck state, and the same with derivatives to start and belt speed, for
 3, 5 and 20 modes. The problems (b), (b2), (c) and (d) of benchmarks/integrator.py, of 1, 2 and 3
 modes and one node, and 20 modes and 40 nodes: with derivatives to the start, and to the start and
-belt speed, at the steps of the run and at those that the derivatives ask for. Runs without
-derivatives are by the same integrator. Then points of the stick-slip branch of 20 modes. CPU time,
-the least of the repetitions.
+belt speed, at the steps of the run and at those that the derivatives ask for. Runs with and
+without derivatives are by the same integrator, small systems by collocation at this tolerance.
+Then points of the stick-slip branch of 20 modes. CPU time, the least of the repetitions.
 """
 
 import sys

@@ -113,11 +113,11 @@ def sensitivity(
 ) -> Sensitivity:
     """Integrate a motion and its derivatives with respect to initial state and a parameter.
 
-    The computed steps themselves are differentiated (discrete sensitivities), at fixed step sizes;
-    second derivatives of laws are found by finite differences, of relative accuracy 1e-8. With more
-    than four modes or two nodes, and no memory, the linear equation of the derivatives is solved
-    along the computed motion instead. Where a node touches down with a force that jumps, as that of
-    :class:`fecontact.laws.LinearContact` with damping, derivatives contain the saltation.
+    Runs by collocation (see Rodas5P) solve its derivative at the stages of each step. Else the
+    computed steps are differentiated, at fixed step sizes, with second derivatives of laws by
+    differences; with more than four modes or two nodes, and no memory, the linear equation of the
+    derivatives is solved along the motion. Where a node touches down with a force that jumps, as
+    that of :class:`fecontact.laws.LinearContact` with damping, derivatives contain the saltation.
 
     With SetValued, forces and velocities jump. Its runs locate the jumps, so that the end of a run
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives
@@ -139,10 +139,10 @@ def sensitivity(
         Relative tolerance of the run.
     derivative_rtol : float, optional
         Tolerance of the derivatives per step, relative to their largest values since the last
-        output time; by default ten times ``rtol`` where steps are differentiated, 200 times
-        along the motion, relative to their current values or a tenth of the largest. 1e-2 saves
-        work that only fast disturbances require. Where steps are differentiated, derivatives of
-        small motions take steps that the run, whose tolerance is then absolute, does not need.
+        output time; by default ten times ``rtol``, 200 times along the motion, relative to their
+        current values or a tenth of the largest. 1e-2 saves work that only fast disturbances
+        require. But along the motion, derivatives of small motions take steps that the run, whose
+        tolerance is then absolute, does not need.
     max_step : float, optional
         Longest step [s]; see :func:`fecontact.simulate`.
 

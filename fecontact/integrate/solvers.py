@@ -92,7 +92,8 @@ class Rodas5P(Solver):
     collocation : 'auto', 'always' or 'never'
         Whether to take steps of order 9 instead, which are longer where little error is allowed: by
         default if ``rtol`` is 1e-7 or less, for plane systems of up to four modes and two nodes
-        on flat ground, of laws without memory, without events. A run by series stays one.
+        on flat ground, of laws without memory, without events; with derivatives or without. A run
+        by series stays one.
     inline_laws : bool
         Whether the laws are written out in steps of Rodas5P instead of called, which takes 0.75 to
         0.85 of the time: for plane systems of up to four modes and two nodes, of laws without

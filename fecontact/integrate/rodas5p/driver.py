@@ -98,8 +98,8 @@ def start(
         where normal forces begin, end or pass the depth of their law, at output times too.
     vary_rtol : float, optional
         Error of one step of the derivatives, relative to the largest they have been. By default
-        ten times ``rtol`` of their size, or of a tenth of the largest; 200 times ``rtol`` where
-        they go over a step in parts, which :func:`in_parts` says.
+        ten times ``rtol`` of their size, or of a tenth of the largest, by collocation too; 200
+        times ``rtol`` where they go over a step in parts, which :func:`in_parts` says.
     events : sequence of ContactEvents, Crossing and Event
         What to watch for.
     series : 'auto', 'always' or 'never'

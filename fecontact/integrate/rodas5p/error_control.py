@@ -11,19 +11,8 @@ from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
 from fecontact.integrate.shared_nodes.tasks import POWERS, SLIP_ERROR, share_at
 from fecontact.integrate.shared_nodes.team import shares
-from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import (
-    ground_motion,
-    in_space,
-    memory_of,
-    moved_across,
-    moved_along,
-    node_motion,
-)
+from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
-
-# Times over which internal variables fade, in a step, after which they are gone.
-_FADED = 100.0
 
 
 @routine
@@ -44,33 +33,6 @@ def state_error(control, progress, room):
         if not abs(room.after[k]) < np.inf:
             error = np.inf
     return error / control.rtol
-
-
-@routine
-def forget_open(step, problem, room):
-    """Let nodes that are open at the end of a step have no memory there; whether any had some.
-
-    It fades within a tiny part of the step, z' = -z / tau, and without force nothing depends on it:
-    its error does not count. A step over lift-off sees this as a rate that begins all at once, and
-    would have to be as short as tau times the tolerance.
-    """
-    s, difference, found = problem.system, room.stages[tableau.STAGES - 1], False
-    m, n = len(problem.control.largest), len(s.gap)
-    states = (len(room.after) - 2 * m) // n
-    moved = ground_motion(min(step.target, step.latest), s)
-    for j in range(n):
-        z, rates = memory_of(j, room.after, s), room.scratch.rates[j]
-        F = node_forces(j, node_motion(j, room.after, s), moved, z, s, room.scratch.force[j],
-                        rates)[0]
-        if F != 0.0:
-            continue
-        for k in range(s.memory[j]):
-            place, fading = 2 * m + j * states + k, rates[k, 3 + k]
-            if (-fading * step.h > _FADED
-                    and abs(rates[k, 0] - fading * z[k]) <= 1e-9 * abs(rates[k, 0])):
-                room.after[place] = difference[place] = 0.0
-                found = True
-    return found
 
 
 @routine

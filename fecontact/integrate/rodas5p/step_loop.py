@@ -10,7 +10,6 @@ from fecontact.integrate.courses import keep_ends, set_courses, set_ends
 from fecontact.integrate.near_nodes import choose_near, extend_near, set_end
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
-    forget_open,
     set_creeps,
     set_scale,
     slip_error,
@@ -206,8 +205,6 @@ def _error_at_end(step, end, problem, progress, room):
     """
     s, control = problem.system, problem.control
     error = state_error(control, progress, room)
-    if error > 1.0 and len(control.memory_scale) > 0 and forget_open(step, problem, room):
-        error = state_error(control, progress, room)
     if error <= 1.0:
         if step.at_break:
             dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.load)

@@ -311,8 +311,6 @@ def propagate(step, problem, progress, room, vary):
             columns.one_by_one(i, step.h, G, s, blocks, gradients, reduced, forced, varies, v)
         else:
             columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
-    if size > 2 * m:
-        columns.forget_open(s, room.gradients_after, v)
     return _largest_error(room.right, v)
 
 

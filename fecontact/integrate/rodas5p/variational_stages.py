@@ -398,22 +398,3 @@ def one_by_one(i, h, G, s, blocks, gradients, reduced, forced, varies, v):
         if i == tableau.STAGES - 1:
             for k in range(size):
                 v.after[c, k] = X[k] + own[i, k]
-
-
-@helper
-def forget_open(s, after, v):
-    """Let the columns have no memory at nodes that are open at the end of a step.
-
-    As the step itself, see :func:`fecontact.integrate.rodas5p.error_control.forget_open`; ``after``
-    are the gradients at its end.
-    """
-    n, states, _ = after.rates.shape
-    m = len(v.none)
-    for j in range(n):
-        force = np.abs(after.partial[j]).max()
-        for k in range(dynamics.friction_length(after)):
-            force = max(force, abs(after.force[j, k]))
-        for k in range(s.memory[j] if force == 0.0 else 0):
-            for c in range(len(v.columns)):
-                v.after[c, 2 * m + j * states + k] = 0.0
-                v.stages[tableau.STAGES * (c + 1) - 1, 2 * m + j * states + k] = 0.0
