@@ -127,7 +127,8 @@ def test_parameters_over_some_steps(name, nodes):
                    normal=RoughSurface(1e6, 1e-5, 40.0), load=Load(60.0))
     state = fc.simulate(system, 0.05, rtol=1e-9).states[-1]
     times, value = [BEGIN, BEGIN + 0.02], system.parameter(name)
-    found = run_over(system, state, times, 1e-10, _moved(system, name)).transitions[-1][:, -1]
+    beside = _moved(system, name, np.array(times), state)
+    found = run_over(system, state, times, 1e-10, beside).transitions[-1][:, -1]
     width = 1e-3 * value
     ends = [run_over(system.with_(**{name: value + part * width}), state, times, 1e-13).states[-1]
             for part in (-2.0, -1.0, 1.0, 2.0)]
@@ -202,8 +203,9 @@ def dashpot_stop(**parts):
 @pytest.mark.parametrize("gap", [0.0, 1e-3])
 def test_a_fall_on_a_dashpot(gap):
     system, height, speed, end = dashpot_stop(gap=gap), 0.05, -0.1, 0.1
-    beside = _moved(system, (lambda one, to: one.with_(gap=to), gap))
-    run = run_over(system, [height - gap, speed], [0.0, end], 1e-10, beside)
+    begin = np.array([height - gap, speed])
+    beside = _moved(system, (lambda one, to: one.with_(gap=to), gap), np.array([0.0, end]), begin)
+    run = run_over(system, begin, [0.0, end], 1e-10, beside)
     state, wanted = fall(height, speed, end)
     assert run.states[-1] == pytest.approx(state - [gap, 0.0], abs=1e-9)
     assert run.transitions[-1] == pytest.approx(wanted, rel=2e-8, abs=1e-7)
@@ -238,7 +240,7 @@ def test_several_impacts_with_a_dashpot(slope):
     along, away = system.arrays.Tx[0], system.arrays.Ty[0]
     begin = np.concatenate([1e-5 * along + 5e-3 * away, 0.01 * along])
     times = np.linspace(0.0, 0.2, 3)
-    beside = _moved(system, (lambda one, to: one.with_(gap=to), gap))
+    beside = _moved(system, (lambda one, to: one.with_(gap=to), gap), times, begin)
     run = run_over(system, begin, times, 1e-10, beside)
     height = run_over(system, begin, np.linspace(0.0, 0.2, 2001), 1e-9).states[:, :2] @ away
     assert (np.diff(np.sign(height + gap)) < 0.0).sum() >= 2
@@ -280,7 +282,7 @@ def test_volumes_shrink_with_the_damping(damping):
 
 def test_runs_go_on_bit_for_bit():
     system, times = friction_oscillator(3), np.linspace(0.0, 0.3, 7)
-    beside = _moved(system, "drive.stiffness_x")
+    beside = _moved(system, "drive.stiffness_x", times, np.zeros(6))
     whole = run_over(system, np.zeros(6), times, 1e-8, beside)
     parts = run_over(system, np.zeros(6), times, 1e-8, beside, pieces=1)
     assert (whole.states == parts.states).all()
@@ -309,6 +311,7 @@ def test_still_derivatives():
         fc.basis_from_matrices([[2.0]], [[0.0]], {"contact": rows[None], "C": rows}),
         normal=PrescribedForce(3.0), friction=ExponentialFriction(0.0, 0.0, 1.0, 1.0),
         ground=Ground(speed=1.0))
-    run = run_over(system, [0.0, 0.1], [0.0, 2.0], 1e-9, _moved(system, "ground.speed"))
+    begin, times = np.array([0.0, 0.1]), np.array([0.0, 2.0])
+    run = run_over(system, begin, times, 1e-9, _moved(system, "ground.speed", times, begin))
     assert run.transitions[-1] == pytest.approx(np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 0.0]]),
                                                 abs=1e-12)
