@@ -166,7 +166,8 @@ def test_parameters(name, friction):
     value, scale, count = system.parameter(name), scales_of(system), 0
     for state in states_of(system, (0.05, -0.004), (3e-5, 6e-5)):
         h = 0.2 / np.abs(np.linalg.eigvals(system.jacobian(BEGIN, state))).max()
-        found = one_step(system, state, h, _moved(system, name, np.array([BEGIN, BEGIN + h]), state))
+        beside = _moved(system, name, np.array([BEGIN, BEGIN + h]), state)
+        found = one_step(system, state, h, beside)
         ends = [one_step(system.with_(**{name: value * (1.0 + part)}), state, h)
                 for part in (-2e-3, -1e-3, 1e-3, 2e-3)]
         if found is None or any(end is None for end in ends):
