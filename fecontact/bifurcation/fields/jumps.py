@@ -18,7 +18,10 @@ def missed_jumps(field: VectorField, points: Sequence[BranchPoint]) -> str:
 
     Multipliers come from Jacobians along the orbit, in which a jump of the force does not show.
     """
-    if not isinstance(field, ContactField):
+    if not isinstance(field, ContactField) or not points:
+        return ""
+    # A law that jumps along a branch, as its dashpot grows from zero, jumps at one of its ends.
+    if not any(_jumps(field, point) for point in (points[0], points[-1])):
         return ""
     missed = sum(_touches_down(field, point) for point in points)
     if not missed:
@@ -28,10 +31,12 @@ def missed_jumps(field: VectorField, points: Sequence[BranchPoint]) -> str:
             f"special points: follow them with method = Shooting().")
 
 
+def _jumps(field: ContactField, point: BranchPoint) -> bool:
+    return bool(jumping_nodes(field.system(point.parameter_values(field))).any())
+
+
 def _touches_down(field: ContactField, point: BranchPoint) -> bool:
     system = field.system(point.parameter_values(field))
-    if not jumping_nodes(system).any():
-        return False
     motion = point.orbit(field, samples=_SAMPLES)
     return touch_down_on_jumps(system, np.ascontiguousarray(motion.times),
                                np.ascontiguousarray(motion.states))
