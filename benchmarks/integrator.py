@@ -9,8 +9,8 @@ Errors are relative to a reference that is kept in the temporary directory; it i
 package's integrator at rtol = 1e-12, and its distance from LSODA at rtol = 1e-12 is printed. All
 solvers run in this process on one thread, in turns, with the same compiled right-hand side and
 Jacobian; times are those of the processor, medians. A solver that has taken twelve seconds for a
-problem is not followed to smaller tolerances, but with --tight. numbalsoda and scikit-sundae take part where they can
-be imported.
+problem is not followed to smaller tolerances, but with --tight. numbalsoda and scikit-sundae take
+part where they can be imported.
 """
 
 import hashlib
