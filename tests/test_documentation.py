@@ -148,7 +148,7 @@ def check_orbits(names, printed, folder):
     assert "period doubling 8.0921923" in printed
     assert (folder / "diagram.png").stat().st_size > 10000
     counts = [len(point.values["mesh"]) - 1 for point in names["exact"].points]
-    assert min(counts) == 40
+    assert min(counts) == 20
     assert 150 <= max(counts) <= 250
     assert names["exact"].column("state_error").max() <= 1e-8
     second = names["doubled"].of_kind("period doubling")[0]
