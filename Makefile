@@ -11,7 +11,7 @@ SYSTEM := $(VENV)/.system-libraries
 # What the tables of README and docs are made of: scripts, and their arguments after plus signs.
 BENCHMARKS := integrator+a+b+b2+c+d integrator+a+b+c+--tight integrator+--inline-laws many_contacts shooting \
   continuation harmonic ensemble nonsmooth bodies solids contact_kernels laws sweep output \
-  eigen eigen+--solids reduction+1 reduction+--solid
+  eigen eigen+--solids+cube eigen+--solids+150000+plate reduction+1 reduction+--solid
 
 # Tests start many processes, and pytest rewrites their files: what Python keeps of this saves time.
 export PYTHONDONTWRITEBYTECODE :=

@@ -32,6 +32,7 @@ from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve, orbit_curve
 from fecontact.bifurcation.orbits.curves.errors import with_errors
 from fecontact.core.checks import require_flags, require_kind
 from fecontact.core.errors import InputError, require_finite, shown
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField, require_field
 
@@ -45,6 +46,7 @@ _BESIDE = 4e-4
 _ON_BOUND = 1e-9
 
 
+@one_blas_thread
 def codim2_curve(
     field: VectorField, point: BranchPoint, parameter: str, *,
     options: ContinuationOptions | None = None,

@@ -18,6 +18,7 @@ from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.same_orbit import VANISHING
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError, require_finite
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.trajectory import Trajectory
@@ -84,6 +85,7 @@ def _beyond(multipliers: ComplexArray, distance: float) -> int:
     return int(np.count_nonzero(np.abs(_others(multipliers)) > 1.0 + distance))
 
 
+@one_blas_thread
 def orbit_family(
     field: VectorField,
     start: HopfPoint | PeriodicMotion | Trajectory | FieldRun | tuple[ArrayLike, ArrayLike],

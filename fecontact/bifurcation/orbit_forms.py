@@ -14,6 +14,7 @@ from fecontact.bifurcation.orbits.normal_forms import examined, verdict
 from fecontact.bifurcation.orbits.starts import corrected_samples, from_samples
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Samples of the orbit, degree of the polynomials, doublings of the intervals, and the change of the
@@ -21,6 +22,7 @@ from fecontact.system.fields.vector_field import VectorField, require_field
 _SAMPLES, _DEGREE, _DOUBLINGS, _CONVERGED = 4001, 4, 4, 1e-3
 
 
+@one_blas_thread
 def with_normal_form(
     field: VectorField, point: BranchPoint, intervals: int = 100
 ) -> BranchPoint:

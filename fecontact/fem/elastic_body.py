@@ -16,7 +16,7 @@ from fecontact.core.errors import (
     require_finite,
     require_positive,
 )
-from fecontact.core.memory import require_memory
+from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.fem.assembly import assembled

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fecontact.core import system_libraries
 from fecontact.core.errors import InputError, MissingLibraryError
-from fecontact.core.memory import available_memory
+from fecontact.core.resources.memory import available_memory
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.shapes import Beam, Block, Grid, Hole, Pendulum, Shape, grid_of, nearest_line
 from fecontact.fem.solids.generate import generate_solid

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from fecontact.core.checks import as_count, as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
-from fecontact.core.memory import require_memory
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.resources.blas_threads import one_blas_thread
+from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.events import AnyEvent, Events, as_events
@@ -225,7 +226,7 @@ def ensemble(
                     done[0] += 1
 
     threads = min(workers or os.cpu_count() or 1, -(-count // chain))
-    with (shown(progress, lambda: progress_bar("Running", count)) as tell,
+    with (shown(progress, lambda: progress_bar("Running", count)) as tell, one_blas_thread,
           ThreadPoolExecutor(threads) as pool):
         pending = {pool.submit(one.work, threads, lambda: not leave[0])
                    for one in together for _ in range(threads)}

@@ -9,6 +9,7 @@ from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import as_floats, is_numeric, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.fem.faces.frames import turned
 from fecontact.integrate.trajectory import Trajectory
@@ -96,6 +97,7 @@ Initial = TypeAliasType("Initial", Literal["rest", "sliding"] | RigidStart | Poi
                         | Trajectory | LoadHistory | RestState | Array)
 
 
+@one_blas_thread
 def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array:
     """State y = [q, q', z] (2 m + n s,) for the start of a run.
 

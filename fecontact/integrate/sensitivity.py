@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.collocation.room import chosen_collocation
 from fecontact.integrate.ensemble import Ensemble, ensemble
@@ -170,6 +171,7 @@ def sensitivity(
     return found
 
 
+@one_blas_thread
 def differentiated(
     system: ContactSystem, times: Array, state: Array, parameter: Parameter | None, solver: Solver,
     rtol: float, derivative_rtol: float | None = None, max_step: float | None = None,

@@ -11,8 +11,9 @@ import numpy as np
 
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.errors import shown as text_of
-from fecontact.core.memory import require_memory
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.resources.blas_threads import one_blas_thread
+from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.events import AnyEvent, ContactEvents, Event, as_events
 from fecontact.integrate.field_runs.field_run import FieldRun, field_state, run_field
@@ -138,7 +139,8 @@ def simulate(
     if not isinstance(initial, str | Trajectory | LoadHistory | RestState):
         _warn_of_depth(system, state, t_start)
     m = system.basis.modes
-    with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:
+    with (shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell,
+          one_blas_thread):
         found = solver.run(Task(system, state, times, float(rtol), max_step, watched, tell))
     _require_finite_events(watched, system, found)
     states = found.states
@@ -178,6 +180,7 @@ def _require_finite_events(
                                  f"for every state.")
 
 
+@one_blas_thread
 def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
     """Status of a completed run after a check of its energies at some output times."""
     some = np.unique(np.linspace(0, len(run.time) - 1, min(len(run.time), _LOOKS)).astype(int))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError
-from fecontact.core.memory import require_memory, shown_count
+from fecontact.core.resources.memory import require_memory, shown_count
 from fecontact.core.types import Array
 from fecontact.study.sweep_section import Axis, Distribution, Span, SweepSettings
 

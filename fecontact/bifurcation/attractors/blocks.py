@@ -31,6 +31,7 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.files.atomic_write import clear_leftovers, output_folder, replaced, write_text
 from fecontact.core.files.locks import locked
 from fecontact.core.files.stored import DamagedError, from_json, npz_arrays, reading
+from fecontact.core.resources.blas_threads import one_blas_thread
 
 Found = dict[str, NDArray[Any]]
 _ABOUT = "blocks.json"
@@ -188,7 +189,7 @@ def _compute(
 
         return blocks[number].found(count)
 
-    with ThreadPoolExecutor(place.workers or cpu_count()) as pool:
+    with one_blas_thread, ThreadPoolExecutor(place.workers or cpu_count()) as pool:
         pending = {pool.submit(run, number): number for number in numbers}
         try:
             while pending:

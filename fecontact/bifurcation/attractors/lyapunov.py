@@ -18,6 +18,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.field_runs.saltation import joined, passages, with_passages
@@ -124,7 +125,8 @@ def lyapunov_exponents(
     if as_count(count, "count") > size:
         raise InputError(f"count = {count} must be a whole number from 1 to {size}.")
     state, time = start_state(moving, initial, 0.0), float(transient)
-    with shown(progress, lambda: progress_bar("Lyapunov exponents", time + duration)) as tell:
+    with (shown(progress, lambda: progress_bar("Lyapunov exponents", time + duration)) as tell,
+          one_blas_thread):
         if transient > 0.0:
             run = start_any(moving, state, np.array([0.0, transient]), rtol=rtol)
             _reach_end(finish(run, tell), run.time)

@@ -26,12 +26,14 @@ from fecontact.bifurcation.equilibria.equilibrium import (
 from fecontact.bifurcation.equilibria.problem import EquilibriumProblem, equilibrium_at
 from fecontact.core.checks import require_flags
 from fecontact.core.errors import InputError, require_finite
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 _GROWTH = 1e4
 
 
+@one_blas_thread
 def equilibrium_branch(
     field: VectorField,
     start: Equilibrium | BranchPoint | ArrayLike | None = None,

@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -142,6 +143,7 @@ def unstable_count(eigenvalues: ComplexArray) -> Integers:
     return np.asarray((eigenvalues.real > least).sum(axis=-1))
 
 
+@one_blas_thread
 def find_equilibrium(
     field: VectorField,
     parameters: Mapping[str, float] | None = None,

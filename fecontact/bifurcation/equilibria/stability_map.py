@@ -15,6 +15,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.core.units import Summarised, span
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -67,6 +68,7 @@ class StabilityMap(Summarised):
         return np.asarray(np.abs(self.critical.imag) / (2.0 * np.pi))
 
 
+@one_blas_thread
 def stability_map(
     field: VectorField, grid: Mapping[str, ArrayLike], *,
     start: Equilibrium | ArrayLike | None = None,

@@ -31,6 +31,7 @@ from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
@@ -116,6 +117,7 @@ class FrequencyResponse(Summarised):
                 ("special", listed(special, 5)), ("ends", ", ".join(ends))]
 
 
+@one_blas_thread
 def frequency_response(
     system: ContactSystem | VectorField, bounds: tuple[float, float],
     parameter: str | None = None, *, levels: Mapping[str, ArrayLike] | None = None,

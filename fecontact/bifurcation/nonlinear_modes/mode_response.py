@@ -11,6 +11,7 @@ from fecontact.bifurcation.nonlinear_modes.given_force import given_force, requi
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.system.contact_system import ContactSystem
@@ -108,6 +109,7 @@ class ModeResponse(Summarised):
                 ("resonances", listed(found, 6))]
 
 
+@one_blas_thread
 def mode_response(
     mode: NonlinearMode, system: ContactSystem, *,
     levels: Mapping[str, ArrayLike] | None = None, frequency: str = "drive.angular_frequency",

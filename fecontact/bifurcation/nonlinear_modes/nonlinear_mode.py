@@ -32,6 +32,7 @@ from fecontact.bifurcation.nonlinear_modes.mode_problem import PERIOD_SCALE, Mod
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
@@ -181,6 +182,7 @@ class NonlinearMode(Summarised):
             ("end", self.branch.status.name.lower())]
 
 
+@one_blas_thread
 def nonlinear_mode(
     system: ContactSystem, bounds: tuple[float, float], mode: int = 1, *,
     observe: tuple[str | int, str] = ("B", "x"), method: HarmonicBalance | None = None,

@@ -25,6 +25,7 @@ from fecontact.bifurcation.harmonic.response import (
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.contact_system import ContactSystem
@@ -109,6 +110,7 @@ class ResonanceCurve(Summarised):
                 ("end", self.branch.status.name.lower())]
 
 
+@one_blas_thread
 def resonance_curve(
     system: ContactSystem | VectorField, bounds: tuple[float, float], parameter: str,
     frequencies: tuple[float, float], *, frequency: str = "drive.angular_frequency",

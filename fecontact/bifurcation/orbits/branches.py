@@ -36,6 +36,7 @@ from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.checks import require_flags, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.trajectory import Trajectory
@@ -51,6 +52,7 @@ _STRONG = {"resonance 1:3": 3, "resonance 1:4": 4}
 T = TypeVar("T")
 
 
+@one_blas_thread
 def orbit_branch(
     field: VectorField,
     start: BranchPoint | PeriodicMotion | Trajectory | FieldRun | tuple[ArrayLike, ArrayLike],

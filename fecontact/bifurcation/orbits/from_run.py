@@ -7,6 +7,7 @@ import numpy as np
 from fecontact.analysis.periodicity import count_periods
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import AnalysisError, InputError, require_not_negative
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.initial_state import Initial
@@ -24,6 +25,7 @@ _TRANSIENT_PERIODS, _LARGEST = 200, 16
 _MISFIT = 1e-2
 
 
+@one_blas_thread
 def periodic_motion(
     system: Moving, *, initial: Initial | FieldRun = "rest", transient: float | None = None,
     longest_period: float | None = None, solver: Solver = RODAS5P, rtol: float = 1e-8,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from fecontact.core.errors import InputError
-from fecontact.core.memory import available_memory
+from fecontact.core.resources.memory import available_memory
 from fecontact.core.types import Array
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.solids.shapes import (

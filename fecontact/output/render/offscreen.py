@@ -9,7 +9,7 @@ from functools import cache
 
 from fecontact.core import system_libraries
 from fecontact.core.errors import InputError, MissingLibraryError
-from fecontact.core.memory import available_memory, shown_memory
+from fecontact.core.resources.memory import available_memory, shown_memory
 
 _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
 _BYTES = 60  # per rendered pixel: window, depth, copies, their mean

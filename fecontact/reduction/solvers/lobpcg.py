@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh, solve_triangular
 
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 
 Product = Callable[[Array], Array]
@@ -48,6 +49,7 @@ class Found:
     steps: int
 
 
+@one_blas_thread
 def lowest_modes(
     stiffness: Product, mass: Product, precondition: Product, start: Array, count: int,
     rigid: Array, tolerance: float, noise: Array, most: int = 60,

@@ -5,6 +5,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, require_finite
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
@@ -89,6 +90,7 @@ def static_equilibrium(
     return q
 
 
+@one_blas_thread
 def equilibrium(
     system: ContactSystem, friction: bool, time: float, *, standing: bool = False
 ) -> Array:
@@ -152,6 +154,7 @@ def at_rest(
         second_motion_parameters=np.array([second_travel], dtype=float)))
 
 
+@one_blas_thread
 def resting(
     system: ContactSystem, arrays: SystemArrays, load: Array, motion: Array, travel: Array
 ) -> tuple[Balance, Array]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
+from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.core.units import count
 from fecontact.system import kernels
@@ -138,6 +139,7 @@ def _loaded(
     return history
 
 
+@one_blas_thread
 def _marched(
     arrays: SystemArrays, given: Array, pose: Pose, sliders: Sliders, scale: Array, rtol: float
 ) -> tuple[int, Kept]:
