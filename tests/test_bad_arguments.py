@@ -14,7 +14,7 @@ from systems import friction_oscillator
 import fecontact
 from fecontact import ElasticBody, FecontactError, InputError, modal_basis
 from fecontact.bifurcation import Branch, BranchPoint
-from fecontact.core import memory
+from fecontact.core.resources import memory
 
 CALLS = """
 Beam(None)
