@@ -18,7 +18,6 @@ ROOMS = ("core", "fem", "laws", "reduction", "system", "integrate", "analysis", 
 STRANGERS = {("laws", "fem"), ("study", "output")}
 # Modules that hold nothing but public names under which people look for them.
 NAMESPACES = {"plot", "io"}
-LARGEST, MOST_FILES = 450, 16
 
 MODULES = {
     ".".join(("fecontact", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
@@ -92,14 +91,3 @@ def test_imports_are_absolute_and_found_by_this_test():
                 if isinstance(node, ast.ImportFrom) and node.level]
     assert not relative
     assert sum(map(len, arrows().values())) > 800
-
-
-def test_modules_and_folders_are_of_a_size_to_be_read():
-    long = {module: lines for module, path in MODULES.items()
-            if (lines := len(path.read_text(encoding="utf-8").splitlines())) > LARGEST}
-    assert not long
-    full = {str(folder.relative_to(PACKAGE)): count
-            for folder in {path.parent for path in MODULES.values()}
-            if (count := sum(path.name != "__init__.py" for path in folder.glob("*.py")))
-            > MOST_FILES}
-    assert not full
