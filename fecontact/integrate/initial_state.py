@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from typing_extensions import TypeAliasType
@@ -56,6 +56,12 @@ class RigidStart:
             object.__setattr__(self, name, tuple(values.tolist()))
 
 
+PointMotion = tuple[float | None, ...] | Mapping[str, float]
+
+_COUNTS = {2: ("x", "y"), 6: ("x", "y", "z", "phi_x", "phi_y", "phi_z")}
+_NAMES = ("x", "y", "z", "phi", "phi_x", "phi_y", "phi_z")
+
+
 @dataclass(frozen=True)
 class PointStart:
     """Initial displacements and velocities of points, in physical coordinates.
@@ -66,31 +72,70 @@ class PointStart:
 
     Parameters
     ----------
-    displacements : mapping of point to (x, y)
-        Points by name, as ``body.point`` of several bodies, or contact nodes by number [m]. None
-        for a component that is not prescribed.
-    velocities : mapping of point to (x, y)
-        Likewise [m/s].
+    displacements : mapping of point to motion
+        Points by name, as ``body.point`` of several bodies, or contact nodes by number. A motion is
+        ``(x, y)`` or ``(x, y, phi)`` of a point of a plane body, ``(x, y, z)`` or ``(x, y, z,
+        phi_x, phi_y, phi_z)`` of a solid [m, rad], with None for a component that is not
+        prescribed; or a table of the prescribed components, ``{"y": 1e-3, "phi": 0.01}``.
+        Components of contact nodes are those of their frames: along tangents and normal.
+    velocities : mapping of point to motion
+        Likewise [m/s, rad/s].
 
     Raises
     ------
     InputError
-        If values are not two numbers or None.
+        If values are not finite numbers or None, or components are unknown.
     """
 
-    displacements: Mapping[str | int, tuple[float | None, float | None]] = field(
-        default_factory=dict)
-    velocities: Mapping[str | int, tuple[float | None, float | None]] = field(default_factory=dict)
+    displacements: Mapping[str | int, PointMotion] = field(default_factory=dict)
+    velocities: Mapping[str | int, PointMotion] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("displacements", "velocities"):
             require_kind("PointStart", Mapping, **{name: getattr(self, name)})
-            for point, given in getattr(self, name).items():
-                known = [value for value in given if value is not None] if isinstance(
-                    given, list | tuple) and len(given) == 2 else [np.nan]
-                if not is_numeric(known) or not np.isfinite(as_floats(known, name)).all():
-                    raise InputError(f"PointStart: {name} of {point!r} = {shown(given)} must be "
-                                     f"two finite numbers (x, y), or None for one of them.")
+            object.__setattr__(self, name, {
+                int(point) if isinstance(point, str) and point.isdecimal() else point:
+                _point_motion(motion, f"PointStart: {name} of {point!r}")
+                for point, motion in getattr(self, name).items()})
+
+    def require_writable(self, where: str) -> None:
+        """Raise :class:`InputError` unless study files, which have no None, can hold it."""
+        for name in ("displacements", "velocities"):
+            for point, motion in getattr(self, name).items():
+                if not isinstance(motion, Mapping) and None in motion:
+                    raise InputError(f"{where}: {name} of {point!r} = {motion} holds None, which a "
+                                     f"study file cannot; name the components that are prescribed "
+                                     f"in a table such as {{x = 1e-3}}.")
+
+
+def _point_motion(given: Any, where: str) -> PointMotion:
+    """A motion of a point; a table of components where some of a list are None.
+
+    Which component the third of three is depends on the body: such lists stay as they are.
+    """
+    if isinstance(given, Mapping):
+        if unknown := [name for name in given if name not in _NAMES]:
+            raise InputError(f"{where}: the component {unknown[0]!r} must be one of "
+                             f"{choices(_NAMES)}.")
+        values = list(given.values())
+    else:
+        values = list(given) if isinstance(given, list | tuple) else []
+        if len(values) not in (2, 3, 6):
+            values = [np.nan]
+    known = [value for value in values if value is not None]
+    if known and (not is_numeric(known) or not np.isfinite(as_floats(known, where)).all()):
+        raise InputError(f"{where} = {shown(given)} must be two, three or six finite numbers (x, "
+                         f"y, then phi in the plane, z, phi_x, phi_y, phi_z in space), None for "
+                         f"those that are not prescribed, or a table such as {{x = 1e-3}}.")
+    if isinstance(given, Mapping):
+        return {str(name): float(value) for name, value in given.items() if value is not None}
+    if None not in values:
+        return tuple(float(value) for value in values)
+    names = _COUNTS.get(len(values)) or (_COUNTS[2] if values[2] is None else ())
+    if not names:
+        return tuple(None if value is None else float(value) for value in values)
+    return {name: float(value) for name, value in zip(names, values, strict=False)
+            if value is not None}
 
 
 Initial = TypeAliasType("Initial", Literal["rest", "sliding"] | RigidStart | PointStart
@@ -180,20 +225,39 @@ def _rest_under_friction(
     return np.concatenate([q, np.zeros(len(q)), memory.reshape(-1)])
 
 
-def _of_points(
-    basis: ModalBasis, given: Mapping[str | int, tuple[float | None, float | None]], what: str
-) -> Array:
+def _of_points(basis: ModalBasis, given: Mapping[str | int, PointMotion], what: str) -> Array:
     """Modal coordinates (m,) of least norm with given motions of points."""
-    found = [(basis.T[basis.point_index(point), axis], value) for point, values in given.items()
-             for axis, value in enumerate(values) if value is not None]
+    found = [(basis.point_row(point, component), value) for point, motion in given.items()
+             for component, value in _components(basis, point, motion, what)]
     if not found:
         return np.zeros(basis.modes)
     rows, values = np.array([row for row, _ in found]), np.array([value for _, value in found])
+    # Displacements [m] and rotations [rad] count by their own sizes.
+    sizes = np.linalg.norm(rows, axis=1)
+    sizes[sizes == 0.0] = 1.0
+    rows, values = rows / sizes[:, None], values / sizes
     q = np.asarray(np.linalg.lstsq(rows, values, rcond=None)[0])
     if np.abs(rows @ q - values).max() > 1e-9 * np.abs(values).max():
         raise InputError(f"PointStart: {what} = {shown(dict(given))} are not a motion that the "
                          f"modes can make; leave out what they hold, or keep more modes.")
     return q
+
+
+def _components(
+    basis: ModalBasis, point: str | int, motion: PointMotion, what: str,
+) -> list[tuple[str, float]]:
+    """Names and values of the prescribed components of a point."""
+    names = basis.components
+    if isinstance(motion, Mapping):
+        if unknown := [name for name in motion if name not in names]:
+            raise InputError(f"PointStart: {what} of {point!r}: the component {unknown[0]!r} must "
+                             f"be one of {choices(names)}.")
+        return list(motion.items())
+    if (len(motion) == 2 and basis.dimension == 3) or len(motion) > len(names):
+        allowed = "two or three numbers" if basis.dimension == 2 else "three or six numbers"
+        raise InputError(f"PointStart: {what} of {point!r} = {motion} must be {allowed}, "
+                         f"{', '.join(names)}.")
+    return [(name, value) for name, value in zip(names, motion, strict=False) if value is not None]
 
 
 def _rigid(basis: ModalBasis, motion: RigidMotion, what: str) -> Array:

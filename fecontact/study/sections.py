@@ -20,7 +20,7 @@ from fecontact.fem.elastic_body import ElasticBody, Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
-from fecontact.integrate.initial_state import RigidStart
+from fecontact.integrate.initial_state import PointStart, RigidStart
 from fecontact.integrate.solvers import Solver, solver_by_name
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
@@ -239,10 +239,11 @@ class SimulationSettings:
         contact node and store them with the run.
     stop : list of str
         Events that end the run when they first occur: 'touch-down', 'lift-off', 'stick', 'slip'.
-    initial : 'rest', 'sliding', 'preload' or RigidStart
+    initial : 'rest', 'sliding', 'preload', RigidStart or PointStart
         Initial state; 'preload' for the end of the path of loads of ``[preload]``;
         ``{displacement = [x, y, phi], velocity = [x, y, phi]}`` for a rigid-body motion, of solids
-        ``[x, y, z, phi_x, phi_y, phi_z]``.
+        ``[x, y, z, phi_x, phi_y, phi_z]``; ``{displacements = {B = {y = 1e-3}}, velocities =
+        {B = [0.1, 0.0]}}`` for motions of points, of all with these values the one of least mass.
     """
 
     t_end: Annotated[float | None, Unit("s")] = None
@@ -262,7 +263,7 @@ class SimulationSettings:
     workers: int | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
-    initial: Literal["rest", "sliding", "preload"] | RigidStart = "rest"
+    initial: Literal["rest", "sliding", "preload"] | RigidStart | PointStart = "rest"
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.t_start):
@@ -273,6 +274,8 @@ class SimulationSettings:
         if self.outputs < 2:
             raise InputError(f"SimulationSettings: outputs = {self.outputs} must be at least 2.")
         require_positive("SimulationSettings", rtol=self.rtol)
+        if isinstance(self.initial, PointStart):
+            self.initial.require_writable("SimulationSettings: initial")
         if self.max_step is not None:
             require_positive("SimulationSettings", max_step=self.max_step)
         with located("SimulationSettings:", "SetValued", "Rodas5P"):
