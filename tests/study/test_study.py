@@ -288,7 +288,7 @@ MISTAKES = [
     ({"basis.damping.mass_facto": 1}, r"cannot be set, because basis\.damping = 0\.01 is not a"),
     ({"basis.points.tip": [9, 9]}, r"\[basis\]: Point tip: \(9, 9\) lies outside the body"),
     ({"simulation.initial": "rst"},
-     r'initial = "rst" must be "rest", "sliding", "preload" or a table of'),
+     r'initial = "rst" must be "rest", "sliding", "preload", a table of'),
     ({"simulation.initial": {"displacement": [0, 1]}},
      r"\[simulation\.initial\]: displacement = \[0, 1\] must be a list of three numbers"),
     ({"simulation.outputs": 3.5}, r"\[simulation\]: outputs = 3\.5 must be a whole number"),
