@@ -5,13 +5,14 @@ import re
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from fecontact.core.progress import PATIENCE
+from fecontact.core import progress
 
 INTERRUPTED = 130  # exit code after Ctrl-C
 _ENDING = ("SIGTERM", "SIGHUP")
@@ -20,14 +21,18 @@ _ended_by: list[int] = []  # first signal received
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """Show a spinner on a terminal, after two seconds, for work of unknown duration."""
-    if not sys.stderr.isatty():
-        yield
+    """Show a spinner on a terminal, after two seconds, for work of unknown duration.
+
+    Without a terminal, a line is printed on stderr every 30 seconds.
+    """
+    if not progress.on_terminal():
+        with _lines(what):
+            yield
         return
     from rich.console import Console
 
     status = Console(stderr=True).status(f"{what} ...")
-    timer = threading.Timer(PATIENCE, status.start)
+    timer = threading.Timer(progress.PATIENCE, status.start)
     timer.daemon = True
     timer.start()
     try:
@@ -36,6 +41,24 @@ def waiting(what: str) -> Iterator[None]:
         timer.cancel()
         timer.join()
         status.stop()
+
+
+@contextmanager
+def _lines(what: str) -> Iterator[None]:
+    """Print a line every 30 seconds from another thread."""
+    ended, begin = threading.Event(), time.perf_counter()
+
+    def show() -> None:
+        while not ended.wait(progress.LINES):
+            progress.line(f"{what} ... {progress.clock(time.perf_counter() - begin)}")
+
+    thread = threading.Thread(target=show, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Progress bars on a terminal or in a notebook, and interruption by Ctrl-C.
+"""Progress bars on a terminal or in a notebook, lines elsewhere, and interruption by Ctrl-C.
 
 Public functions take ``progress``: True for a progress bar, or a callback. Internal functions take
 the callback alone and draw nothing.
@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from html import escape
 from importlib import import_module
 from typing import Any, Protocol
@@ -17,7 +17,8 @@ from typing import Any, Protocol
 from fecontact.core.errors import InputError
 
 PATIENCE = 2.0  # shorter computations show no bar [s]
-_PAUSE = 0.1  # between two updates [s]
+_PAUSE = 0.1  # between two updates of a bar [s]
+LINES = 30.0  # between two lines of output that is not interactive [s]
 
 
 class Show(Protocol):
@@ -32,6 +33,11 @@ class Show(Protocol):
 
 class _Bar(Protocol):
     """Surface that a bar is drawn on."""
+
+    @staticmethod
+    def pause() -> float:
+        """Least time between two drawings [s]."""
+        ...
 
     def draw(self, what: str, part: float, note: str) -> None: ...
 
@@ -87,12 +93,13 @@ def counting_bar(what: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def titled_bar() -> Iterator[Show]:
-    """Progress bar with changing titles, on a terminal or in a notebook, if there is one.
+    """Progress bar with changing titles.
 
-    It appears after two seconds and is removed at the end.
+    On a terminal or in a notebook it appears after two seconds and is removed at the end.
+    Elsewhere, as in a batch job or a log, a line is printed on stderr every 30 seconds.
     """
-    kind = _kind()
     bar: _Bar | None = None
+    kind = _kind() or _Lines
     begin = latest = since = time.perf_counter()
     title, first = "", 0.0
 
@@ -101,7 +108,7 @@ def titled_bar() -> Iterator[Show]:
         now = time.perf_counter()
         if what != title:
             title, since, first = what, now, part
-        if kind is not None and now - begin > PATIENCE and now - latest > _PAUSE:
+        if kind is not None and now - begin > PATIENCE and now - latest > kind.pause():
             latest, bar = now, bar or kind()
             bar.draw(what, part, note or _left(part, first, now - since))
 
@@ -112,10 +119,10 @@ def titled_bar() -> Iterator[Show]:
             bar.clear()
 
 
-def say(line: str) -> None:
+def say(text: str) -> None:
     """Print a line on stderr, where a bar would be drawn: on a terminal or in a notebook."""
     if _kind() is not None:
-        print(line, file=sys.stderr, flush=True)
+        line(text)
 
 
 def clock(seconds: float) -> str:
@@ -130,16 +137,26 @@ def _left(part: float, first: float, passed: float) -> str:
     return f"{clock(passed * (1.0 - part) / (part - first))} left" if part > first else ""
 
 
-def _kind() -> Callable[[], _Bar] | None:
+def _kind() -> type[_Bar] | None:
     """Class of the bar for the output of this process; None if it is not interactive."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     if getattr(shell, "kernel", None) is not None:
         return _NotebookBar
-    return _TerminalBar if sys.stderr is not None and sys.stderr.isatty() else None
+    return _TerminalBar if on_terminal() else None
+
+
+def on_terminal() -> bool:
+    """True if stderr is a terminal; False also where it is closed."""
+    return sys.stderr is not None and not sys.stderr.closed and sys.stderr.isatty()
 
 
 class _TerminalBar:
     """A line of a terminal, on stderr."""
+
+    @staticmethod
+    def pause() -> float:
+        """Least time between two drawings [s]."""
+        return _PAUSE
 
     def __init__(self) -> None:
         from rich.console import Console
@@ -160,11 +177,38 @@ class _TerminalBar:
         self._bar.stop()
 
 
+class _Lines:
+    """Lines on stderr, for batch jobs and logs."""
+
+    @staticmethod
+    def pause() -> float:
+        """Least time between two lines [s]."""
+        return LINES
+
+    def draw(self, what: str, part: float, note: str) -> None:
+        line(f"{what}: {100.0 * min(max(part, 0.0), 1.0):.0f} %" + f", {note}" * bool(note))
+
+    def clear(self) -> None:
+        """Lines stay."""
+
+
+def line(text: str) -> None:
+    """Print a line on stderr; without effect if stderr is closed."""
+    with suppress(OSError, ValueError):
+        if sys.stderr is not None:
+            print(text, file=sys.stderr, flush=True)
+
+
 class _NotebookBar:
     """An output of a notebook cell, in HTML and as text.
 
     The bars of rich need ipywidgets in a notebook; this one needs only IPython.
     """
+
+    @staticmethod
+    def pause() -> float:
+        """Least time between two drawings [s]."""
+        return _PAUSE
 
     def __init__(self) -> None:
         self._handle: Any = None

@@ -1,8 +1,9 @@
-"""Progress bars on terminals, in notebooks, and nowhere else."""
+"""Progress bars on terminals and in notebooks, and lines elsewhere."""
 
 import io
 import re
 import sys
+import time
 from contextlib import redirect_stderr
 from types import ModuleType, SimpleNamespace
 
@@ -17,6 +18,7 @@ from fecontact.bifurcation import (
     lyapunov_exponents,
     stability_map,
 )
+from fecontact.cli.console import waiting
 from fecontact.core import progress
 
 
@@ -171,3 +173,37 @@ def test_the_bar_goes_when_the_work_fails(notebook):
     with pytest.raises(ZeroDivisionError):
         fail(1, 4)
     assert [shapes["text/plain"] for shapes in notebook.outputs[0]] == ["Drawing 25 %", ""]
+
+
+def test_without_a_terminal_a_line_is_printed_now_and_then(monkeypatch, capsys):
+    clock = iter([100.0, 110.0, 129.0, 131.0, 140.0, 170.0]).__next__
+    monkeypatch.setattr(progress.time, "perf_counter", clock)
+    monkeypatch.setattr(progress, "PATIENCE", 2.0)
+    with progress.titled_bar() as show:
+        show("Running", 0.1)
+        show("Running", 0.2)
+        show("Running", 0.25)
+        show("Running", 0.4)
+        show("Sweeping 4/8", 0.5, "2 failed")
+    assert capsys.readouterr().err.splitlines() == [
+        "Running: 25 %, 1:45 left", "Sweeping 4/8: 50 %, 2 failed"]
+
+
+def test_work_of_unknown_length_prints_lines_without_a_terminal(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "LINES", 0.01)
+    with waiting("Computing modes"):
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines
+    assert all(re.fullmatch(r"Computing modes \.\.\. 0:00", line) for line in lines)
+
+
+def test_closed_standard_error_stops_no_work(monkeypatch):
+    closed = io.StringIO()
+    closed.close()
+    monkeypatch.setattr(progress, "LINES", -1.0)
+    monkeypatch.setattr(progress, "PATIENCE", -1.0)
+    for stream in (None, closed):
+        monkeypatch.setattr(sys, "stderr", stream)
+        with progress.titled_bar() as show:
+            show("Running", 0.5)

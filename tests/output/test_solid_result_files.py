@@ -110,12 +110,12 @@ def test_vtk_reads_volume_motion_and_stress_of_solids(tmp_path, tetrahedra):
     for name, q in (("displacement", run.modal_coordinates), ("velocity", run.modal_velocities)):
         expected = field.shapes @ q[4]
         assert of(grid, "Point", name) == pytest.approx(expected,
-                                                        abs=1e-6 * np.abs(expected).max())
+                                                        abs=2e-5 * np.abs(expected).max())
     # Against the tensor's deviator.
     s = (field.stress @ run.modal_coordinates[4])[:, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 3, 3)
     deviator = s - np.trace(s, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
     expected = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
-    assert of(grid, "Point", "von_mises") == pytest.approx(expected, rel=1e-5)
+    assert of(grid, "Point", "von_mises") == pytest.approx(expected, rel=2e-5)
     assert of(grid, "Cell", "stress").shape == (len(field.cells), 6)
 
 
@@ -342,3 +342,13 @@ def test_tables_have_both_directions(tmp_path):
     assert both.tangent.values.tolist() == ["t", "t2"]
     assert {"contact_force_z", "node_normal_z", "node_relative_displacement"} <= set(both)\
         | set(both.coords)
+
+
+def test_frames_of_solids_are_compressed(tmp_path):
+    run = moved(system(solid(counts=(12, 6, 5))), times=21)
+    path = fc.write_case(tmp_path / "run.vtkhdf", run, frames=20)
+    with h5py.File(path) as file:
+        frames = [data for kind in ("PointData", "CellData")
+                  for data in file[f"VTKHDF/{kind}"].values()]
+        stored = sum(data.id.get_storage_size() for data in frames)
+        assert stored < 0.4 * sum(data.nbytes for data in frames)

@@ -57,7 +57,7 @@ def test_vtk_reads_grid_times_and_rigid_motion(tmp_path, triangles):
         expected = np.column_stack([x0[k] - phi[k] * (y - 0.5 * HEIGHT),
                                     y0[k] + phi[k] * (x - 0.5 * LENGTH), 0 * x])
         np.testing.assert_allclose(point_data(grid, "displacement"), expected,
-                                   rtol=3e-7, atol=1e-12)
+                                   rtol=2e-5, atol=1e-12)
         assert point_data(grid, "displacement").dtype == np.float32
         assert not point_data(grid, "von_mises").any()
     assert len(mesh_times) == 1  # the grid is stored once and read once
@@ -80,7 +80,7 @@ def test_stretched_body_has_its_axial_stress_as_von_mises_stress(tmp_path):
         reader.UpdateTimeStep(time)
         expected = YOUNGS_MODULUS * 2.0 / LENGTH * abs(amplitude)
         stress = point_data(reader.GetOutputDataObject(0), "von_mises")
-        np.testing.assert_allclose(stress, expected, rtol=1e-6)
+        np.testing.assert_allclose(stress, expected, rtol=2e-5)
 
 
 def test_vtk_reads_velocity_contact_state_and_cell_stress(tmp_path):
@@ -106,7 +106,7 @@ def test_vtk_reads_velocity_contact_state_and_cell_stress(tmp_path):
             - bend * (y - 0.5 * HEIGHT) * k * np.sin(k * (x - 0.5 * LENGTH)),
             rate[1] + rate[2] * (x - 0.5 * LENGTH)
             + bend * (0.5 - np.cos(k * (x - 0.5 * LENGTH))), 0 * x])
-        np.testing.assert_allclose(point_data(grid, "velocity"), expected, rtol=1e-6, atol=1e-10)
+        np.testing.assert_allclose(point_data(grid, "velocity"), expected, rtol=2e-5, atol=1e-10)
         states = point_data(grid, "contact_state")
         assert states.dtype == np.int8
         assert (states[~bottom] == -1).all()
@@ -117,7 +117,7 @@ def test_vtk_reads_velocity_contact_state_and_cell_stress(tmp_path):
         ends = np.cos(k * (cells - 0.5 * LENGTH)) * np.cos(0.5 * k * LENGTH / 20.0)
         np.testing.assert_allclose(
             stress[:, 0], YOUNGS_MODULUS * (2.0 / LENGTH * q[4] - heights * k**2 * ends * q[3]),
-            rtol=1e-5, atol=1.0)
+            rtol=2e-5, atol=1.0)
         assert not stress[:, 1:].any()
     with h5py.File(tmp_path / "case.vtkhdf") as file:
         names = file["VTKHDF/CellData/stress"].attrs["component_names"]
@@ -284,7 +284,7 @@ def test_pvd_lists_frames_that_vtk_reads(tmp_path):
     reader.Update()
     expected = trajectory.system.basis.mode_shapes.shapes @ trajectory.modal_coordinates[20]
     moved = point_data(reader.GetOutput(), "displacement")
-    np.testing.assert_allclose(moved[:, :2], expected, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(moved[:, :2], expected, rtol=2e-5, atol=1e-12)
     force = point_data(reader.GetOutput(), "contact_force").astype(float).sum(axis=0)
     assert force[1] == pytest.approx(trajectory.normal_force[20].sum(), rel=1e-5)
 
@@ -311,7 +311,7 @@ def test_pvd_frames_hold_velocity_and_contact_state(tmp_path):
                                           point_data(expected, name))
         velocity = point_data(frame.GetOutput(), "velocity")[:, :2]
         np.testing.assert_allclose(velocity, trajectory.system.basis.mode_shapes.shapes
-                                   @ trajectory.modal_velocities[number], rtol=1e-6, atol=1e-10)
+                                   @ trajectory.modal_velocities[number], rtol=2e-5, atol=1e-10)
         seen |= set(point_data(frame.GetOutput(), "contact_state").tolist())
     assert seen == {-1, *trajectory.contact_state[[0, 5, 12, 21, 30]].ravel().tolist()}
     assert len(seen) > 2

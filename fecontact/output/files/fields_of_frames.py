@@ -33,9 +33,12 @@ class FieldKind:
     components: tuple[str, ...]
     unit: str
     kind: Any = np.float32
+    rounded: bool = False  # to 16 significant bits, which compress well
 
     def flat(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (F, N) or (F, N, k) as rows of VTK, components that a plane lacks zero."""
+        if self.rounded:
+            values = _rounded(values)
         if not self.components:
             return values.reshape(-1).astype(self.kind)
         out = np.zeros((values.shape[0] * values.shape[1], len(self.components)), dtype=self.kind)
@@ -43,13 +46,23 @@ class FieldKind:
         return out
 
 
+def _rounded(values: NDArray[Any]) -> NDArray[Any]:
+    """Values (F, ...) in single precision with 16 significant bits, each to 1.6e-5 of itself.
+
+    The last byte of each number is zero, and compresses to nothing.
+    """
+    bits = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
+    return ((bits + np.uint32(0x80)) & np.uint32(0xFFFFFF00)).view(np.float32)
+
+
+
 _PLANE = (
-    FieldKind("displacement", "Point", _VECTOR, "m"),
-    FieldKind("velocity", "Point", _VECTOR, "m/s"),
-    FieldKind("von_mises", "Point", (), "Pa"),
+    FieldKind("displacement", "Point", _VECTOR, "m", rounded=True),
+    FieldKind("velocity", "Point", _VECTOR, "m/s", rounded=True),
+    FieldKind("von_mises", "Point", (), "Pa", rounded=True),
     FieldKind("contact_force", "Point", _VECTOR, "N"),
     FieldKind("contact_state", "Point", (), _STATES, np.int8),
-    FieldKind("stress", "Cell", ("xx", "yy", "zz", "xy", "yz", "xz"), "Pa"),
+    FieldKind("stress", "Cell", ("xx", "yy", "zz", "xy", "yz", "xz"), "Pa", rounded=True),
 )
 # Of solids, constant over the patches: cells beside the contact faces hold the traction there.
 _SPACE = (

@@ -27,6 +27,8 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
 
+# Higher levels of deflate take longer and gain three per cent.
+COMPRESSED: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
 _OPTIONAL = ("inertia_rows", "stiffness", "contact_normals", "on_ground", "link_load")
 _MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
@@ -173,14 +175,20 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
         return
     shapes = group.create_group("mode_shapes")
     for name in _MODE_SHAPES:
-        shapes.create_dataset(name, data=getattr(basis.mode_shapes, name))
+        store_compressed(shapes, name, getattr(basis.mode_shapes, name))
     for name in ("elements", "outline_nodes"):
         if getattr(basis.mode_shapes, name) is not None:
-            shapes.create_dataset(name, data=getattr(basis.mode_shapes, name))
+            store_compressed(shapes, name, getattr(basis.mode_shapes, name))
     restriction = basis.mode_shapes.restriction.tocsr()
     for name in ("data", "indices", "indptr"):
         shapes.create_dataset(f"restriction/{name}", data=getattr(restriction, name))
     shapes["restriction"].attrs["shape"] = restriction.shape
+
+
+def store_compressed(group: Any, name: str, values: Any) -> None:
+    """Write an array, compressed without loss from 64 kB on."""
+    options = COMPRESSED if values.nbytes >= 2**16 else {}
+    group.create_dataset(name, data=values, **options)
 
 
 def stored_basis(group: Any) -> ModalBasis:

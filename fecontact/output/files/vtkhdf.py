@@ -9,9 +9,12 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.fields_of_frames import FrameFields
 from fecontact.output.files.frames import blocks, body_numbers, require_field
+from fecontact.output.files.hdf5 import COMPRESSED, store_compressed
 
 # VTK_TRIANGLE, VTK_QUAD, VTK_TETRA, VTK_HEXAHEDRON by dimension and corners.
 CELL_TYPES = {(2, 3): 5, (2, 4): 9, (3, 4): 10, (3, 8): 12}
+
+_CHUNK = 2**14  # fewest values of a compressed chunk
 
 
 def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -> None:
@@ -24,9 +27,11 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     xy, yz, xz. Of solids the nodes of contact faces have ``contact_pressure`` [Pa], and cells with
     a facet there ``contact_pressure``, ``contact_traction`` (3 components) [Pa], what acts on their
     body, and ``contact_state``; all are zero and -1 elsewhere. All are in single precision but the
-    states. The attributes ``unit`` and ``component_names`` of each are for readers of HDF5: the
-    format has no place for them. Points and cells are stored once; those of several bodies hold
-    their number ``body``, counted from 0 as the names in its attribute.
+    states; motion and stresses are rounded to 16 significant bits, 1.6e-5 of each value. All
+    are compressed (byte shuffle and deflate). The attributes ``unit`` and ``component_names`` of
+    each are for readers of HDF5: the format has no place for them. Points and cells are stored
+    once; those of several bodies hold their number ``body``, counted from 0 as the names in its
+    attribute.
 
     Parameters
     ----------
@@ -62,7 +67,9 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     for one in fields.kinds:
         size = fields.sizes[one.of]
         shape = (steps * size, *([len(one.components)] if one.components else []))
-        data[one] = group.create_dataset(f"{one.of}Data/{one.name}", shape, dtype=one.kind)
+        data[one] = group.create_dataset(
+            f"{one.of}Data/{one.name}", shape, dtype=one.kind,
+            chunks=(min(max(size, _CHUNK), shape[0]), *(1 for _ in shape[1:])), **COMPRESSED)
         data[one].attrs["unit"] = one.unit
         if one.components:
             data[one].attrs["component_names"] = list(one.components)
@@ -80,11 +87,12 @@ def _write_grid(group: Any, nodes: Array, cells: Integers) -> None:
     count, corners = cells.shape
     points = np.zeros((len(nodes), 3))
     points[:, : nodes.shape[1]] = nodes
-    group["Points"] = points
+    store_compressed(group, "Points", points)
     group["Points"].attrs["unit"] = "m"
-    group["Connectivity"] = cells.astype(np.int64).reshape(-1)
-    group["Offsets"] = np.arange(count + 1, dtype=np.int64) * corners
-    group["Types"] = np.full(count, CELL_TYPES[nodes.shape[1], corners], dtype=np.uint8)
+    store_compressed(group, "Connectivity", cells.astype(np.int64).reshape(-1))
+    store_compressed(group, "Offsets", np.arange(count + 1, dtype=np.int64) * corners)
+    store_compressed(group, "Types", np.full(count, CELL_TYPES[nodes.shape[1], corners],
+                                             dtype=np.uint8))
     group["NumberOfPoints"] = np.array([len(nodes)], dtype=np.int64)
     group["NumberOfCells"] = np.array([count], dtype=np.int64)
     group["NumberOfConnectivityIds"] = np.array([cells.size], dtype=np.int64)
