@@ -29,7 +29,7 @@ from fecontact import (
 from fecontact.analysis import Impacts, Periodicity, Rest, find_impacts, find_rests, periodicity
 from fecontact.analysis.periodicity import drive_period
 from fecontact.bifurcation import lyapunov_exponents
-from fecontact.laws import ConstantFriction, RoughSurface
+from fecontact.laws import Frictionless, RoughSurface
 
 STUDY = Path(__file__).with_suffix(".toml")
 REDUCED_MASS = 0.092  # kg
@@ -67,7 +67,7 @@ def two_mode_system(bending_hz: float = 230.0, ratio: float = 0.600,
         np.eye(2), np.diag([0.0, (2.0 * np.pi * bending_hz) ** 2]), {"contact": rows[None],
                                                                     "B": rows},
         damping=(0.0, damping))
-    return ContactSystem(basis, normal=LAW, friction=ConstantFriction(0.0), drive=DRIVE)
+    return ContactSystem(basis, normal=LAW, friction=Frictionless(), drive=DRIVE)
 
 
 def start(system: ContactSystem, height: float = 0.0, velocity: float = 0.0) -> np.ndarray:

@@ -7,8 +7,9 @@ from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fecontact.cli.console import loading
+from fecontact.cli.console import echo, loading
 from fecontact.core.errors import FecontactError, InputError
+from fecontact.core.units import listed
 
 if TYPE_CHECKING:
     from fecontact.integrate.trajectory import Trajectory
@@ -39,11 +40,28 @@ def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
         except (RecursionError, ValueError):
             parsed(f"value = {text}", f"--set {name}")
     if values:
+        before = study
         study = study.with_(**values)
+        for name in values:
+            if name.endswith(".law"):
+                _tell_dropped_keys(before, study, name)
     if study.preload is not None:
         with loading():
             import fecontact.system.quasistatic.loading  # noqa: F401
     return study
+
+
+def _tell_dropped_keys(before: "Study", after: "Study", name: str) -> None:
+    """Print a note on the keys that another law ``name`` of a study does not have."""
+    section = name.removesuffix(".law")
+    old, new = (one.tables(defaults=False) for one in (before, after))
+    for part in section.split("."):
+        old, new = (table[int(part)] if isinstance(table, list) else table.get(part, {})
+                    for table in (old, new))
+    gone = [key for key in old if key not in new and key != "law"]
+    if gone:
+        echo(f"note: [{section}]: the law {new.get('law', 'chosen')} has no {listed(gone)}; "
+             f"{'these keys are' if len(gone) > 1 else 'this key is'} left out.")
 
 
 def require_same_study(study: "Study", file: Path, *free: str) -> None:

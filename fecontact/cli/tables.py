@@ -29,9 +29,14 @@ def table(*headings: str, rows: Iterable[Iterable[str]], left: int = 1) -> Any:
     return result
 
 
-def mesh_table(mesh: "Mesh") -> Any:
-    """Counts, size and groups of a mesh."""
-    return table("", "", rows=mesh.summary())
+def mesh_table(mesh: "Mesh", degree: int) -> Any:
+    """Counts, size and groups of a mesh, and the unknowns of finite elements of a degree on it."""
+    from fecontact.fem.elastic_body import ElasticBody
+
+    unknowns = ElasticBody(mesh, degree=degree).unknowns
+    order = {1: "linear", 2: "quadratic"}[degree]
+    return table("", "", rows=[*mesh.summary(),
+                               ("unknowns", f"{unknowns}, {order} elements (degree = {degree})")])
 
 
 def run_table(trajectory: "Trajectory") -> Any:

@@ -2,7 +2,7 @@
 
 import inspect
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar, get_origin
 
 from docstring_parser import Docstring, DocstringStyle, compose, parse
 from docstring_parser.common import DocstringParam
@@ -38,8 +38,11 @@ def inherit_documentation(cls: type) -> None:
     bases = [_parsed(inspect.cleandoc(base.__dict__.get("__doc__") or ""))
              for base in cls.__mro__[1:-1]]
     own = _parsed(inspect.cleandoc(text))
-    names = [*getattr(cls, "__dataclass_fields__", ()), *inspect.get_annotations(cls),
-             *(name for entry in own.params for name in _names(entry))]
+    annotations = inspect.get_annotations(cls)
+    # A class variable in the place of an inherited field: the class has no such field.
+    fixed = {name for name, hint in annotations.items() if ClassVar in (hint, get_origin(hint))}
+    names = [*(name for name in (*getattr(cls, "__dataclass_fields__", ()), *annotations)
+               if name not in fixed), *(name for entry in own.params for name in _names(entry))]
     entries: dict[str, DocstringParam] = {}
     for doc in (*reversed(bases), own):
         for entry in doc.params:

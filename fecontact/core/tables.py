@@ -18,6 +18,7 @@ from fecontact.core.errors import FecontactError, InputError, choices, nearest
 
 T = TypeVar("T")
 
+_COMMA = re.compile(r"([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)")  # a number with a decimal comma
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
 
 
@@ -64,7 +65,9 @@ def parsed(text: str, title: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text.removeprefix("\ufeff"))
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{title} is not valid TOML: {error}.") from None
+        meant = re.search(rf"^[^#=\n]*=\s*{_COMMA.pattern}\s*(?:#.*)?$", text, re.MULTILINE)
+        hint = f"; write {meant[1]}.{meant[2]} with a decimal point" if meant else ""
+        raise InputError(f"{title} is not valid TOML: {error}{hint}.") from None
     except RecursionError:
         raise _too_deep(title) from None
     except ValueError:  # Python refuses integers of thousands of digits
@@ -194,10 +197,17 @@ def convert(value: Any, hint: Any, where: str, key: str) -> Any:
         return _converted(value, hint, f"{where[:-1]}.{key}]" if where.endswith("]")
                           else f"{where}: [{key}]")
     except _MismatchError:
-        raise InputError(f"{where}: {key} = {shown(value)} must be {described(hint)}.") from None
+        raise InputError(f"{where}: {key} = {shown(value)} must be {described(hint)}"
+                         f"{_decimal_point(value)}.") from None
     except OverflowError:
         raise InputError(f"{where}: {key} = {shown(value)} is too large; numbers reach "
                          f"1.8e308, whole numbers 9.2e18.") from None
+
+
+def _decimal_point(value: Any) -> str:
+    """A hint at the number that a text with a decimal comma stands for, else an empty text."""
+    meant = _COMMA.fullmatch(value.strip()) if isinstance(value, str) else None
+    return f" (did you mean {meant[1]}.{meant[2]}?)" if meant else ""
 
 
 @contextmanager

@@ -165,6 +165,11 @@ class ElasticBody(Summarised):
         return self.mesh.dimension
 
     @property
+    def unknowns(self) -> int:
+        """Number of degrees of freedom without supports, d times that of displacement nodes."""
+        return self.dimension * len(self.nodes)
+
+    @property
     def curved(self) -> bool:
         """Whether the elements follow curved edges of the mesh."""
         return self.degree == 2 and len(self.mesh.curved_edges) > 0

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "gaussian": stribeck.GaussianFriction,
             "hyperbolic": stribeck.HyperbolicFriction,
             "constant": stribeck.ConstantFriction,
+            "frictionless": stribeck.Frictionless,
             "galvanetto": stribeck.GalvanettoFriction,
             "cubic": stribeck.CubicFriction,
             "product": stribeck.ProductFriction,
@@ -133,6 +135,17 @@ def law_class(kind: type, name: Any, where: str) -> type:
     if name in names:
         return names[name]
     return own_law(kind, name, f"{where}: law = {name!r}")
+
+
+def foreign_keys(table: Mapping[str, Any], name: Any) -> list[str]:
+    """Keys of the table of a law that the law ``name`` does not have; none for unknown names.
+
+    Those of a table for another law, whose name is replaced.
+    """
+    found = [names[name] for names in law_names().values()
+             if isinstance(name, str) and name in names]
+    known = {entry.name for law in found for entry in fields(law)} | {"law"}
+    return [key for key in table if found and key not in known]
 
 
 def _meant(name: str, names: Mapping[str, type], meant: list[type]) -> str:

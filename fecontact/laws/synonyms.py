@@ -20,6 +20,7 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
     "coulomb": ("ConstantFriction",), "amontons": ("ConstantFriction",),
     "dry": ("ConstantFriction",), "regularised": ("ConstantFriction", "JenkinsFriction"),
     "regularized": ("ConstantFriction", "JenkinsFriction"),
+    "none": ("Frictionless",), "nofriction": ("Frictionless",),
     "bristle": ("LuGreFriction", "DahlFriction"), "hysteresis": (*_IWAN, "BoucWenFriction",
                                                                  "JenkinsFriction"),
     "maxwell": ("IwanFriction", "JenkinsFriction"), "maxwellslip": ("IwanFriction",),

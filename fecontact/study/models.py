@@ -101,7 +101,7 @@ class StudyModels:
     @property
     def thickness(self) -> float | None:
         """Thickness of the body, or of all bodies [m]; None if they differ. One for solids."""
-        found = {one.body.thickness for one in self.bodies.values()} or {self.body.thickness}
+        found = {one.body.depth for one in self.bodies.values()} or {self.body.depth}
         return found.pop() if len(found) == 1 else None
 
     def _require_one(self, name: str, instead: str) -> None:

@@ -44,7 +44,8 @@ class BodySettings:
     youngs_modulus, poisson_ratio, density : float, optional
         [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
     thickness : float
-        Out-of-plane thickness of a plane body [m]; not for a solid.
+        Out-of-plane thickness of a plane body [m]; required in plane stress, 1 m by default in
+        plane strain; not for a solid.
     plane : 'stress' or 'strain'
         Plane stress for thin bodies, plane strain for long ones; not for a solid.
     degree : 1 or 2
@@ -60,16 +61,22 @@ class BodySettings:
     youngs_modulus: float | None = None
     poisson_ratio: float | None = None
     density: float | None = None
-    thickness: Annotated[float, Unit("m")] = 1.0
+    thickness: Annotated[float | None, Unit("m")] = None
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
     fixed: Mapping[str, Support] = field(default_factory=dict)
     rotation: Rotation | None = None
 
     def __post_init__(self) -> None:
-        require_positive("BodySettings", thickness=self.thickness)
+        if self.thickness is not None:
+            require_positive("BodySettings", thickness=self.thickness)
         with located("BodySettings:", "Material"):
             _ = self.elastic_material
+
+    @property
+    def depth(self) -> float:
+        """Thickness, or 1 m where it is left out [m]."""
+        return 1.0 if self.thickness is None else self.thickness
 
     @property
     def elastic_material(self) -> Material:
@@ -96,7 +103,11 @@ class BodySettings:
                 if (value := getattr(self, key)) != getattr(usual, key):
                     raise InputError(f"ElasticBody: {key} = {shown(plain(value))} is for plane "
                                      f"bodies, but the mesh is that of a solid; leave it out.")
-        return ElasticBody(mesh, self.elastic_material, thickness=self.thickness,
+        elif self.thickness is None and self.plane == "stress":
+            raise InputError("ElasticBody: the key 'thickness' is missing, the thickness of a "
+                             "plane body in m; give it, or plane = \"strain\" for a slice of a "
+                             "long part, 1 m thick.")
+        return ElasticBody(mesh, self.elastic_material, thickness=self.depth,
                            plane=self.plane, degree=self.degree, fixed=self.fixed)
 
 

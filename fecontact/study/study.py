@@ -29,8 +29,8 @@ from fecontact.integrate.wear import WearHistory, wear_history
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
-from fecontact.laws.registry import PART_CLASSES, with_folder
-from fecontact.study.assembly import contact_system
+from fecontact.laws.registry import PART_CLASSES, foreign_keys, with_folder
+from fecontact.study.assembly import LAWS, contact_system
 from fecontact.study.bodies_section import (
     BodySections,
     Gap,
@@ -83,8 +83,8 @@ class Study(Summarised, StudyModels):
     basis : BasisSettings
         ``[basis]``
     normal, friction, ground, drive, load
-        ``[normal]``, ... : laws, ground, drive and load (contact requires a normal law, which has
-        no default); see
+        ``[normal]``, ... : laws, ground, drive and load (contact requires both laws, which have
+        no default; ``law = "frictionless"`` is none); see
         :class:`~fecontact.ContactSystem`.
     interfaces : mapping of interface to InterfaceSettings
         ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``: laws of single interfaces;
@@ -232,7 +232,7 @@ class Study(Summarised, StudyModels):
             if "preload" in tables else None,
             path=path,
             **{name: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
-               for name, kind in _SECTIONS.items() if name in tables or name != "normal"},
+               for name, kind in _SECTIONS.items() if name in tables or name not in LAWS},
         )
         check_bodies(study, title)
         return study
@@ -276,7 +276,8 @@ class Study(Summarised, StudyModels):
             if getattr(self, name) is not None:
                 sections[name] = to_table(getattr(self, name), defaults=defaults)
         return {"gap": plain(self.gap), **first, **interfaces,
-                **{name: table for name, table in sections.items() if table or defaults}}
+                **{name: table for name, table in sections.items()
+                   if table or defaults or name in LAWS}}
 
     def to_toml(self) -> str:
         """The resolved study as TOML text, with every key, including default values.
@@ -291,8 +292,8 @@ class Study(Summarised, StudyModels):
         """Copy of the study with other values, given by dotted keys of the file.
 
         ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``; list entries are
-        numbered, ``load.forces.0.signal.amplitude``. Mesh, body and modal basis are reused if
-        nothing they depend on changes.
+        numbered, ``load.forces.0.signal.amplitude``. Another ``law`` keeps only the keys that it
+        has. Mesh, body and modal basis are reused if nothing they depend on changes.
 
         Raises
         ------
@@ -321,6 +322,9 @@ class Study(Summarised, StudyModels):
                                      f"table.")
             place = _number(key, table, name, _title(self.path)) if isinstance(table, list) else key
             table[place] = plain(value)
+            if key == "law" and isinstance(table, dict):
+                for old in foreign_keys(table, value):
+                    del table[old]
         study = self.from_tables(tables, self.path)
         study.reuse(self)
         return study

@@ -48,8 +48,8 @@ NO_NORMAL_LAW = ("{}, the law of the normal force, which has no default; give a 
                  "laws` lists them, `fecontact laws rough-surface` says how to choose.")
 
 NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a friction law with "
-                   "its coefficients, such as the exponential or the constant one (0 for no "
-                   "friction); `fecontact laws` lists them.")
+                   "its coefficients, such as the exponential or the constant one, or law = "
+                   "\"frictionless\" (Frictionless() in Python); `fecontact laws` lists them.")
 
 PARTS = ("normal", "friction", "sliding", "ground", "drive", "load")
 IN_SPACE_ONLY = frozenset({"ground.speed_y", "ground.rotation_speed", "ground.centre",

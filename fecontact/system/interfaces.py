@@ -129,7 +129,7 @@ def system_fields(
         if one.friction is None and slides(basis)[nodes].any():
             raise InputError(f"Interface '{name}' lacks friction, although its contact nodes can "
                              f"move along the other side: give a friction law with its "
-                             f"coefficients, such as ConstantFriction(0.0) for no friction.")
+                             f"coefficients, such as ExponentialFriction, or Frictionless().")
         friction[name] = ConstantFriction(0.0) if one.friction is None else one.friction
         with located(f"Interface '{name}':"):
             gaps.append(np.asarray(one.pairing.gaps, dtype=float)

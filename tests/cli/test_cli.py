@@ -54,6 +54,13 @@ def test_a_study_without_a_normal_law_is_told_what_to_give(cli, study):
     assert "How to choose." in out
 
 
+def test_keys_of_the_law_before_are_left_out_with_a_note(cli, study):
+    code, out, err = cli("mesh", study, "--set", "friction.law=constant")
+    assert (code, err) == (0, "")
+    assert ("note: [friction]: the law constant has no static_coefficient, kinetic_coefficient; "
+            "these keys are left out.") in out
+
+
 def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli("init", "beam.toml")[0] == 0
@@ -65,6 +72,8 @@ def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
     code, out, _ = cli("mesh", "beam.toml", *small)
     assert code == 0
     assert re.search("boundary contact +20 edges", out)
+    # Corners, middles of edges and centres of cells stand on a grid of 41 x 5.
+    assert re.search(r"unknowns +410, quadratic elements \(degree = 2\)", out)
     assert len(read_mesh("results/beam.msh").nodes) == 63
 
     code, out, _ = cli("modes", "beam.toml", *small)

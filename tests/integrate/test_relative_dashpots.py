@@ -112,9 +112,15 @@ element_size = 0.01
 modes = 4
 contact_nodes = 2
 
+[body]
+thickness = 1.0
+
 [normal]
 stiffness = 1e6
 roughness_height = 5e-6
+
+[friction]
+law = "frictionless"
 
 [drive]
 stiffness_x = 1e4

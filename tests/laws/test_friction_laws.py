@@ -16,6 +16,7 @@ from fecontact.laws import (
     ConstantFriction,
     CubicFriction,
     ExponentialFriction,
+    Frictionless,
     GalvanettoFriction,
     GaussianFriction,
     HyperbolicFriction,
@@ -59,6 +60,7 @@ def every_law():
             viscous = {"viscous_coefficient": 3.0} if kind in VISCOUS else {}
             yield kind(smoothing_slope=2e5, smoothing=smoothing, **values, **viscous)
     yield ProductFriction()
+    yield Frictionless()
     yield ExponentialFriction(static_coefficient=(0.8, 0.5), smoothing="tanh")
 
 

@@ -55,9 +55,17 @@ length = 0.2
 height = 0.02
 element_size = 0.01
 
+[body]
+thickness = 1.0
+
 [basis]
 modes = 6
 contact_nodes = 5
+"""
+FRICTION = """
+[friction]
+static_coefficient = 0.8
+kinetic_coefficient = 0.55
 """
 
 
@@ -89,8 +97,8 @@ def test_every_law_is_documented(kind, name):
     if kind in (NormalLaw, FrictionLaw):
         assert "Raises" in text
         assert "References" in text or name in (
-            "linear", "prescribed-force", "two-sided-stop", "constant", "parabolic-surface",
-            "cosine-surface", "gaussian-surface", "measured-surface", "hyperbolic", "cubic",
+            "linear", "prescribed-force", "two-sided-stop", "constant", "frictionless",
+            "parabolic-surface", "cosine-surface", "gaussian-surface", "measured-surface", "hyperbolic", "cubic",
             "bilateral-cubic", "bilateral-play", "bilateral-piecewise")
 
 
@@ -105,7 +113,8 @@ def test_every_law_runs_from_a_study(kind, name, tmp_path):
     lines = "\n".join(f"{key} = {value!r}".replace("(", "[").replace(")", "]").replace("'", '"')
                       for key, value in to_table(law).items())
     head = HEAD.replace(SURFACE, "") if part == "normal" else HEAD
-    study = Study.from_toml(f"{head}\n[{part}]\n{lines}\n[load]\nnormal = 20.0\n[ground]\n"
+    other = FRICTION if part == "normal" else ""
+    study = Study.from_toml(f"{head}{other}\n[{part}]\n{lines}\n[load]\nnormal = 20.0\n[ground]\n"
                             f"speed = 0.01\n[drive]\nstiffness_x = 1e4\n")
     assert getattr(study, part) == law
     assert Study.from_toml(study.to_toml()) == study
@@ -192,7 +201,7 @@ def test_parts_of_ground_and_drive_by_name(tmp_path):
     (tmp_path / "trace.csv").write_text("x,y\n" + "\n".join(
         f"{1e-3 * i},{1e-6 * np.sin(0.3 * i):.9e}" for i in range(30)))
     path = tmp_path / "study.toml"
-    path.write_text(f"""{HEAD}
+    path.write_text(f"""{HEAD + FRICTION}
 [ground]
 speed = 0.01
 [ground.profile]
@@ -258,6 +267,8 @@ file = "part.msh"
 [geometry.boundaries]
 left = [-0.11, -0.001, -0.04, 0.001]
 right = [0.04, -0.001, 0.11, 0.001]
+[body]
+thickness = 1.0
 [basis]
 modes = 6
 contact = ["left", "right"]
@@ -269,6 +280,8 @@ damping = 6.0
 [interfaces.left.friction]
 law = "jenkins"
 stiffness = 1e6
+[interfaces.right.friction]
+static_coefficient = 0.8
 [interfaces.right.normal]
 law = "linear"
 stiffness = 1e6

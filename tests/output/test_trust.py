@@ -56,6 +56,7 @@ simulation = { t_end = 2e-3, outputs = 101 }
 output = { frames = 3 }
 render = { frames = 2, size = [320, 180] }
 normal = { law = "own.py:Stiff" }
+friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55 }
 """
 
 

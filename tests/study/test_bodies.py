@@ -199,6 +199,9 @@ part = "lower"
 scale = 1e-3
 [bodies.disc.body]
 fixed = { table = "xy" }
+thickness = 1.0
+[bodies.pad.body]
+thickness = 1.0
 [bodies.pad.geometry]
 file = "two.inp"
 part = "upper"
@@ -213,6 +216,8 @@ other = "disc.rim"
 [normal]
 law = "linear"
 stiffness = 1e8
+[friction]
+law = "frictionless"
 [load]
 gravity = [0.0, -9.81]
 """)

@@ -272,6 +272,7 @@ def test_summaries_of_solids_see_all_directions():
 PLANE = """
 geometry = { shape = "block", element_size = 0.02 }
 basis = { modes = 4, contact_nodes = 4 }
+body = { thickness = 0.1 }
 normal = { law = "linear", stiffness = 1e7 }
 friction = { law = "constant", friction_coefficient = 0.3 }
 simulation = { t_end = 1e-4, outputs = 3 }

@@ -212,7 +212,8 @@ def test_another_shape_when_nothing_was_said_of_the_first():
 def test_material_values_replace_those_of_the_named_one(tiny):
     material = tiny.with_(**{"body.density": 3000}).body.elastic_material
     assert (material.density, material.youngs_modulus) == (3000.0, 7.0e10)
-    assert Study.from_toml('geometry = { shape = "beam" }').elastic_body().material == Material()
+    assert Study.from_toml('geometry = { shape = "beam" }\nbody = { thickness = 0.02 }'
+                           ).elastic_body().material == Material()
 
 
 def test_mesh_file_is_found_beside_the_study(tmp_path):
@@ -226,6 +227,8 @@ def test_mesh_file_is_found_beside_the_study(tmp_path):
         scale = 1e-3
         boundaries = { shoe = "contact", half = [-1, 0.009, 0.051, 0.011] }
         points = { tip = [0.1, 0.01], corner = "C" }
+        [body]
+        thickness = 0.02
         [basis]
         contact = "shoe"
         modes = 4
@@ -462,3 +465,33 @@ def test_workers_are_those_of_the_study_before_those_of_the_run(tiny, monkeypatc
     assert seen == [None, 1, 3, 3]
     with pytest.raises(InputError, match="workers = 3 is only for solver = 'rodas5p', not 'radau'"):
         three.with_(**{"simulation.solver": "radau"})
+
+
+def test_friction_and_thickness_have_to_be_given(tiny):
+    tables = tiny.tables(defaults=False)
+    without = {name: table for name, table in tables.items() if name != "friction"}
+    with pytest.raises(InputError, match=r"lacks the section \[friction\].*frictionless"):
+        Study.from_tables(without).system()
+    smooth = Study.from_tables({**without, "friction": {"law": "frictionless"}})
+    assert Study.from_toml(smooth.to_toml()) == smooth
+    assert not smooth.run().friction_force.any()
+    thin = {**tables, "body": {"material": "steel"}}
+    with pytest.raises(InputError, match=r"\[body\]: the key 'thickness' is missing"):
+        Study.from_tables(thin).elastic_body()
+    slab = Study.from_tables({**tables, "body": {"plane": "strain"}})
+    assert slab.elastic_body().thickness == 1.0
+
+
+def test_another_law_keeps_only_its_own_keys(tiny):
+    changed = tiny.with_(**{"friction.law": "jenkins", "friction.stiffness": 1e6})
+    assert (changed.friction.stiffness, type(changed.friction).__name__) == (1e6, "JenkinsFriction")
+    kept = tiny.with_(**{"friction.static_coefficient": 0.4, "friction.kinetic_coefficient": 0.2})
+    kept = kept.with_(**{"friction.law": "gaussian"})
+    assert (kept.friction.static_coefficient, kept.friction.kinetic_coefficient) == (0.4, 0.2)
+
+
+def test_a_decimal_comma_is_recognised(tiny):
+    with pytest.raises(InputError, match=r'speed = "0,5" must be a number \(did you mean 0\.5\?'):
+        tiny.with_(**{"ground.speed": "0,5"})
+    with pytest.raises(InputError, match=r"not valid TOML: .*; write 2\.5e-3 with a decimal point"):
+        Study.from_toml("[ground]\nspeed = 2,5e-3  # m/s\n")

@@ -15,6 +15,8 @@ STUDY = """
 geometry = { shape = "pendulum" }
 basis = { modes = 2, contact_nodes = 1 }
 normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
+friction = { law = "frictionless" }
+body = { thickness = 1.0 }
 simulation = { initial = { displacement = [0.0, 1e-4, 0.0] } }
 [drive]
 stiffness_y = 99.085

@@ -54,7 +54,8 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
             geometry = described.bodies[name].geometry if name else described.geometry
             if name:
                 echo(f"\n{name}:")
-            show(mesh_table(made))
+            body = described.bodies[name].body if name else described.body
+            show(mesh_table(made, body.degree))
             target = folder / f"{described.name}{'-' * bool(name)}{name}.msh"
             source = getattr(geometry, "file", None)
             if source is not None and target.exists() and (

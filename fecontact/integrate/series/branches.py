@@ -208,7 +208,7 @@ def obstacle(
     if ground.wavy and basis.ground_nodes.any():
         return "the ground is wavy"
     for _, _, law in system.law_groups("friction"):
-        if not (type(law) is ConstantFriction and not np.any(law.friction_coefficient)
+        if not (isinstance(law, ConstantFriction) and not np.any(law.friction_coefficient)
                 and not np.any(law.viscous_coefficient)):
             return "there is friction"
     for _, share, law in system.law_groups("normal"):

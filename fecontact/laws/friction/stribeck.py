@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NotNegative, PerNode, Positive
 from fecontact.laws.elementary import arctangent
@@ -233,6 +234,20 @@ class ConstantFriction(SmoothedFriction):
     smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
+
+
+@dataclass(frozen=True)
+class Frictionless(ConstantFriction):
+    """No friction, ``R = 0``: Coulomb's law with the coefficient zero; without parameters."""
+
+    friction_coefficient: ClassVar[float] = 0.0  # type: ignore[misc]
+    smoothing_slope: ClassVar[float] = 1e6  # type: ignore[misc]
+    viscous_coefficient: ClassVar[float] = 0.0  # type: ignore[misc]
+    smoothing: ClassVar[Smoothing] = "arctan"  # type: ignore[misc]
+
+    def table(self, share: Array) -> Array:
+        """Parameters (n, 4) of :class:`ConstantFriction` with the coefficient zero."""
+        return ConstantFriction(0.0).table(share)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.arrays import with_sides
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.balance import Balance
@@ -204,4 +205,54 @@ def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
     load = system.load
     more = " and the further loads" if load != Load(load.normal) else ""
     return (f"There is no {kind}: under load.normal = {load.normal:g} N{more} the body lifts off "
-            f"or tips over; check the sign and place of the load, and the length of the contact.")
+            f"or tips over{_places(system, problem.load)}; check the sign and place of the load, "
+            f"and the length of the contact: more contact nodes or patches reach closer to the "
+            f"ends of the face.")
+
+
+def _places(system: ContactSystem, load: Array) -> str:
+    """Where the resultant of modal loads (m,) meets the ground, and where the contact nodes are.
+
+    Empty for several bodies, and where supports or links keep the body from rigid motion.
+    """
+    basis = system.basis
+    d, places = basis.dimension, basis.contact_places
+    if basis.parts or not len(places):
+        return ""
+    force, moment = resultant(basis, load)
+    level = float(places[:, d - 1].mean())
+    if not np.isfinite(moment[: d - 1]).all() or not abs(force[-1]) > 0.0:
+        return ""
+    along = np.nan_to_num(force[:-1])
+    # Point of the ground about which the loads have no moment along it.
+    if d == 2:
+        at = np.array([(moment[0] + level * along[0]) / force[1]])
+    else:
+        at = np.array([level * along[0] - moment[1], moment[0] + level * along[1]]) / force[2]
+    shown = ", ".join(f"{axis} = {value:.4g} m" for axis, value in zip("xy", at, strict=False))
+    reach = ", ".join(
+        f"{axis} = {values.min():.4g} to {values.max():.4g} m"
+        for axis, values in zip("xy", places.T[: d - 1], strict=False))
+    return (f" (its loads have the resultant {force[-1]:.4g} N in {AXES[d - 1]}, which meets the "
+            f"ground at {shown}; the contact nodes hold it at {reach})")
+
+
+def resultant(basis: ModalBasis, load: Array) -> tuple[Array, Array]:
+    """Resultant force (d,) [N] and moment (1 or 3,) about the origin [N m] of modal loads (m,).
+
+    The work of the loads in unit rigid motions; NaN for motions that the basis does not have.
+    """
+    d = basis.dimension
+    used, free = np.abs(basis.T).any(axis=(1, 2)), basis.angular_frequencies == 0.0
+    places, rows = basis.positions[used], basis.T[used, :d].reshape(-1, basis.modes)[:, free]
+    if d == 2:
+        turns = [np.column_stack([-places[:, 1], places[:, 0]])]
+    else:
+        turns = [np.cross(axis, places) for axis in np.eye(3)]
+    shifts = [np.tile(axis, (len(places), 1)) for axis in np.eye(d)]
+    work = []
+    for motion in (*shifts, *turns):
+        q = np.linalg.lstsq(rows, motion.ravel(), rcond=1e-10)[0]
+        rigid = np.linalg.norm(rows @ q - motion.ravel()) <= 1e-6 * np.linalg.norm(motion)
+        work.append(float(q @ load[free]) if rigid else np.nan)
+    return np.array(work[:d]), np.array(work[d:])
