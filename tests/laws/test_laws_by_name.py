@@ -98,8 +98,8 @@ def test_every_law_is_documented(kind, name):
         assert "Raises" in text
         assert "References" in text or name in (
             "linear", "prescribed-force", "two-sided-stop", "constant", "frictionless",
-            "parabolic-surface", "cosine-surface", "gaussian-surface", "measured-surface", "hyperbolic", "cubic",
-            "bilateral-cubic", "bilateral-play", "bilateral-piecewise")
+            "parabolic-surface", "cosine-surface", "gaussian-surface", "measured-surface",
+            "hyperbolic", "cubic", "bilateral-cubic", "bilateral-play", "bilateral-piecewise")
 
 
 @pytest.mark.parametrize(("kind", "name"), [

@@ -56,7 +56,7 @@ simulation = { t_end = 2e-3, outputs = 101 }
 output = { frames = 3 }
 render = { frames = 2, size = [320, 180] }
 normal = { law = "own.py:Stiff" }
-friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55 }
+friction = { law = "frictionless" }
 """
 
 
@@ -150,7 +150,8 @@ def test_a_study_of_ones_own_names_its_law(stored, capsys):
         tables = json.loads(file["system"].attrs["json"])
         tables["friction"] = {"law": "hostile.py:Harm"}
         file["system"].attrs["json"] = json.dumps(tables)
-        file["study"].attrs["toml"] = STUDY + '\nfriction = { law = "hostile.py:Harm" }\n'
+        file["study"].attrs["toml"] = STUDY.replace(
+                "frictionless", "hostile.py:Harm")
     assert execute(["plot", str(study), "history"]) == 0
     assert "other values" in capsys.readouterr().err
     assert not (stored.parent / "harm").exists()
