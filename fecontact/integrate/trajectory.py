@@ -63,7 +63,9 @@ def output_part(t: Array, t_start: float | None, t_end: float | None) -> slice:
 class Energies:
     """Energies, work put in and energy lost, each (N,) [J]; work and losses count from the start.
 
-    ``stored - stored[0] = work - lost`` up to the integrator's error, see :attr:`imbalance`.
+    The change of ``stored`` since the first output is that of ``work - lost``, up to the
+    integrator's error; see :attr:`imbalance`. The first output shows the state after an impact at
+    the start, and ``lost`` what this impact took.
 
     Attributes
     ----------
@@ -116,13 +118,13 @@ class Energies:
 
     @property
     def imbalance(self) -> float:
-        """Largest ``|stored - stored[0] - work + lost|`` relative to the largest energy in it."""
+        """Largest error of the balance of energies, relative to the largest energy in it."""
         error = float(np.abs(self._unexplained).max())
         return error / self._scale if self._scale > 0.0 else 0.0
 
     @property
     def growth(self) -> float:
-        """Largest ``stored - stored[0] - work + lost`` relative to the largest energy in it."""
+        """Largest gain that the balance does not explain, relative to the largest energy in it."""
         error = max(float(self._unexplained.max()), 0.0)
         return error / self._scale if self._scale > 0.0 else 0.0
 
@@ -130,7 +132,8 @@ class Energies:
     def _unexplained(self) -> Array:
         # Energies that overflow give NaN here, and a corresponding status.
         with np.errstate(over="ignore", invalid="ignore"):
-            return self.stored - self.stored[0] - self.work + self.lost
+            put_in = self.work - self.lost
+            return self.stored - self.stored[0] - (put_in - put_in[0])
 
     @property
     def _scale(self) -> float:

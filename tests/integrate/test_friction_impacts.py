@@ -70,6 +70,25 @@ def test_oblique_impact_of_a_particle(law, along, mu, e):
     assert imbalance(system, run) < 1e-12
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.1])
+@pytest.mark.parametrize(("along", "mu", "e"), [(2.0, 0.3, 0.5), (0.4, 0.3, 0.0), (1.0, 0.0, 1.0)])
+def test_an_impact_at_the_start_is_an_event_like_others(along, mu, e, gap):
+    system = body([(0.0, 0.0)], mu, mass=2.0, gap=gap)
+    run, motion = go(system, [0.0, -gap, 0.0], [along, -1.0, 0.0], [0.0, 0.2], restitution=e,
+                     events=[ContactEvents()])
+    after = max(along - mu * (1.0 + e), 0.0)
+    assert run.status is Status.FINISHED
+    assert motion[0, SPEEDS] == pytest.approx([after, e, 0.0], abs=1e-12)
+    assert (run.statistics["events"], run.statistics["impacts"]) == (1, 1)
+    assert run.events.only("touch-down").time == pytest.approx([0.0], abs=0.0)
+    for row in (0, -1):
+        assert run.node_friction_work[row, 0] == pytest.approx(along**2 - after**2, rel=1e-11)
+        assert run.work[row, CONTACT_DAMPING] == pytest.approx(1.0 - e**2, abs=1e-11)
+    assert imbalance(system, run) < 1e-12
+    resting, _ = go(system, [0.0, -gap, 0.0], [along, 0.0, 0.0], [0.0, 0.2], restitution=e)
+    assert resting.statistics["impacts"] == 0
+
+
 def test_bouncing_particle_slides_on_when_it_no_longer_bounces():
     """Every impact takes mu (1 + e) v; over all, friction takes mu g t of the speed."""
     system = body([(0.0, 0.0)], 0.1, load=Load(10.0))

@@ -27,6 +27,7 @@ from fecontact.integrate.nonsmooth.problem import (
     LAST_ERROR,
     LENGTH,
     LIMITS,
+    OPEN,
     OUTPUT,
     OUTPUTS,
     PARADOX,
@@ -67,6 +68,8 @@ EARLY = 0.25
 _DAMPED, _SMALLEST_ERROR = 0.03, 1e-4
 # Events in a row without any time between them after which a run is stuck.
 _MOST_IDLE = 200
+# Penetration rates at the start below this part of the largest are no approach.
+_SLOW = 1e-9
 # Repeated steps in a row, without any time between them, in which what lets go may still hold;
 # after these rounding alone holds it.
 _MOST_HELD = 3
@@ -88,15 +91,22 @@ def _start(t, p, limits, progress, w, room):
         room.released[c] = room.arrived[c] = False
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
     if p.restitution >= 0.0:
-        height = 0.0
+        height, clusters = 0.0, len(p.rows)
         for j in range(len(p.cluster)):
             room.touched[j] = w.nodes[j, PENETRATION] >= 0.0
             room.parting[j] = False
             height = max(height, abs(w.nodes[j, PENETRATION]))
             largest[RATE_SIZE] = max(largest[RATE_SIZE], abs(w.nodes[j, RATE]))
+        slow = _SLOW * largest[RATE_SIZE]
+        for j in range(len(p.cluster)):
+            room.past[clusters + j] = room.touched[j] and w.nodes[j, RATE] > slow
         flight = change_contacts_at(p.change)(
-            t, p, progress, room, w, 1e-9 * largest[RATE_SIZE], height, 1e-9 * limits.longest,
-            room.rate)
+            t, p, progress, room, w, slow, height, 1e-9 * limits.longest, room.rate)
+        # Stops that are approached at the start are struck; what rests on one touches it only.
+        room.touched[:] = room.past[clusters:]
+        struck = np.count_nonzero(room.touched)
+        progress.counts[IMPACTS] += struck
+        progress.counts[EVENTS] += 1 if struck > 0 else 0
         return _outcome(flight)
     decide_clusters(t, p, progress, room, 1e-12 * largest[SLIP_SIZE], w, room.rate)
     return GOING_ON
@@ -219,13 +229,17 @@ def _accept(step, t, passing, p, progress, output, w, room):
 
 @helper
 def _holds_on(p, progress, w, room):
-    """Whether all that was to let go holds: the repeated step may end just before it does."""
+    """True if the repeated step ends just before its event.
+
+    Then all that was to let go still holds, and what was to touch down is still open.
+    """
     clusters, holds = len(p.rows), True
     for k in range(len(room.past)):
         if room.past[k]:
             holds = holds and (
                 progress.closed[k - clusters] == 1 and w.nodes[k - clusters, FORCE] > 0.0
-                if k >= clusters else progress.status[k] == STICK and w.pressing[k] > 0.0
+                if k >= clusters else not w.pressing[k] > 0.0 if progress.status[k] == OPEN
+                else progress.status[k] == STICK and w.pressing[k] > 0.0
                 and abs(w.total[k]) < (1.0 - 1e-12) * w.limit[k])
     return holds
 
@@ -266,7 +280,10 @@ def _change_stops(t, again, p, limits, progress, w, room):
 
 @helper
 def _change_clusters(t, again, p, progress, w, room):
-    """Release the marked clusters that stick, and bring those that slip to rest."""
+    """Release the marked clusters that stick, bring those that slip to rest, press open ones."""
+    for j in range(len(p.cluster)):
+        c = p.cluster[j]
+        room.touched[j] = room.past[c] and progress.status[c] == OPEN
     _mark_clusters(again, p, progress, w, room)
     decide_clusters(t, p, progress, room, 1e-9 * progress.largest[SLIP_SIZE], w, room.slopes[0])
 
@@ -310,9 +327,6 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
             # The state at the start is the only output.
             _write_at(t, progress, output, w)
             return outcome
-        # Work counts from the state after an impact at the start, the first output.
-        for i in range(2 * p.rows.shape[1], len(Y)):
-            Y[i] = 0.0
         if watch.note != 0:
             derivative(t, Y, p, status, closed, w, room.slopes[0])
             note_at(watch.note)(Step(t, 0.0, t), 0.0, BEGIN, p, progress, w, room, watch)

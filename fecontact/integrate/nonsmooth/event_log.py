@@ -186,13 +186,14 @@ def _note_step(upto, step, p, progress, w, room, watch):
 
 @routine
 def _note_change(t, begin, p, progress, w, room, watch):
-    """Note what has changed at a moment, of which w knows; or take it for the start."""
+    """Note what has changed at a moment, of which w knows; at the start, what is struck."""
     Y, size = progress.state, watch.states.shape[1]
     for j in range(len(watch.zones)):
         zone = _zone(j, p, progress, w)
         if begin:
-            watch.zones[j] = zone
-        elif watch.counts[NODES] != 0:
+            # A stop that is struck at the start was open before.
+            watch.zones[j] = OPEN if room.touched[j] else zone
+        if watch.counts[NODES] != 0:
             if room.touched[j] and watch.zones[j] == OPEN and zone == OPEN:
                 _note(watch, t, TOUCH_DOWN, j, Y)
                 _note(watch, t, LIFT_OFF, j, Y)

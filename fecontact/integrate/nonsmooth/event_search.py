@@ -39,7 +39,7 @@ from fecontact.laws.signatures import ground_at, normal_at
 from fecontact.system.nodes import ground_motion
 
 # Rounding of a sum, relative to its parts.
-_ROUNDING = 2e-15
+ROUNDING = 2e-15
 # Part of the shortest wave that a node may pass in a step, for the polynomial through the places.
 _WAVE = 0.25
 _PLACES = 0.5 - 0.5 * np.cos(np.pi * np.arange(PARTS + 1) / PARTS)
@@ -79,7 +79,7 @@ class Room(NamedTuple):
     released, arrived, held : (k,) boolean arrays
         Clusters that reach the limit of stick, that come to rest, and that stick.
     touched, parting : (n,) boolean arrays
-        Stops that are struck, and that open.
+        Stops that are struck and nodes that touch down, and stops that open.
     given, loads, pushes : (GIVEN,), (m,), (m,) arrays
         What is given in time, see :mod:`fecontact.integrate.nonsmooth.steps.rates`.
     flights, pull, heights : (n, FLIGHT_FIELDS), (SLOPES,), (PARTS + 2,) arrays
@@ -178,7 +178,7 @@ def _set_slip(k, sign, step, p, Y, room):
             speed = max(abs(speed), abs(values[i]))
         _through(values, b)
     for i in range(len(b)):
-        b[i] = sign * b[i] + _ROUNDING * (size + abs(speed))
+        b[i] = sign * b[i] + ROUNDING * (size + abs(speed))
 
 
 @helper
@@ -262,7 +262,7 @@ def _search_stops(step, p, progress, room):
             continue
         shorter = min(shorter, _add_ground(j, step, p, Y, room))
         for i in range(len(b)):
-            b[i] = _ROUNDING * size - b[i]
+            b[i] = ROUNDING * size - b[i]
         room.place[clusters + j] = first_below(b, room.halves)
         first = min(first, room.place[clusters + j])
     return first, shorter, forces

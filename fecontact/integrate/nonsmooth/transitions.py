@@ -4,15 +4,23 @@ A cluster without slip velocity sticks if a friction force within its limit hold
 such clusters are the solution of a quadratic program, found by projected Gauss-Seidel sweeps:
 
     -L_c <= R_c <= L_c,    a_c = 0 where |R_c| < L_c,    sign(R_c) a_c >= 0 where |R_c| = L_c
+
+A touch-down is decided by its event. The state there has a penetration of zero up to rounding, of
+either sign; :func:`press` moves it to the side on which the normal law acts.
 """
 
 import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.integrate.nonsmooth.equations import derivative, solve_small, speed_rate
-from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, STICK
+from fecontact.integrate.nonsmooth.event_search import ROUNDING, pressed
+from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, PENETRATION, RATE, SLOPE, STICK
 
 SWEEPS = 20000
+# Rounding of a time relative to it or to the longest step, in which a problem has so many ticks.
+_TIME_ROUNDING, _TICKS = 1e-14, 1e4
+# How often the distance by which a node is moved into contact is enlarged fourfold.
+_PRESSES = 4
 
 
 @helper
@@ -67,18 +75,51 @@ def _least_friction(p, candidate, relative, w):
 
 
 @helper
+def press(t, p, touched, w, Y):
+    """Move touched nodes into contact by the rounding of their penetrations.
+
+    Nodes that are open by more, as those of a step that ends before its touch-down, are left.
+    """
+    s = p.system
+    m = s.Tx.shape[1]
+    for j in range(len(touched)):
+        u, rate = w.nodes[j, PENETRATION], w.nodes[j, RATE]
+        if not touched[j] or pressed(u, j, s) > 0.0:
+            continue
+        size, stretch = abs(s.gap[j]) + max(abs(p.relief[0]), abs(p.relief[1])), 0.0
+        for i in range(m):
+            row = s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]
+            size += abs(s.Ty[j, i] * Y[i])
+            stretch += row * row
+        depth = ROUNDING * size + abs(rate) * _TIME_ROUNDING * (abs(t) + _TICKS * p.tick)
+        for _ in range(_PRESSES):
+            way = depth if pressed(u + depth, j, s) > 0.0 else (
+                -depth if pressed(u - depth, j, s) > 0.0 else 0.0)
+            if way != 0.0 and stretch > 0.0:
+                for i in range(m):
+                    row = s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]
+                    Y[i] -= row / stretch * way
+                break
+            depth *= 4.0
+
+
+@helper
 def decide_clusters(t, p, progress, room, near, w, out):
     """Set the status of all clusters at a moment at which some may change.
 
     ``room.released`` clusters have reached the limit of stick and slip in the sense of ``status``;
     those whose slip has ``arrived`` at its end, up to the error of the step, and others with a
-    slip velocity below ``near`` stick or slip by their forces. ``room.fresh`` tells those that
-    begin to slip from no slip velocity. Fills ``out`` with Y'.
+    slip velocity below ``near`` stick or slip by their forces; ``room.touched`` nodes touch down.
+    ``room.fresh`` tells clusters that begin to slip from no slip velocity. Fills ``out`` with Y'.
     """
     clusters, m = p.rows.shape
     Y, status, closed = progress.state, progress.status, progress.closed
     released, arrived, fresh = room.released, room.arrived, room.fresh
     derivative(t, Y, p, status, closed, w, out)
+    if room.touched.any():
+        press(t, p, room.touched, w, Y)
+        room.touched[:] = False
+        derivative(t, Y, p, status, closed, w, out)
     candidate, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
     for c in range(clusters):
         fresh[c] = False
