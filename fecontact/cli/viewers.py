@@ -12,6 +12,8 @@ import webbrowser
 from pathlib import Path
 
 from fecontact.core.errors import InputError, MissingLibraryError, choices
+from fecontact.core.files.hdf5_check import open_hdf5
+from fecontact.core.files.stored import reading
 
 FRAMES = (".vtkhdf", ".pvd", ".vtu")  # fields over the bodies, for ParaView
 MEDIA = (".png", ".mp4", ".pdf")
@@ -47,13 +49,8 @@ def has_frames(file: Path) -> bool:
     """Whether ParaView finds fields over bodies in a file."""
     if file.suffix.lower() != ".vtkhdf":
         return True
-    import h5py
-
-    try:
-        with h5py.File(file) as content:
-            return "VTKHDF" in content
-    except OSError:
-        raise InputError(f"{file} is not an HDF5 file; run the study again.") from None
+    with reading(file, "not an HDF5 file, or is damaged"), open_hdf5(file) as content:
+        return "VTKHDF" in content
 
 
 def show_in_paraview(file: Path, program: Path | None) -> None:

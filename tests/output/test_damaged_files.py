@@ -11,6 +11,8 @@ from synthetic import basis, run
 from fecontact import InputError, read_case, sweep, write_case
 from fecontact.bifurcation import Branch, BranchPoint, BranchStatus
 from fecontact.bifurcation.continuation.points import details_of
+from fecontact.core.files import hdf5_check
+from fecontact.core.files.hdf5_check import append_checksum
 from fecontact.core.files.stored import DamagedError, npz_arrays
 from fecontact.integrate import Events
 from fecontact.io import read_basis, read_branches, read_table, write_basis, write_branches
@@ -148,6 +150,7 @@ def test_a_damaged_run_is_one_sentence(case, change, tmp_path):
     path.write_bytes(case.read_bytes())
     with h5py.File(path, "a") as file:
         change(file)
+    append_checksum(path)
     with pytest.raises(InputError) as caught:
         read_case(path)
     said = str(caught.value)
@@ -158,10 +161,40 @@ def test_a_damaged_run_is_one_sentence(case, change, tmp_path):
 
 def test_a_run_cut_anywhere_is_refused(case, tmp_path):
     whole, path = case.read_bytes(), tmp_path / "cut.vtkhdf"
-    for place in np.linspace(0, len(whole) - 1, 60).astype(int):
+    for place in np.linspace(0, len(whole) - 27, 6).astype(int):
         path.write_bytes(whole[:place])
         with pytest.raises(InputError, match=r"cut\.vtkhdf"):
             read_case(path)
+
+
+def test_a_run_with_turned_bits_is_refused_at_once(case, tmp_path):
+    whole, path = bytearray(case.read_bytes()), tmp_path / "turned.vtkhdf"
+    for place in np.linspace(100, len(whole) - 1, 40).astype(int):
+        turned = bytearray(whole)
+        turned[place] ^= 1
+        path.write_bytes(turned)
+        with pytest.raises(InputError, match=r"turned\.vtkhdf is not an HDF5 file, or is damaged"):
+            read_case(path)
+
+
+def test_a_file_that_the_library_never_ends_reading_is_refused(tmp_path, monkeypatch):
+    limited = hdf5_check._CHECK.replace("def read(", "while True: pass\ndef read(")
+    assert limited != hdf5_check._CHECK
+    monkeypatch.setattr(hdf5_check, "_CHECK", limited)
+    monkeypatch.setattr(hdf5_check, "_PATIENCE", 0.5)
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["basis"] = 1.0
+    with pytest.raises(InputError, match="fails to read it to its end"):
+        read_basis(path)
+
+
+def test_a_file_to_which_others_have_added_is_read(case, tmp_path):
+    path = tmp_path / "added.vtkhdf"
+    path.write_bytes(case.read_bytes())
+    with h5py.File(path, "a") as file:
+        file.attrs["note"] = "x" * 5000
+    assert np.array_equal(read_case(path).trajectory.states, read_case(case).trajectory.states)
 
 
 def branches():
@@ -190,6 +223,7 @@ def test_a_damaged_branch_is_one_sentence(change, tmp_path):
     assert np.array_equal(found.column("observed"), 0.2 * np.arange(4))
     with h5py.File(path, "a") as file:
         change(file)
+    append_checksum(path)
     with pytest.raises(InputError) as caught:
         read_branches(path)
     assert str(caught.value).startswith(str(path))
@@ -210,6 +244,7 @@ def test_a_damaged_basis_is_one_sentence(tmp_path):
     write_basis(path, run(times=3).system.basis)
     with h5py.File(path, "a") as file:
         huge("basis/T", (10**6, 3, 10**6))(file)
+    append_checksum(path)
     with pytest.raises(InputError, match=r"basis\.h5 is damaged"):
         read_basis(path)
 

@@ -21,7 +21,7 @@ from fecontact.core.errors import InputError
 T = TypeVar("T")
 Shape = tuple[int | None, ...]
 
-_DENSEST = 1100  # upper bound of the compression ratio of deflate
+DENSEST = 1100  # upper bound of the compression ratio of deflate
 LARGEST = 20_000_000  # rows and columns of a sparse matrix
 _KINDS = {"f": ("fiu", np.float64), "i": ("iu", np.int64)}
 
@@ -122,7 +122,7 @@ def values(data: Any) -> Any:
         raise DamagedError(f"the values of '{data.name}' lie in another file")
     needed = math.prod(data.shape) * data.dtype.itemsize
     filtered = data.id.get_create_plist().get_nfilters() > 0
-    if needed > data.id.get_storage_size() * (_DENSEST if filtered else 1):
+    if needed > data.id.get_storage_size() * (DENSEST if filtered else 1):
         raise DamagedError(f"'{data.name}' declares {needed:.3g} bytes, more than the file holds")
     return data[()]
 
@@ -193,7 +193,7 @@ def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
     whole = path.stat().st_size
     with zipfile.ZipFile(path) as archive:
         for entry in archive.infolist():
-            if entry.file_size > _DENSEST * max(min(entry.compress_size, whole), 1):
+            if entry.file_size > DENSEST * max(min(entry.compress_size, whole), 1):
                 raise DamagedError(f"'{entry.filename}' is larger than the file can hold")
             with archive.open(entry) as stream:
                 found[entry.filename.removesuffix(".npy")] = npy_array(stream, entry.file_size)

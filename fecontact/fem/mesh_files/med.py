@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import MeshError
+from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import member, values
 from fecontact.core.types import Integers
 from fecontact.fem.mesh_files.raw import RawMesh
@@ -26,10 +27,8 @@ def read_med(path: Path) -> RawMesh:
     MeshError
         If the file is not HDF5, holds no mesh, several meshes or several time steps.
     """
-    import h5py
-
     try:
-        file = h5py.File(path, "r")
+        file = open_hdf5(path)
     except OSError:
         raise MeshError("The file is not HDF5, or is damaged.") from None
     with file:

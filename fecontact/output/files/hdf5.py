@@ -11,6 +11,7 @@ import numpy as np
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.atomic_write import replaced
+from fecontact.core.files.hdf5_check import append_checksum, open_hdf5
 from fecontact.core.files.stored import (
     DamagedError,
     array,
@@ -66,6 +67,8 @@ class _Sink(io.FileIO):
 def new_file(path: str | Path) -> Iterator[Any]:
     """Open a new HDF5 file for writing; it is moved into place if the block succeeds.
 
+    The file ends in a checksum of its content, by which :func:`open_file` finds damage.
+
     Ctrl-C is deferred until then: an exception inside the library would leave a broken file open.
 
     Raises
@@ -76,15 +79,17 @@ def new_file(path: str | Path) -> Iterator[Any]:
     import h5py
 
     with held_back_interrupt() as check:
-        with replaced(path) as part, _Sink(part) as sink:
-            try:
-                with h5py.File(sink, "w") as file:
-                    yield file
-            except Exception:
-                if sink.error is None:
-                    raise
-            if sink.error is not None:
-                raise sink.error
+        with replaced(path) as part:
+            with _Sink(part) as sink:
+                try:
+                    with h5py.File(sink, "w") as file:
+                        yield file
+                except Exception:
+                    if sink.error is None:
+                        raise
+                if sink.error is not None:
+                    raise sink.error
+            append_checksum(part)
         check()
 
 
@@ -98,15 +103,11 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
         If the file does not exist, is not HDF5, or lacks the group; other errors in the block are
         converted too, see :func:`fecontact.core.files.stored.reading`.
     """
-    import h5py
-
     path = as_path(path, "a file of results")
     if not path.is_file():
         raise InputError(f"{path} does not exist; give a file that fecontact wrote.")
-    try:
-        file = h5py.File(path, "r")
-    except OSError:
-        raise InputError(f"{path} is not an HDF5 file, or is damaged.") from None
+    with reading(path, "not an HDF5 file, or is damaged"):
+        file = open_hdf5(path)
     with reading(path), file:
         if group not in file:
             raise InputError(f"{path} was not written by fecontact: it has no group '{group}'.")

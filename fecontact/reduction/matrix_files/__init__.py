@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
 from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
 
@@ -121,7 +122,7 @@ def _read_mat(path: Path, name: str | None) -> tuple[Any, None]:
     import h5py
 
     if h5py.is_hdf5(path):
-        with h5py.File(path, "r") as file:
+        with open_hdf5(path) as file:
             return _chosen({key: _from_hdf5(file[key]) for key in file
                             if not key.startswith("#")}, name), None
     from scipy.io import loadmat
