@@ -731,6 +731,9 @@ SetValued(static_coefficient=True)
 Rodas5P(keep_checkpoint=3)
 Rodas5P(inline_laws="yes")
 Rodas5P(inline_laws=True,series="always")
+simulate(osc,1,solver=Rodas5P(checkpoint="/dev/zero"))
+HeightMap(file="/dev/zero")
+read_table("/dev/zero")
 """
 
 NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study",

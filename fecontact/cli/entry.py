@@ -44,6 +44,8 @@ def _show_warning(otherwise: Any) -> Any:
 
 def _execute(tokens: list[str]) -> int:
     debug = "--debug" in tokens
+    if "" in tokens:
+        return fail('an argument is empty (""); give it a value, or leave its option out.', 2)
     try:
         return int(app.meta(tokens, exit_on_error=False, print_error=False,
                             result_action="return_value") or 0)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecontact.cli.run_files import StoredRun
+from fecontact.core.checks import whole_number
 from fecontact.core.errors import FecontactError, InputError, choices
 
 if TYPE_CHECKING:
@@ -122,7 +123,8 @@ def _branch(file: Path, named: "dict[str, Branch]", wanted: str | None) -> "tupl
                              f"{'; choose one with --branch: ' * bool(orbits)}"
                              f"{choices(_numbered(named))}.")
         return orbits[0], named[orbits[0]]
-    name = names[int(wanted)] if wanted.isdigit() and int(wanted) < len(names) else wanted
+    number = whole_number(wanted)
+    name = names[number] if number is not None and number < len(names) else wanted
     if name not in named:
         raise InputError(f"{file} has no branch '{wanted}'; there are: "
                          f"{choices(_numbered(named))}.")
@@ -197,7 +199,8 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
     title = file.stem.removesuffix("-branch").removesuffix("-response")
     if "observed" in first.attributes:
         seen, _, component = str(first.attributes["observed"]).rpartition(" ")
-        place = int(seen) if seen.isdigit() else seen
+        number = whole_number(seen)
+        place = seen if number is None else number
         write: Any = report_response if "level" in first.attributes else report_modes
         shown: Any = (response_of(named) if "level" in first.attributes
                       else [mode_of(one) for one in named.values()])

@@ -11,6 +11,7 @@ import numpy as np
 from fecontact.analysis.histories import Point, usual_component
 from fecontact.analysis.receptance import Place, receptance
 from fecontact.cli.orbit_files import DIAGRAMS, OrbitChoice, holds_branches
+from fecontact.core.checks import whole_number
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots import analysis
@@ -168,8 +169,9 @@ def redraw(
 
 def point_of(text: str) -> Point:
     """A point from a command line: ``B``, ``3`` for a contact node, ``0.1,0.02`` for a place."""
-    if text.isdigit():
-        return int(text)
+    number = whole_number(text)
+    if number is not None:
+        return number
     if "," not in text:
         return text
     try:

@@ -1,6 +1,7 @@
 """Checks of arguments, shared by all public functions."""
 
 import os
+import stat
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from fecontact.core.errors import InputError, require_positive, shown
+from fecontact.core.resources.memory import available_memory, shown_memory
 from fecontact.core.types import Array, Coordinates, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
@@ -71,11 +73,38 @@ def as_path(path: Any, what: str) -> Path:
     return found
 
 
+def require_regular_file(path: Path, what: str, where: str = "") -> None:
+    """Raise :class:`InputError` if a path exists but is no regular file that fits into memory.
+
+    Pipes and devices may never end. Call it before the file is opened; ``what`` is its role in the
+    message, 'a study', and ``where`` its beginning.
+    """
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return  # said when it is opened
+    begin, free = f"{where}{path} cannot be read as {what}", available_memory()
+    if stat.S_ISDIR(found.st_mode):
+        raise InputError(f"{begin}: it is a folder; give a file.")
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(f"{begin}: it is a pipe or device, not a file; store its content in a "
+                         f"file first.")
+    if found.st_size > free:
+        raise InputError(f"{begin}: it has {shown_memory(found.st_size)}, where "
+                         f"{shown_memory(free)} of memory are free; take a smaller one.")
+
+
 def as_count(value: Any, what: str, least: int = 1) -> int:
     """Convert to an int of at least ``least``; ``what`` is its name in the InputError."""
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise InputError(f"{what} = {shown(value)} must be a whole number, {least} or above.")
     return int(value)
+
+
+def whole_number(text: str) -> int | None:
+    """The number that a text of decimal digits stands for, None for any other text."""
+    # Superscripts are digits too, and thousands of digits are not converted.
+    return int(text) if text.isdecimal() and len(text) < 20 else None
 
 
 def as_floats(values: Any, what: str) -> Array:

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from fecontact.core.checks import require_regular_file
 from fecontact.core.errors import InputError, nearest
 
 
@@ -30,6 +31,7 @@ def user_module(file: str | Path, where: str = "") -> ModuleType:
         If there is no such file, or it cannot be loaded.
     """
     path = Path(file).resolve()
+    require_regular_file(path, "Python code", where)
     try:
         written = path.stat().st_mtime_ns
     except FileNotFoundError:

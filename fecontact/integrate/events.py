@@ -257,7 +257,7 @@ class Events:
 
     def only(self, kind: str | None = None, node: int | None = None) -> "Events":
         """Events of one kind, of one node, or both; InputError for an unknown kind."""
-        own = isinstance(kind, str) and kind.startswith("event ") and kind[6:].isdigit()
+        own = isinstance(kind, str) and kind.startswith("event ") and kind[6:].isdecimal()
         if kind is not None and kind not in CONTACT_EVENTS and not own:
             raise InputError(f"kind = {kind!r} must be one of {choices(CONTACT_EVENTS)}, or "
                              f"'event k' for the k-th user-defined one.")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.checks import require_regular_file
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
@@ -136,6 +137,7 @@ def read_columns(
 def _text(owner: str, file: str | Path) -> str:
     if not isinstance(file, str | Path):
         raise InputError(f"{owner}: file = {file!r} must be the name of a file.")
+    require_regular_file(Path(file), "a table of numbers", f"{owner}: ")
     try:
         content = Path(file).read_bytes()
     except (OSError, ValueError) as error:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.checks import whole_number
 from fecontact.core.errors import InputError, choices, require_finite
 from fecontact.core.types import Array
 from fecontact.reduction.modal_basis import ModalBasis
@@ -79,10 +80,10 @@ def _place(basis: ModalBasis, name: str) -> tuple[str, tuple[int, ...]]:
     """Kind of a number and its index."""
     kind, *numbers = name.split(".")
     lengths = {"damping_ratios": 1, "damping": 2, "stiffness": 2}
-    if lengths.get(kind) != len(numbers) or not all(text.isdecimal() for text in numbers):
+    place = tuple(number for text in numbers if (number := whole_number(text)) is not None)
+    if not lengths.get(kind) == len(numbers) == len(place):
         raise InputError(f"The system has no parameter 'basis.{name}'; numbers of the basis are "
                          f"{choices(NAMES)}, with numbers I and J of modes from 0.")
-    place = tuple(int(text) for text in numbers)
     if max(place) >= basis.modes:
         raise InputError(f"The system has no parameter 'basis.{name}': the basis has {basis.modes} "
                          f"modes, counted from 0.")

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
-from fecontact.core.checks import require_frame_rate, require_scale
+from fecontact.core.checks import require_frame_rate, require_scale, whole_number
 from fecontact.core.errors import (
     InputError,
     choices,
@@ -179,7 +179,7 @@ class BasisSettings:
             raise InputError(f"BasisSettings: contact_nodes = {self.contact_nodes} must be at "
                              f"least 1, or \"all\".")
         for name in self.points:
-            if name.isdigit():
+            if name.isdecimal():
                 raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "
                                  f"go by number; choose a name with a letter.")
 
@@ -198,8 +198,9 @@ class BasisSettings:
     def finished(self, basis: ModalBasis) -> ModalBasis:
         """A basis with the dashpots of these settings and the modes that they select."""
         if self.dashpots:
-            basis = basis.with_dashpots({int(point) if point.isdigit() else point: values
-                                         for point, values in self.dashpots.items()})
+            basis = basis.with_dashpots({
+                point if (number := whole_number(point)) is None else number: values
+                for point, values in self.dashpots.items()})
         return basis if self.select is None else basis.select(self.select)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.bifurcation.response_options import ResponseSettings, flat_levels
-from fecontact.core.checks import as_path, require_kind
+from fecontact.core.checks import as_path, require_kind, require_regular_file, whole_number
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import (
     convert,
@@ -168,6 +168,7 @@ class Study(Summarised, StudyModels):
             the wrong type or out of range.
         """
         path = as_path(path, "a study")
+        require_regular_file(path, "a study")
         try:
             text = path.read_text(encoding="utf-8")
         except FileNotFoundError:
@@ -406,10 +407,11 @@ class Study(Summarised, StudyModels):
 
 
 def _number(text: str, items: list[Any], name: str, title: str) -> int:
-    if not (text.isdigit() and int(text) < len(items)):
+    number = whole_number(text)
+    if number is None or number >= len(items):
         raise InputError(f"{title}: {name} cannot be set, because '{text}' is none of the "
                          f"{len(items)} members, counted from 0.")
-    return int(text)
+    return number
 
 
 def _title(path: Path | None) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.checks import whole_number
 from fecontact.core.docstrings import summary
 from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.types import Array
@@ -115,7 +116,8 @@ def _function(name: str, folder: Path, known: Mapping[str, Any]) -> Callable[[Tr
         if "point" not in inspect.signature(function).parameters:
             raise InputError(f"The summary '{bare}' is not one of a point; leave out "
                              f"'@{point}'.")
-        options["point"] = int(point) if point.isdigit() else point
+        number = whole_number(point)
+        options["point"] = point if number is None else number
     return partial(function, **options) if options else function
 
 

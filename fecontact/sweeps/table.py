@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.core.checks import as_path
+from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, MissingLibraryError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, html_table, listed, span
@@ -241,6 +241,7 @@ def read_table(path: str | Path) -> SweepTable:
         If the file does not exist or is not such a table.
     """
     path = as_path(path, "a table")
+    require_regular_file(path, "a table")
     try:
         with path.open(encoding="utf-8", newline="") as file:
             head, *rows = csv.reader(file)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.checks import whole_number
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
@@ -145,8 +146,9 @@ def _multilinear(name: str, parts: Mapping[str, Any]) -> bool:
         return True
     *path, _ = inner.split(".")
     for step in path:
-        owner = (owner[int(step)] if isinstance(owner, tuple) and step.isdecimal()
-                 and int(step) < len(owner) else getattr(owner, step, None))
+        number = whole_number(step)
+        owner = (owner[number] if isinstance(owner, tuple) and number is not None
+                 and number < len(owner) else getattr(owner, step, None))
     return type(owner) is Harmonic
 
 

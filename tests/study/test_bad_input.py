@@ -3,6 +3,7 @@
 Each case ends with one kind sentence that names what is wrong, and leaves nothing behind.
 """
 
+import os
 import shlex
 import subprocess
 import sys
@@ -37,6 +38,8 @@ def prepared(tmp_path_factory):
         "binary.csv": bytes(range(256)) * 8, "text.msh": b"hello",
     }.items():
         (folder / name).write_bytes(content)
+    for name in ("fifo.toml", "fifo.py"):
+        os.mkfifo(folder / name)
     for name in ("folder.toml", "folder.vtkhdf", "folder.msh"):
         (folder / name).mkdir()
     (folder / "tiny.vtkhdf").rename(folder / "run.vtkhdf")
@@ -417,6 +420,12 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path):
 
 # Command lines, and a word that the sentence must have.
 COMMANDS = """
+run fifo.toml | pipe or device
+run /dev/zero | pipe or device
+plot run.vtkhdf history --point ² | no point '²'
+render run.vtkhdf -o "" | is empty
+run tiny.toml --set 'ground.profile={law="measured-profile",file="/dev/zero"}' | pipe or device
+run tiny.toml --set 'friction={law="fifo.py:A"}' | pipe or device
 init folder.toml | folder.toml exists
 init tiny.toml | --force
 init none/../tiny.toml | --force
@@ -600,3 +609,18 @@ def test_in_a_process_of_its_own(place):
         assert done.returncode == 1
         assert done.stdout == ""
         assert_kind(done.stderr)
+
+
+def test_python_without_docstrings_is_refused():
+    done = subprocess.run([sys.executable, "-OO", "-m", "fecontact", "keys"], text=True,
+                          capture_output=True, check=False)
+    assert done.returncode == 1
+    assert_kind(done.stderr)
+    assert "-OO" in done.stderr
+
+
+def test_pictures_into_the_present_folder(place, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert execute(["render", str(place / "run.vtkhdf"), "--frames", "2", "--size", "320", "180",
+                    "-o", "."]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["frame_0000.png", "frame_0001.png"]

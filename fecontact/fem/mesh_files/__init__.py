@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import as_path, require_kind
+from fecontact.core.checks import as_path, require_kind, require_regular_file
 from fecontact.core.errors import InputError, MeshError
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.types import ArrayLike, Coordinates, Integers
@@ -72,6 +72,7 @@ def read_mesh(
     reader, format_name = _reader(path)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
+    require_regular_file(path, "a mesh")
     try:
         mesh, groups = body_mesh(_read(reader, path, format_name).part(part), scale)
         return Mesh(mesh.nodes, mesh.cells,

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fecontact.core.checks import whole_number
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Integers
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
@@ -164,15 +165,17 @@ class _Part:
             return  # reference points
         members = sets.setdefault(name, [])
         if sets is self.node_sets and "ELSET" in options:
-            for number in self.resolve(self.element_sets, options["ELSET"]):
-                members.extend(self.elements[number][1] if number in self.elements else [])
+            for element in self.resolve(self.element_sets, options["ELSET"]):
+                members.extend(self.elements[element][1] if element in self.elements else [])
         for row in rows:
             words = [word for word in row if word]
             if "GENERATE" in options:
                 first, last, *step = (int(word) for word in words)
                 members.extend(range(first, last + 1, *step))
             else:
-                members.extend(int(word) if word.isdigit() else word for word in words)
+                for word in words:
+                    number = whole_number(word)
+                    members.append(word if number is None else number)
 
     def add_surface(self, name: str, rows: list[list[str]], several: bool) -> None:
         """Add rows ``set or element, side``; of several parts, only sets that this one has."""
@@ -203,7 +206,8 @@ class _Part:
         for name, side, *_ in (row for row in rows if len(row) > 1):
             if not re.fullmatch(r"[SE][1-6]", side.upper()):
                 continue
-            numbers = [int(name)] if name.isdigit() else self.resolve(self.element_sets, name)
+            given = whole_number(name)
+            numbers = self.resolve(self.element_sets, name) if given is None else [given]
             for number in numbers:
                 if number not in self.elements:
                     continue

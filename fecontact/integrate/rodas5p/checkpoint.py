@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.checks import require_regular_file
 from fecontact.core.errors import InputError
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.files.stored import DamagedError, npz_arrays, reading
@@ -53,6 +54,7 @@ class Checkpoint:
         """
         if not self.path.exists():
             return
+        require_regular_file(self.path, "a checkpoint")
         with reading(self.path, "not a checkpoint of fecontact"):
             stored = npz_arrays(self.path)
             mark = str(stored["mark"])

@@ -267,7 +267,7 @@ def _numbered_files(path: Path) -> Iterator[Callable[[Image], Any]]:
     names: list[str] = []
 
     try:
-        with beside(path) as part:
+        with beside(path / stem if path.is_dir() else path) as part:
             def take(image: Image) -> None:
                 names.append(f"{stem}_{len(names):04d}.png")
                 _save(part / names[-1], image)

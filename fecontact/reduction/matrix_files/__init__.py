@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import as_path
+from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
@@ -85,6 +85,7 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
                          f"that are: {', '.join(sorted(readers))}.")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
+    require_regular_file(path, "a matrix")
     try:
         matrix, labels = readers[path.suffix.lower()](path, name)
     except InputError as error:

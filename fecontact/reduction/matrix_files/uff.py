@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.core.checks import as_path
+from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.from_modes import basis_from_modes
@@ -215,6 +215,7 @@ def data_sets(path: Path) -> list[dict[str, Any]]:
                                   "pip install pyuff") from None
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
+    require_regular_file(path, "a matrix")
     try:
         # Each data set lies between two such lines; pyuff skips one without end.
         if len(re.findall(rb"^ {4}-1\s*?$", path.read_bytes(), re.MULTILINE)) % 2:
