@@ -1,7 +1,16 @@
 from .complex_modes import ComplexModes, complex_modes, prestressed_modes
 from .histories import History, history
 from .impacts import Impacts, Rest, find_impacts, find_rests
-from .periodicity import Periodicity, Strobe, count_periods, periodicity, strobed_states
+from .key_numbers import KeyNumbers, key_numbers
+from .periodicity import (
+    Periodicity,
+    Steadiness,
+    Strobe,
+    count_periods,
+    periodicity,
+    steadiness,
+    strobed_states,
+)
 from .receptance import Receptance, receptance
 from .spectra import (
     Peak,
@@ -16,12 +25,14 @@ __all__ = [
     "ComplexModes",
     "History",
     "Impacts",
+    "KeyNumbers",
     "Peak",
     "Periodicity",
     "Receptance",
     "Rest",
     "Spectrogram",
     "Spectrum",
+    "Steadiness",
     "Strobe",
     "amplitude_spectrum",
     "complex_modes",
@@ -29,10 +40,12 @@ __all__ = [
     "find_impacts",
     "find_rests",
     "history",
+    "key_numbers",
     "periodicity",
     "power_spectral_density",
     "prestressed_modes",
     "receptance",
     "spectrogram",
+    "steadiness",
     "strobed_states",
 ]

@@ -1,7 +1,9 @@
-"""Periodicity: strobed states and the number of drive periods after which they repeat."""
+"""Periodicity: strobed states, the periods after which they repeat, and steady motion."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +14,10 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
 
 _LEAST_CHECKS = 8  # returns that must agree before a motion is called periodic
+
+_FEWEST = 32  # output times of a run that can be called steady
+_MOST_GRID, _MOST_CHECKS = 2**15, 2000  # times of the search for a lag, and of its check
+_TRIED, _MOST_LINES = 8, 33  # candidates of a lag, and multiples of the period of a spectral line
 
 
 def drive_period(system: ContactSystem) -> float:
@@ -61,6 +67,31 @@ class Periodicity:
     periods: int | None
     misfit: float
     settled: bool = True
+
+
+@dataclass(frozen=True)
+class Steadiness:
+    """Result of :func:`steadiness`.
+
+    Attributes
+    ----------
+    kind : 'at rest', 'periodic', 'not steady' or 'unknown'
+        'unknown' if the run has too few output times to tell.
+    period : float or None
+        Period of a periodic motion [s].
+    misfit : float
+        Largest difference to the motion one lag earlier, relative to the largest deviation from the
+        mean; the lag is the best between an eighth and a quarter of the run. Zero at rest.
+    """
+
+    kind: Literal["at rest", "periodic", "not steady", "unknown"]
+    period: float | None = None
+    misfit: float = 0.0
+
+    @property
+    def steady(self) -> bool:
+        """True for motion at rest and periodic motion."""
+        return self.kind in ("at rest", "periodic")
 
 
 def strobed_states(
@@ -227,6 +258,141 @@ def periodicity(
         return Periodicity(1, 0.0)
     return count_periods(observed(found.states)[:, moves], size[moves], largest=largest,
                          tolerance=tolerance)
+
+
+def steadiness(trajectory: Trajectory, *, tolerance: float = 1e-2) -> Steadiness:
+    """Tell whether a run has become steady: at rest, periodic, or neither.
+
+    The displacements x of B and the contact nodes are observed in the last quarter of the run.
+
+    - *At rest*: x deviates from its mean there by at most 1e-3 of the largest deviation from it
+      in the whole run, or by at most 1e-9 of the largest displacement.
+    - *Periodic*: a lag L between an eighth and a quarter of the run exists for which
+      ``|x(t) - x(t - L)| <= tolerance max |x - mean|`` holds at all times t of the last quarter.
+      The period is the shortest lag L/k that meets the tolerance, too.
+
+    Motion that still grows or decays by more than the tolerance within a quarter of the run,
+    quasi-periodic and chaotic motion are not steady. Drives of any period are treated alike.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run. At least 32 output times and about five for each period are needed.
+    tolerance : float
+        Tolerance relative to the size of the motion.
+
+    Raises
+    ------
+    InputError
+        For a tolerance that is not positive.
+    """
+    require_kind("steadiness", Trajectory, trajectory=trajectory)
+    require_positive("steadiness", tolerance=tolerance)
+    t = trajectory.time
+    if len(t) < _FEWEST or not np.isfinite(trajectory.states).all():
+        return Steadiness("unknown")
+    x, v = _observed_motion(trajectory)
+    end, length = float(t[-1]), float(t[-1] - t[0])
+    late = t >= end - 0.25 * length
+    mean = x[late].mean(axis=0)
+    away = np.linalg.norm(x - mean, axis=1)
+    size = float(away[late].max())
+    if size <= max(1e-3 * float(away.max()), 1e-9 * float(np.linalg.norm(x, axis=1).max())):
+        return Steadiness("at rest")
+    count = min(len(t), _MOST_GRID)
+    even = np.linspace(float(t[0]), end, count)
+    step = float(even[1] - even[0])
+    grid = _hermite(t, x, v, even)
+    # Displacements between outputs are interpolated; every second one must do for that.
+    rough = _hermite(t[::2], x[::2], v[::2], t[late][:-1]) - x[late][:-1]
+    if float(np.linalg.norm(rough, axis=1).max()) > 16.0 * tolerance * size:
+        return Steadiness("unknown")
+    window = count // 4
+    times = np.linspace(end - 0.25 * length, end, min(window, _MOST_CHECKS))
+    now = _hermite(t, x, v, times)
+
+    def misfit(lag: float) -> float:
+        return float(np.linalg.norm(now - _hermite(t, x, v, times - lag), axis=1).max()) / size
+
+    lags = np.arange(count // 8, window + 1)
+    distance = _lagged_distance(grid, window)[lags]
+    best, found = np.inf, 0.0
+    for place in _lowest(distance):
+        lag, value = _refined(misfit, step * lags[place], step, 0.3 * length)
+        if value < best:
+            best, found = value, lag
+    if best > tolerance:
+        return Steadiness("not steady", misfit=best)
+    # Multiples of the period of the largest spectral line, which may be a harmonic.
+    power = (np.abs(np.fft.rfft(grid[-2 * window :] - mean, axis=0)) ** 2).sum(axis=1)
+    line = max(int(np.argmax(power[1:])) + 1, 1) / (2 * window * step)
+    period = found
+    for multiple in range(1, _MOST_LINES):
+        parts = round(found * line / multiple)
+        if parts < 1:
+            break
+        if misfit(found / parts) <= max(tolerance, 1.5 * best):
+            period = found / parts
+            break
+    return Steadiness("periodic", period, best)
+
+
+def _observed_motion(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Displacements and velocities (N, m) with the norm of those of B and the contact nodes."""
+    basis, m = trajectory.system.basis, trajectory.system.basis.modes
+    points = [0, *range(2, 2 + basis.contact_nodes)]
+    rows = basis.T[points, : basis.dimension].reshape(-1, m)
+    if not rows.any():
+        rows = np.eye(m)
+    square, ways = np.linalg.eigh(rows.T @ rows)
+    kept = square > 1e-14 * square[-1]
+    root = ways[:, kept] * np.sqrt(square[kept])
+    return trajectory.modal_coordinates @ root, trajectory.modal_velocities @ root
+
+
+def _hermite(t: Array, x: Array, v: Array, at: Array) -> Array:
+    """Cubic Hermite interpolation (k, m) of motion x (N, m) with velocities v."""
+    place = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    h = (t[place + 1] - t[place])[:, None]
+    s = (at - t[place])[:, None] / h
+    x0, x1, r0, r1 = x[place], x[place + 1], h * v[place], h * v[place + 1]
+    rise = x1 - x0
+    return np.asarray(x0 + s * (r0 + s * ((3.0 * rise - 2.0 * r0 - r1)
+                                          + s * (r0 + r1 - 2.0 * rise))))
+
+
+def _lagged_distance(grid: Array, window: int) -> Array:
+    """Sums of ``|x(t) - x(t - lag)|^2`` over the last ``window`` times, by the lag in steps."""
+    size = len(grid)
+    centred = grid - grid[-window:].mean(axis=0)
+    last = np.zeros_like(centred)
+    last[-window:] = centred[-window:]
+    padded = 2 * size
+    product = (np.fft.rfft(last, padded, axis=0)
+               * np.fft.rfft(centred, padded, axis=0).conj()).sum(axis=1)
+    together = np.fft.irfft(product, padded)[:size]
+    square = np.concatenate([[0.0], np.cumsum((centred**2).sum(axis=1))])
+    lags = np.arange(size - window)
+    earlier = square[size - lags] - square[size - window - lags]
+    return np.asarray(earlier[0] + earlier - 2.0 * together[lags])
+
+
+def _lowest(distance: Array) -> list[int]:
+    """Places of the lowest local minima."""
+    inner = np.concatenate([[np.inf], distance, [np.inf]])
+    minima = np.flatnonzero((inner[1:-1] <= inner[:-2]) & (inner[1:-1] <= inner[2:]))
+    return [int(place) for place in minima[np.argsort(distance[minima], kind="stable")][:_TRIED]]
+
+
+def _refined(
+    misfit: Callable[[float], float], lag: float, step: float, most: float
+) -> tuple[float, float]:
+    """Lag of the smallest misfit within a step of a lag, and that misfit."""
+    from scipy.optimize import minimize_scalar
+
+    found = minimize_scalar(misfit, bounds=(max(lag - step, step), min(lag + step, most)),
+                            method="bounded", options={"xatol": 1e-4 * step})
+    return float(found.x), float(found.fun)
 
 
 def _start(trajectory: Trajectory, t_start: float | None) -> float:

@@ -1,10 +1,12 @@
 """Tables of meshes and runs printed by commands."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from fecontact.core.units import quantity
 
 if TYPE_CHECKING:
     from fecontact.fem.mesh import Mesh
@@ -46,6 +48,19 @@ def run_table(trajectory: "Trajectory") -> Any:
     return table("", "", rows=run_facts(trajectory))
 
 
+def key_table(trajectory: "Trajectory", points: "Sequence[Any]") -> Any:
+    """Key numbers of a run; None for a run that is too short or grew beyond all numbers."""
+    from fecontact.analysis.key_numbers import key_numbers
+
+    states = trajectory.states
+    if len(states) < 4 or not np.isfinite(states).all():
+        return None
+    found = key_numbers(trajectory, tuple(point for point in points
+                                          if isinstance(point, str | int)))
+    begin, end = (quantity(time, "s") for time in found.interval)
+    return table(f"from {begin} to {end}", "", rows=found.rows())
+
+
 def compliance_table(interfaces: "Iterable[InterfaceCompliance]") -> Any:
     """Parts of the static compliance of interfaces that the modes resolve, in per cent."""
     rows = []
@@ -62,7 +77,6 @@ def preload_table(history: "LoadHistory", basis: "ModalBasis") -> Any:
 
     Their sum over faces of different directions would mean nothing.
     """
-    from fecontact.core.units import quantity
     from fecontact.reduction.assembly.contact_faces import contact_faces
     from fecontact.system.quasistatic.rest_state import STATES, total_friction
 
@@ -85,7 +99,6 @@ def preload_table(history: "LoadHistory", basis: "ModalBasis") -> Any:
 
 def wear_table(history: "WearHistory", basis: "ModalBasis") -> Any:
     """Summary of wear, of several bodies with the depth by interface."""
-    from fecontact.core.units import quantity
     from fecontact.reduction.assembly.contact_faces import contact_faces
 
     faces, rows = contact_faces(basis), dict(history.summary())

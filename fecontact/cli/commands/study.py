@@ -214,12 +214,15 @@ def run(
 ) -> int:
     """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
 
+    Prints the key numbers over the second half of the run, and whether its motion has become
+    steady: at rest, or periodic to within 1 % over the last quarter of the run.
+
     Ctrl-C, SIGTERM and SIGHUP stop the run; the part computed so far is written, and --resume
     continues it.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_results_of_run
-    from fecontact.cli.tables import run_table
+    from fecontact.cli.tables import key_table, run_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.files.locks import locked
 
@@ -248,6 +251,8 @@ def run(
         if ended != "INTERRUPTED":
             checkpoint.unlink(missing_ok=True)
         show(run_table(trajectory))
+        if (numbers := key_table(trajectory, described.output.points)) is not None:
+            show(numbers)
         for note in notes(trajectory):
             echo(f"note: {note}")
         echo_written(*files)
