@@ -6,12 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import right_hand_side
 from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import NODE_POWERS, POWERS, powers
+
+# Most periods of what is given in time, and steps of a given length, in a run, which then takes hours.
+MOST_PERIODS = 1e9
 
 
 def integrate(
@@ -256,6 +260,27 @@ def energy_scale(system: ContactSystem, state: Array) -> float:
     return float(start + springs + pressed) or float(slow)
 
 
+def bounded_period(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
+    """Shortest period of drive, loads and waves [s], infinite if none; see :func:`longest_step`.
+
+    Raises
+    ------
+    InputError
+        If the run holds more than :data:`MOST_PERIODS` of these periods, or of steps ``max_step``.
+    """
+    start, end = float(times[0]), float(times[-1])
+    period = system.shortest_period(start, end)
+    for size, what, remedy in (
+            (period, "periods of the fastest of drive, loads, ground and waves",
+             "end it earlier or lower that frequency"),
+            (max_step or np.inf, "steps of max_step", "end it earlier or raise max_step")):
+        count = (end - start) / size
+        if count > MOST_PERIODS:
+            raise InputError(f"The run from {start:g} s to {end:g} s holds {count:.2g} {what} of "
+                             f"{size:.3g} s, but can have {MOST_PERIODS:.0e} at most; {remedy}.")
+    return period
+
+
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
     """Limit of the step [s]: 1/50 of the run, 1/20 of the shortest period, or ``max_step``.
 
@@ -263,5 +288,5 @@ def longest_step(system: ContactSystem, times: Array, max_step: float | None = N
     from rest.
     """
     start, end = float(times[0]), float(times[-1])
-    longest = min((end - start) / 50.0, system.shortest_period(start, end) / 20.0)
+    longest = min((end - start) / 50.0, bounded_period(system, times, max_step) / 20.0)
     return longest if max_step is None else min(longest, float(max_step))

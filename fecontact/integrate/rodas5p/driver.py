@@ -13,6 +13,7 @@ from fecontact.integrate.collocation.room import chosen_collocation, collocation
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.reference.scipy import (
+    bounded_period,
     breaks,
     energy_scale,
     largest_motions,
@@ -258,7 +259,7 @@ def longest_step(system: ContactSystem, times: Array, max_step: float | None = N
     Contacts that they miss are found, however long they are.
     """
     start, end = float(times[0]), float(times[-1])
-    longest = min(end - start, system.shortest_period(start, end) / 4.0)
+    longest = min(end - start, bounded_period(system, times, max_step) / 4.0)
     return longest if max_step is None else min(longest, float(max_step))
 
 

@@ -1,0 +1,49 @@
+"""Runs that could not end are refused before they begin."""
+
+import numpy as np
+import pytest
+from systems import friction_oscillator, impact_oscillator
+
+import fecontact as fc
+from fecontact.core.errors import InputError
+from fecontact.integrate import Rodas5P, Scipy, SetValued
+
+SOLVERS = (Rodas5P(), Rodas5P(series="never"), Rodas5P(collocation="always"), Scipy("LSODA"))
+
+
+@pytest.mark.parametrize("frequency", [1e12, 1e100, 1e300])
+def test_periods_without_number_are_refused(frequency):
+    for solver in (*SOLVERS, SetValued()):
+        for system in (friction_oscillator(), impact_oscillator()):
+            if isinstance(solver, SetValued) and not system.ground.speed:
+                continue
+            with pytest.raises(InputError, match=r"holds .*e\+\d+ periods of the fastest of drive"):
+                fc.simulate(system.with_(**{"drive.angular_frequency": frequency}), 1.0,
+                            solver=solver)
+
+
+def test_waves_under_a_fast_belt_count_too():
+    system = friction_oscillator(ground=fc.Ground(speed=1e3, amplitude=1e-9, wavelength=1e-9))
+    with pytest.raises(InputError, match="of the fastest of drive, loads, ground and waves of"):
+        fc.simulate(system, 1.0)
+
+
+def test_steps_without_number_are_refused():
+    for solver in SOLVERS:
+        with pytest.raises(InputError, match=r"holds 1e\+12 steps of max_step of 1e-12 s, but can "
+                                             r"have 1e\+09 at most; end it earlier or raise max"):
+            fc.simulate(friction_oscillator(), 1.0, solver=solver, max_step=1e-12)
+
+
+def test_ensembles_refuse_them():
+    fast = friction_oscillator().with_(**{"drive.angular_frequency": 1e12})
+    with pytest.raises(InputError, match="periods of the fastest of drive"):
+        fc.ensemble([friction_oscillator(), fast], [0.0, 1.0])
+
+
+def test_short_runs_of_fast_drives_end():
+    """The same drive over ten of its periods: the block does not move yet."""
+    system = friction_oscillator().with_(**{"drive.angular_frequency": 1e12})
+    run = fc.simulate(system, 20.0 * np.pi / 1e12, outputs=11)
+    assert run.status is fc.Status.FINISHED
+    assert np.abs(run.modal_coordinates - run.modal_coordinates[0]).max() < 1e-12
