@@ -22,6 +22,7 @@ from .output.report.branch_report import report_branches
 from .output.report.mode_report import report_modes
 from .output.report.notebook import ReportFrame, report_frame, report_widget
 from .output.report.response_report import report_response
+from .output.report.run_comparison import report_runs
 from .output.report.run_report import report
 from .reduction.matrix_files import AssembledMatrix, read_matrix
 from .reduction.matrix_files.uff import UffModes, read_uff
@@ -55,6 +56,7 @@ __all__ = [
     "report_frame",
     "report_modes",
     "report_response",
+    "report_runs",
     "report_sweep",
     "report_widget",
     "to_pandas",

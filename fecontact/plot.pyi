@@ -10,7 +10,7 @@ from .output.plots.contact_map import plot_contact_map
 from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
-from .output.plots.many_runs import plot_basins, plot_poincare_scan
+from .output.plots.many_runs import plot_basins, plot_poincare_scan, plot_runs
 from .output.plots.modes import plot_convergence, plot_modes
 from .output.plots.phase_space import plot_phase_space
 from .output.plots.preload import plot_loop, plot_shear
@@ -52,6 +52,7 @@ __all__ = [
     "plot_receptance",
     "plot_resonance_curve",
     "plot_response",
+    "plot_runs",
     "plot_shear",
     "plot_sobol",
     "plot_spectrogram",

@@ -1,3 +1,4 @@
+from .comparison import Comparison, compare_runs
 from .complex_modes import ComplexModes, complex_modes, prestressed_modes
 from .histories import History, history
 from .impacts import Impacts, Rest, find_impacts, find_rests
@@ -22,6 +23,7 @@ from .spectra import (
 )
 
 __all__ = [
+    "Comparison",
     "ComplexModes",
     "History",
     "Impacts",
@@ -35,6 +37,7 @@ __all__ = [
     "Steadiness",
     "Strobe",
     "amplitude_spectrum",
+    "compare_runs",
     "complex_modes",
     "count_periods",
     "find_impacts",

@@ -61,8 +61,7 @@ class KeyNumbers:
         if found.kind == "unknown":
             return "unknown: too few output times"
         if found.period is None:
-            return (f"no: neither at rest nor periodic to 1 %; the motion differs by "
-                    f"{100.0 * found.misfit:.3g} %")
+            return f"no, differs by {100.0 * found.misfit:.3g} %"
         text = f"yes, periodic with {quantity(found.period, 's', 4)}"
         if self.drive_period is None:
             return text

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from fecontact.cli.commands import about, branch, response, run, study, sweep
+from fecontact.cli.commands import about, branch, compare, response, run, study, sweep
 from fecontact.core.errors import InputError
 
 
@@ -36,6 +36,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     sweep.sweep,
     branch.branch,
     response.response,
+    compare.compare,
     run.report,
     run.render,
     run.plot,

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = 1000  # most points of a line
 _ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
-_DECADES = 5.0  # range of a logarithmic axis below its highest value
+LOWEST_DECADES = 5.0  # range of a logarithmic axis below its highest value
 
 def plot_spectrum(
     trajectory: Trajectory,
@@ -73,13 +73,13 @@ def plot_spectrum(
         panel = figure.subplots()
         factor, symbol = (1.0, f"({shown.unit})²/Hz") if density else suitable_unit(
             float(found.values.max()), shown.unit)
-        end = highest_hz or _end_of_content(found.frequency_hz, found.values)
+        end = highest_hz or end_of_content(found.frequency_hz, found.values)
         heights = np.maximum(found.values, 1e-300) / factor
-        panel.semilogy(*_envelope(found.frequency_hz, heights, end), color=COLOURS[0],
+        panel.semilogy(*spectrum_line(found.frequency_hz, heights, end), color=COLOURS[0],
                        linewidth=1.0)
         top = float(found.values.max()) / factor
         if top > 0.0:
-            panel.set_ylim(top * 10.0**-_DECADES, 4.0 * top)
+            panel.set_ylim(top * 10.0**-LOWEST_DECADES, 4.0 * top)
         panel.set_xlim(0.0, end)
         named: list[float] = []
         for peak in found.peaks(40):
@@ -146,7 +146,7 @@ def plot_spectrogram(
             norm=LogNorm(top * 1e-4, top), cmap="viridis", shading="nearest", rasterized=True)
         figure.colorbar(image, ax=lower, label=f"amplitude [{symbol}]", pad=0.01)
         spread = found.values.max(axis=1)
-        lower.set_ylim(0.0, highest_hz or _end_of_content(found.frequency_hz, spread))
+        lower.set_ylim(0.0, highest_hz or end_of_content(found.frequency_hz, spread))
         lower.set_xlim(trajectory.time[0] / time_unit, trajectory.time[-1] / time_unit)
         lower.set_ylabel("frequency [Hz]")
         lower.set_xlabel(f"time [{time_symbol}]")
@@ -367,14 +367,14 @@ def _place(place: tuple[str | int, str]) -> str:
     return f"{point_name(place[0])} {place[1]}"
 
 
-def _end_of_content(frequency: Array, values: Array) -> float:
+def end_of_content(frequency: Array, values: Array) -> float:
     """Highest frequency with more than 0.002 of the highest value."""
     heard = np.flatnonzero(values > 2e-3 * values.max(initial=0.0))
     end = 1.1 * frequency[heard[-1]] if len(heard) else frequency[-1]
     return float(min(max(end, 10.0 * frequency[1]), frequency[-1]))
 
 
-def _envelope(frequency: Array, values: Array, end: float) -> tuple[Array, Array]:
+def spectrum_line(frequency: Array, values: Array, end: float) -> tuple[Array, Array]:
     """A long spectrum up to ``end``, thinned to the maxima of its bins."""
     shown = int(np.searchsorted(frequency, end, side="right"))
     few = shown // _COLUMNS

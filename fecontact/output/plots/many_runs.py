@@ -1,15 +1,24 @@
-"""Pictures of many runs: maps of basins of attraction, and diagrams of brute force."""
+"""Pictures of many runs: runs over each other, basins of attraction, diagrams of brute force."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from fecontact.analysis.comparison import require_runs
+from fecontact.analysis.histories import Point, history, usual_component
+from fecontact.analysis.spectra import amplitude_spectrum
+from fecontact.analysis.summaries import usual_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import ArrayLike
+from fecontact.core.units import suitable_unit
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.plots.analysis import LOWEST_DECADES, end_of_content, spectrum_line
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import distinct_colours
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
@@ -23,6 +32,63 @@ if TYPE_CHECKING:
 _UNSETTLED = "#ffffff"
 _COLUMNS, _ROWS = 1600, 800  # cells of the picture, at most
 _DARKEST = 0.98  # part of the cells that are met which are not the darkest
+
+
+def plot_runs(
+    runs: Mapping[str, Trajectory], quantity: str = "velocity", point: Point | None = None,
+    component: str | None = None, *, highest_hz: float | None = None,
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot histories of runs over each other, and their amplitude spectra.
+
+    Parameters
+    ----------
+    runs : mapping of name to Trajectory
+        Two runs or more.
+    quantity, point, component
+        As for :func:`fecontact.analysis.history`; by default B, or the contact node in the middle,
+        and the direction of the drive.
+    highest_hz : float, optional
+        End of the axis of the spectra [Hz].
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For fewer than two runs, a quantity or a point that a run does not have, another suffix, or
+        a file that cannot be written.
+    """
+    require_runs("plot_runs", runs)
+    first = next(iter(runs.values()))
+    point = usual_point(first) if point is None else point
+    component = usual_component(first.system) if component is None else component
+    found = [history(run, quantity, point, component) for run in runs.values()]
+    spectra = [amplitude_spectrum(run.time, one.values, resample=True)
+               for run, one in zip(runs.values(), found, strict=True)]
+    last = max(float(np.abs(run.time).max()) for run in runs.values())
+    time_unit, time_symbol = suitable_unit(last, "s")
+    unit, symbol = suitable_unit(max(float(np.abs(one.values).max()) for one in found),
+                                 found[0].unit)
+    end = highest_hz or max(end_of_content(one.frequency_hz, one.values) for one in spectra)
+    largest = max(float(one.values.max()) for one in spectra)
+    height, height_symbol = suitable_unit(largest, found[0].unit)
+    with new_figure(10.0, 6.6, path) as figure:
+        upper, lower = figure.subplots(2, 1)
+        for name, run, one, spectrum, colour in zip(
+                runs, runs.values(), found, spectra, distinct_colours(len(runs)), strict=True):
+            upper.plot(*thinned(run.time / time_unit, one.values / unit), color=colour,
+                       linewidth=1.0, label=name)
+            frequency, values = spectrum_line(spectrum.frequency_hz, spectrum.values, end)
+            lower.semilogy(frequency, np.maximum(values, 1e-300) / height, color=colour,
+                           linewidth=1.0)
+        upper.set(xlabel=f"time [{time_symbol}]", ylabel=f"{found[0].title} [{symbol}]")
+        lower.set(xlabel="frequency [Hz]", ylabel=f"amplitude [{height_symbol}]", xlim=(0.0, end))
+        if largest > 0.0:
+            top = largest / height
+            lower.set_ylim(top * 10.0**-LOWEST_DECADES, 4.0 * top)
+        figure.legend(loc="outside upper center", ncols=min(len(runs), 4))
+    return figure
 
 
 def plot_basins(

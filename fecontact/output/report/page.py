@@ -16,14 +16,15 @@ from fecontact.core.files.atomic_write import write_text
 from fecontact.output.report.payload import as_text
 from fecontact.output.report.shorten import shortened
 
-Kind = Literal["run", "branches", "sweep", "widget"]
+Kind = Literal["run", "runs", "branches", "sweep", "widget"]
 # In the order in which they need each other; together one script.
 _COMMON = ("payload.js", "chart.js", "widgets.js")
 SCRIPTS: Mapping[Kind, tuple[str, ...]] = {
-    "run": (*_COMMON, "map.js", "player.js", "run.js", "start.js"),
+    "run": (*_COMMON, "spectrum.js", "map.js", "player.js", "run.js", "start.js"),
+    "runs": (*_COMMON, "spectrum.js", "runs.js", "start.js"),
     "branches": (*_COMMON, "player.js", "branches.js", "start.js"),
     "sweep": (*_COMMON, "sweep.js", "start.js"),
-    "widget": (*_COMMON, "map.js", "player.js", "run.js", "widget.js"),
+    "widget": (*_COMMON, "spectrum.js", "map.js", "player.js", "run.js", "widget.js"),
 }
 LARGE = 20e6  # bytes of a file that mail and browsers take without complaint
 

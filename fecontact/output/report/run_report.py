@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 
 from fecontact.analysis.histories import Point
+from fecontact.analysis.key_numbers import key_numbers
 from fecontact.analysis.run_facts import notes, run_facts
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
-from fecontact.core.units import UNITS, round_125
+from fecontact.core.units import UNITS, quantity, round_125
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.stored_system import library_versions
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.scene import COLOUR_MAPS
 from fecontact.output.report.bodies import PRESSURE, STATE, Motions, bodies_table
-from fecontact.output.report.charts import chart_tables, energy_charts
+from fecontact.output.report.charts import chart_tables, energy_charts, spectrum_tables
 from fecontact.output.report.contact import (
     contact_table,
     drawn_contact,
@@ -116,11 +117,13 @@ def run_block(
         "good": found.status in (Status.FINISHED, Status.EVENT),
         "notes": told,
         "facts": [list(row) for row in _facts(run, found)],
+        **_key_numbers(found, points),
         "system": [list(row) for row in system.summary()],
         "study": study_tables(study),
         "versions": list(map(list, (versions or library_versions()).items())),
         "time": payload.add(found.time, 1e-9 * float(np.ptp(found.time) or 1.0)),
-        "charts": charts, "phases": phases, "energies": energy_charts(found, payload),
+        "charts": charts, "spectra": spectrum_tables(found, points, payload), "phases": phases,
+        "energies": energy_charts(found, payload),
         "balance": f"error of the energy balance: {found.energies.imbalance:.1e} of the largest "
                    f"term",
         "units": UNITS,
@@ -204,6 +207,16 @@ def _finite(run: Trajectory) -> Trajectory:
 
 def _facts(run: Trajectory, found: Trajectory) -> list[tuple[str, str]]:
     return run_facts(replace(found, statistics=run.statistics))
+
+
+def _key_numbers(run: Trajectory, points: Sequence[Point]) -> dict[str, Any]:
+    """Rows of the key numbers of a run and the interval that they are taken over."""
+    if len(run.time) < 4:
+        return {"numbers": [], "numbersOf": ""}
+    found = key_numbers(run, tuple(point for point in points if isinstance(point, str | int)))
+    begin, end = (quantity(time, "s") for time in found.interval)
+    return {"numbers": [list(row) for row in found.rows()],
+            "numbersOf": f"from {begin} to {end}"}
 
 
 def colour_maps() -> dict[str, list[list[int]]]:

@@ -121,7 +121,7 @@ class Chart {
     letters(c, "right");
     c.strokeStyle = css("grid");
     c.lineWidth = 1;
-    const xs = (this.marks || ticks).call(this, ...x, clamp((right - left) / 70, 2, 10)), ys = ticks(...y, this.height / 32);
+    const xs = (this.marks || ticks).call(this, ...x, clamp((right - left) / 70, 2, 10)), ys = (this.levels || ticks)(...y, this.height / 32);
     c.beginPath();
     for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
     for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }

@@ -26,12 +26,6 @@ function states(contact) {
   }), ...contact.slides?.length ? [`sliding: ${contact.slides.join(", ")}`] : []);
 }
 
-function columns({ values, lines, title, unit }, clock) {
-  const { values: all, columns: count, rows } = values;
-  return { title, unit, xLabel: clock.label, lines: lines.map((line, k) => ({ ...line,
-    y: Float64Array.from({ length: rows }, (_, i) => all[i * count + k]) })) };
-}
-
 async function build(host, data, told) {
   units = data.units;
   const clock = new Clock(data.time.values, told);
@@ -44,8 +38,9 @@ async function build(host, data, told) {
   });
   const maps = data.contact ? data.contact.faces.flatMap((face) => (face.plan ? [Footprint, ContactMap] : [ContactMap])
     .map((kind) => new kind(clock, data.contact, face, data.maps["von Mises stress"]))) : [];
+  const spectra = data.spectra.map((one) => new Spectrum(one));
   const energies = data.energies.map((one) => new Chart(clock, columns(one, clock)));
-  const all = [...charts, ...phases, ...maps, ...energies];
+  const all = [...charts, ...spectra, ...phases, ...maps, ...energies];
   const resize = () => { for (const one of all) one.resize(); };
   const timing = controls(data, clock, player, resize);
   const nodes = (some) => some.map((one) => one.node);
@@ -54,10 +49,11 @@ async function build(host, data, told) {
     timing.bar, timing.more, ...player && data.contact ? [states(data.contact)] : []),
     ...section("Contact", ...nodes(maps))),
     el("div", {}, ...section("Histories", ...nodes(charts)),
+      ...section("Spectra", ...nodes(spectra)),
       ...section("Phase portraits", ...phases.length ? [el("div.grid", {}, ...nodes(phases))] : []),
       ...section("Energies", ...nodes(energies), ...energies.length ? [el("p.legend", {}, data.balance)] : []),
       ...player ? section("Modes", modesTable(data, player, timing)) : [])),
-  el("div.two", {}, ...section("Run", table([], data.facts)),
+  el("div.two", {}, ...section("Run", table([], data.facts), ...data.numbers.length ? [el("h3", {}, data.numbersOf), table([], data.numbers)] : []),
     ...section("System", table([], data.system))),
   ...cards("Study", data.study), foot(data));
   const refresh = () => { player?.resize(); resize(); };

@@ -1,0 +1,105 @@
+"""The report of a comparison: a page with several runs over each other."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.analysis.comparison import compare_runs
+from fecontact.analysis.histories import Point, history, usual_component
+from fecontact.analysis.summaries import usual_point
+from fecontact.core.checks import as_path
+from fecontact.core.units import UNITS
+from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.output.files.stored_system import library_versions
+from fecontact.output.plots.style import distinct_colours
+from fecontact.output.report.charts import spectrum_table, table_of_curves
+from fecontact.output.report.page import write_page
+from fecontact.output.report.payload import Payload
+from fecontact.output.report.run_report import require_page
+
+_OUTPUTS = 4000  # of the common time of all runs
+
+
+def report_runs(
+    runs: Mapping[str, Trajectory], path: str | Path, *, title: str | None = None,
+    points: Sequence[str | int] = (), component: str | None = None,
+    studies: Sequence[str | None] = (),
+) -> Path:
+    """Write a comparison of runs as one HTML file that opens in any browser, without a network.
+
+    It shows key numbers side by side with their changes from the first run, the parameters that
+    differ, histories over each other in the time that all runs have, and spectra.
+
+    Parameters
+    ----------
+    runs : mapping of name to Trajectory
+        Two runs or more; the first is the reference.
+    path : str or Path
+        The .html file; it is replaced if it exists.
+    title : str, optional
+        Heading; the names of the runs by default.
+    points : sequence of str or int
+        Points of histories and spectra; B by default, or the contact node in the middle.
+    component : str, optional
+        Direction of motion; that of the drive by default.
+    studies : sequence of str or None
+        Study of each run, as TOML text.
+
+    Returns
+    -------
+    Path
+        The file, written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        As :func:`fecontact.analysis.compare_runs`, for another suffix, or a file that cannot be
+        written.
+    """
+    path = require_page(as_path(path, "a report"))
+    found = compare_runs(runs, points, studies=studies)
+    first = next(iter(runs.values()))
+    component = usual_component(first.system) if component is None else component
+    chosen: Sequence[Point] = tuple(points) or (usual_point(first),)
+    payload, colours = Payload(), distinct_colours(len(runs))
+    begin = max(float(run.time[0]) for run in runs.values())
+    end = min(float(run.time[-1]) for run in runs.values())
+    time = np.linspace(begin, end, _OUTPUTS) if end > begin else None
+    wanted: list[tuple[str, Point, str]] = [
+        (quantity, point, component) for point in chosen
+        for quantity in ("displacement", "velocity")]
+    if all(run.system.basis.contact_nodes for run in runs.values()):
+        wanted += [("total_normal_force", "B", "x"), ("total_friction_force", "B", "x")]
+    charts, spectra = [], []
+    for wish in wanted:
+        shown = [history(run, *wish) for run in runs.values()]
+        if not any(one.values.any() for one in shown):
+            continue
+        if time is not None:
+            charts.append(table_of_curves(shown[0].title, shown[0].unit, [
+                (name, colour, np.interp(time, run.time, one.values))
+                for (name, run), one, colour in zip(runs.items(), shown, colours, strict=True)],
+                payload))
+        if wish[0] == "velocity":
+            spectra.append(spectrum_table(shown[0].title, [
+                (name, colour, run.time, one) for (name, run), one, colour in zip(
+                    runs.items(), shown, colours, strict=True)], payload))
+    notes = [f"{name}: {run.status.value}" for name, run in runs.items()
+             if run.status not in (Status.FINISHED, Status.EVENT)]
+    if time is None:
+        notes.append("The runs have no time in common; their histories are left out.")
+    title = " and ".join(runs) if title is None else title
+    header: dict[str, Any] = {
+        "format": 1, "title": title, "units": UNITS, "names": list(found.names),
+        "status": f"{len(runs)} runs; changes are relative to {found.names[0]}",
+        "good": len(notes) == 0, "notes": notes,
+        "numbers": [list(row) for row in found.number_rows()],
+        "parameters": [list(row) for row in found.parameter_rows()],
+        "same": "All parameters that the files hold are equal.",
+        "time": None if time is None else payload.add(time, 1e-9 * (end - begin)),
+        "charts": charts, "spectra": [one for one in spectra if one is not None],
+        "versions": list(map(list, library_versions().items())),
+    }
+    return write_page(path, title, payload.block(header), "runs")

@@ -1,0 +1,92 @@
+"""Runs over each other: motions that are known in closed form."""
+
+import numpy as np
+import pytest
+from report_reading import Shown
+from synthetic import basis
+
+import fecontact as fc
+from fecontact import ContactSystem, InputError
+from fecontact.analysis import compare_runs
+from fecontact.cli import execute
+from fecontact.io import report_runs
+from fecontact.laws import ConstantFriction, LinearContact
+from fecontact.plot import plot_runs
+from fecontact.system.powers import POWERS
+
+TURN = 2.0 * np.pi
+STUDIES = ("[ground]\nspeed = 0.1\n[output]\nframes = 3\n",
+           "[ground]\nspeed = 0.2\n[output]\nframes = 5\n[friction]\nlaw = 'constant'\n")
+
+
+def vibration(amplitude, hertz, outputs=1001):
+    shapes = basis()
+    system = ContactSystem(shapes, normal=LinearContact(stiffness=1e6),
+                           friction=ConstantFriction(0.3, smoothing_slope=200.0))
+    t = np.linspace(0.0, 1.0, outputs)
+    q, v = np.zeros((2, outputs, shapes.modes))
+    q[:, 0], v[:, 0] = amplitude * np.cos(TURN * hertz * t), (
+        -amplitude * TURN * hertz * np.sin(TURN * hertz * t))
+    q[:, 1] = -1e-5
+    return fc.Trajectory(system, t, q, v, np.zeros((outputs, len(POWERS))))
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {"slow": vibration(1e-3, 20.0), "fast": vibration(1.5e-3, 25.0, outputs=801)}
+
+
+def test_differences_of_parameters_and_numbers(runs):
+    found = compare_runs(runs, ["B"], studies=STUDIES)
+    assert found.parameters == {"ground.speed": ("0.1", "0.2"), "friction.law": ("", "constant")}
+    assert found.change("amplitude_x@B") == pytest.approx(0.5, rel=2e-2)
+    assert found.change("dominant_frequency@B") == pytest.approx(0.25, rel=1e-2)
+    assert found.change("mean_normal_force") == pytest.approx(0.0, abs=1e-9)
+    rows = {row[0]: row[1:] for row in found.number_rows()}
+    assert rows["steady"] == ("yes, periodic with 50 ms", "yes, periodic with 40 ms")
+    assert rows["amplitude x at B"][0] == "1 mm"
+    assert rows["amplitude x at B"][1].startswith("1.5 mm (+")
+
+
+def test_pictures_of_runs_over_each_other(runs):
+    upper, lower = plot_runs(runs, "displacement", "B", "x").axes
+    assert [line.get_label() for line in upper.lines] == ["slow", "fast"]
+    for line, amplitude in zip(upper.lines, (1.0, 1.5), strict=True):
+        assert line.get_ydata().max() == pytest.approx(amplitude, rel=1e-2)
+    for line, hertz in zip(lower.lines, (20.0, 25.0), strict=True):
+        assert line.get_xdata()[line.get_ydata().argmax()] == pytest.approx(hertz, abs=0.3)
+
+
+def test_the_page_of_a_comparison(runs, tmp_path):
+    page = Shown(report_runs(runs, tmp_path / "two.html", studies=STUDIES))
+    assert page.header["names"] == ["slow", "fast"]
+    assert ["ground.speed", "0.1", "0.2"] in page.header["parameters"]
+    curves = page.array("charts", 0, "values") * page.header["charts"][0]["factor"]
+    time = page.array("time")
+    assert curves[:, 0] == pytest.approx(1e-3 * np.cos(TURN * 20.0 * time), abs=3e-5)
+    spectrum = page.header["spectra"][0]
+    assert spectrum["title"] == "velocity x of B"
+    heights = page.array("spectra", 0, "values")
+    frequency = page.array("spectra", 0, "frequency")
+    assert frequency[heights.argmax(axis=0)] == pytest.approx([20.0, 25.0], abs=0.3)
+
+
+def test_what_cannot_be_compared(runs):
+    with pytest.raises(InputError, match="1 run cannot be compared; give two or more"):
+        compare_runs({"slow": runs["slow"]})
+    with pytest.raises(InputError, match="1 studies do not match 2 runs"):
+        compare_runs(runs, studies=[None])
+
+
+def test_the_command(runs, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for (name, run), study in zip(runs.items(), STUDIES, strict=True):
+        fc.write_case(f"{name}.vtkhdf", run, frames=2, study=study)
+    assert execute(["compare", "slow.vtkhdf", "fast.vtkhdf", "--point", "B"]) == 0
+    out = capsys.readouterr().out
+    assert "ground.speed" in out
+    assert "dominant frequency at B" in out
+    assert (tmp_path / "slow-compare.html").is_file()
+    assert (tmp_path / "slow-compare.png").is_file()
+    assert execute(["compare", "slow.vtkhdf"]) == 1
+    assert "compare takes two files or more, not 1" in capsys.readouterr().err
