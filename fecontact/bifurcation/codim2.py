@@ -10,6 +10,7 @@ from fecontact.bifurcation.codim2_beside import begun
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.newton import corrected
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     DiscontinuityPoint,
@@ -31,7 +32,13 @@ from fecontact.bifurcation.homoclinic.starts import homoclinic_curve
 from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve, orbit_curve
 from fecontact.bifurcation.orbits.curves.errors import with_errors
 from fecontact.core.checks import require_flags, require_kind
-from fecontact.core.errors import InputError, require_finite, shown
+from fecontact.core.errors import (
+    AnalysisError,
+    FecontactError,
+    InputError,
+    require_finite,
+    shown,
+)
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -42,6 +49,9 @@ _ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("resonance 1:1", "reso
 _CROSSINGS = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")
 # Part of the first step at which a curve begins that leaves a point to one side.
 _BESIDE = 4e-4
+# Distances, in first steps, at which the two sides of such a start are compared; the first one at
+# which the curve has points on both sides counts.
+_SIDES = (1.0, 0.3, 0.1, 0.01, 1e-3)
 # Part of a range within which a start on its end may lie beside it.
 _ON_BOUND = 1e-9
 
@@ -215,12 +225,40 @@ def _followed(
         chosen = replace(chosen, tolerance=problem.orbit.sizes.newton(chosen.tolerance))
     tangent = tangent_at(problem, u, direction)
     if grows is not None:
-        beside = _BESIDE * options.step * tangent
-        if grows(u - beside) > grows(u + beside):
-            tangent, beside = -tangent, -beside
-        u, both = u + beside, False
+        tangent = _towards_growth(problem, u, tangent, chosen, grows)
+        u, both = u + _BESIDE * options.step * tangent, False
     curve = continue_branch(problem, u, chosen, name=names[0], tangent=tangent, both=both,
                             attributes=attributes)
     if not isinstance(problem, OrbitCurve):
         return curve
     return with_errors(problem, curve, list(options.events))
+
+
+def _towards_growth(
+    problem: Problem, u: Array, tangent: Array, options: ContinuationOptions,
+    grows: Callable[[Array], float],
+) -> Array:
+    """The tangent, turned to the side of the curve on which ``grows`` of the unknowns is larger.
+
+    At a point of codimension two the equations may have more than one direction, and rounding then
+    decides which part of the other ones the tangent has. Therefore ``grows`` is compared at points
+    of the curve itself, a step away from u on both sides, or nearer where there are none.
+
+    Raises
+    ------
+    AnalysisError
+        If Newton's method reaches no points of the curve beside u.
+    """
+    row = problem.weights() * tangent
+    for part in _SIDES:
+        try:
+            behind, ahead = (corrected(problem, u + side * part * options.step * tangent, row,
+                                       options.tolerance, 2 * options.iterations)
+                             for side in (-1.0, 1.0))
+        except FecontactError:
+            continue
+        if behind is not None and ahead is not None:
+            return -tangent if grows(behind[0]) > grows(ahead[0]) else tangent
+    raise AnalysisError(f"The curve has no points within {_SIDES[0] * options.step:.3g} of its "
+                        f"start on both sides; start from another point of it, or with a shorter "
+                        f"step than step = {options.step:g}.")

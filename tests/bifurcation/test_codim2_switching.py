@@ -1,5 +1,7 @@
 """Curves that begin at points of codimension two, in systems in which they are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_curves import takens
@@ -194,6 +196,27 @@ def test_folds_and_tori_from_a_resonance_1_1():
     assert found.parameter == pytest.approx(np.zeros(len(found)), abs=1e-10)
     assert np.sort(found.column("c"))[[0, -1]] == pytest.approx([-0.8, 0.0], abs=1e-5)
     assert not found.of_kind("Chenciner")
+
+
+def test_tori_from_a_resonance_1_1_whatever_rounding_does():
+    """At the resonance the equations have two directions; relative changes of 1e-14 of the orbit
+    mix them. The tori lie at c < 0, whatever the mixture is.
+    """
+    field, t, circle = circle_field(strong, b=-0.05, c=-0.5)
+    a = np.roots([1.0, -0.5, -0.05]).min()
+    branch = orbit_branch(field, PeriodicMotion(t, (1.0 + a) * circle, period=np.pi), "b",
+                          method=Collocation(intervals=16), bounds=(-0.3, 0.3), scales=np.ones(3))
+    box = {"b": (-0.3, 0.3), "c": (-0.8, 0.8)}
+    folds = codim2_curve(field, branch.of_kind("fold")[0], "c", bounds=box)
+    point, = folds.of_kind("resonance 1:1")
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        moved = replace(point, u=point.u * (1.0 + 1e-14 * rng.normal(size=len(point.u))))
+        tori = codim2_curve(field, moved, "c", to="Neimark-Sacker", bounds=box,
+                            options=ContinuationOptions(points=2))
+        c = tori.column("c")
+        assert c[-1] < c[0] < 1e-4
+        assert c[-1] < -0.01
 
 
 def half(t, x, p, out):
