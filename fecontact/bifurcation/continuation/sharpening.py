@@ -48,8 +48,15 @@ _DISTANCES = (1e-3, 1e-2, 1e-4, 3e-2)
 _MOST_POINTS = 30
 # Finest mesh for a coefficient, in least intervals of the branch; one doubling is always made.
 _FINEST_MESH = 16
-# Relative change between two meshes at which a coefficient counts as converged.
-_CONVERGED = 1e-3
+# Relative change between the first two meshes at which a coefficient counts as converged, and the
+# relative error at which no finer mesh is tried.
+_CONVERGED, _KNOWN = 1e-3, 0.02
+# Last change of a coefficient from mesh to mesh, in its errors: where rounding is all that changes,
+# the last value is as far off as the one before.
+_OF_ROUNDING = 2.0
+# Factor by which the error of a parameter falls from one mesh to the next: the least one if nothing
+# is known of it, and the largest one.
+_FALLS = (1.0 / 32.0, 0.5)
 # Smallest factor by which the error of a parameter is taken to fall from one mesh to the next.
 LEAST_FALL = 1e-3
 # Smallest error of a parameter, in widths of the diagram.
@@ -167,8 +174,9 @@ class _Located:
     def best(self) -> tuple[BranchPoint, float]:
         """The point on the first mesh that is fine enough, and the error of its parameter.
 
-        A change much smaller than the one before is an accident: an error falls by 256 from mesh to
-        mesh of degree four where the motion is smooth.
+        The error is the sum of the changes on all finer meshes, as a geometric series. A change
+        much smaller than the one before is an accident: an error falls by 256 from mesh to mesh of
+        degree four where the motion is smooth.
         """
         places = [point.parameter for point in self.points]
         changes = [abs(after - before) for before, after in pairwise(places)]
@@ -176,8 +184,10 @@ class _Located:
             changes[0] = max(changes[0], self._tolerance * (1.0 + LEAST_FALL))
         if not changes:
             return self.points[0], float("nan")
-        errors = [max(change, LEAST_FALL * before, self._rounding)
-                  for change, before in zip(changes, [0.0, *changes], strict=False)]
+        falls = [_FALLS[0], *(min(max(after / before, _FALLS[0]), _FALLS[1]) if before > 0.0
+                              else _FALLS[1] for before, after in pairwise(changes))]
+        errors = [max(change / (1.0 - fall), LEAST_FALL * before, self._rounding)
+                  for change, before, fall in zip(changes, [0.0, *changes], falls, strict=False)]
         # A coefficient may have needed finer meshes than are to be kept.
         kept = [k for k in range(len(errors))
                 if k == 0 or len(self.points[k].values["mesh"]) <= self._most + 1]
@@ -236,8 +246,8 @@ def reach(place: tuple[Problem, Array, Array], unknown: int = -1) -> float:
 def _judged(located: _Located, found: BranchPoint | None) -> dict[str, Any] | None:
     """Coefficient and criticality of a special point, from finer meshes; None if none has it.
 
-    The error of the coefficient is its last change from mesh to mesh, and at least half the change
-    before: two meshes may agree by accident.
+    The error of the coefficient is twice its last change from mesh to mesh, and at least half the
+    change before: two meshes may agree by accident.
     """
     most = max(_FINEST_MESH * located.least, 2 * located.intervals)
     coefficients = [] if found is None else [_normal_form(found)[0]]
@@ -249,16 +259,19 @@ def _judged(located: _Located, found: BranchPoint | None) -> dict[str, Any] | No
             continue
         confirmed = True
         coefficient, own_error = _normal_form(finer)
-        if own_error > before:  # Rounding on this mesh is more than the last change.
+        # Rounding on this mesh is more than the error on the last one, or finer ones may have less.
+        finer_ones = 2 * located.intervals <= most
+        if own_error > error or (finer_ones and not own_error <= _KNOWN * abs(coefficient)):
             continue
         coefficients.append(coefficient)
         if len(coefficients) == 1:
             continue
-        change = abs(coefficients[-1] - coefficients[-2])
-        at_once = change <= _CONVERGED * abs(coefficients[-1])
-        error = max(own_error, change, 0.0 if at_once else 0.5 * before)
+        size, change = abs(coefficients[-1]), abs(coefficients[-1] - coefficients[-2])
+        if before == np.inf and change <= _CONVERGED * size:
+            before = 0.0
+        error = max(own_error, _OF_ROUNDING * change, 0.5 * before)
         before = change
-        if verdict(coefficients[-1], error)["criticality"] != "undecided":
+        if error <= _KNOWN * size:
             break
     return verdict(coefficients[-1], error) if confirmed else None
 

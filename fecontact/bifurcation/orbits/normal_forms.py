@@ -35,7 +35,10 @@ Array = NDArray[Any]
 
 # Steps of the differences, in ranges of the states over the orbit; the first two that agree count.
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
-_AGREEMENT = 0.02
+_AGREEMENT = 1e-3
+# Least error of a coefficient, in the sum of the sizes of what adds up to it: that is how well
+# meshes of orbits with large multipliers reproduce it.
+_CANCELLED = 1e-5
 # Largest relative error of a coefficient whose sign is trusted.
 _DECIDED = 0.25
 
@@ -80,17 +83,22 @@ def verdict(coefficient: float, error: float) -> dict[str, Any]:
 def _judged(
     expansion: "Expansion", formula: "Callable[[Sequence[Bend]], Share]"
 ) -> dict[str, Any]:
-    """The coefficient from the first two steps that agree, or else the best pair."""
+    """The coefficient from the first two steps that agree, or else the best pair.
+
+    Where none agree, the error is the largest difference from any step: two may be near each other
+    by accident, on their way from one plateau to another.
+    """
     values: list[float] = []
     pairs: list[tuple[float, float]] = []
     for step in _STEPS:
-        values.append(formula(expansion.bends(step)).value)
+        value, size = formula(expansion.bends(step))
+        values.append(value)
         if len(values) > 1:
-            pairs.append((abs(values[-1] - values[-2]), values[-1]))
-            if pairs[-1][0] <= _AGREEMENT * abs(values[-1]):
-                return verdict(values[-1], pairs[-1][0])
-    error, value = min(pairs)
-    return verdict(value, error)
+            pairs.append((abs(value - values[-2]), value))
+            if pairs[-1][0] <= _AGREEMENT * abs(value):
+                return verdict(value, max(pairs[-1][0], _CANCELLED * size))
+    _, value = min(pairs)
+    return verdict(value, max(abs(one - value) for one in values))
 
 
 class Share(NamedTuple):

@@ -33,7 +33,8 @@ from fecontact.core.types import Array
 
 # Radii of the amplitudes at which series are fitted, where one is the range of the states.
 _RADII = (0.5, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3)
-# Relative difference between two radii at which no other one is tried.
+# Relative difference between two radii at which no other one is tried, and relative error that no
+# agreement shows: the point itself is known to the root of rounding along its curve.
 _AGREEMENT = 1e-7
 # Part of the largest term below which a coefficient that divides counts as zero.
 _CANCELLATION = 1e-9
@@ -106,7 +107,8 @@ def agreed(
     if not pairs:
         raise AnalysisError(f"The rates about the orbit are not finite at amplitudes of "
                             f"{_RADII[-2]:g} of its range; the field must be smooth there.")
-    return min(pairs, key=lambda one: one[0])[1:]
+    _, value, error, series = min(pairs, key=lambda one: one[0])
+    return value, np.maximum(error, _AGREEMENT * np.nanmax(np.abs(value))), series
 
 
 def _on_circle(multiplier: complex) -> complex:
