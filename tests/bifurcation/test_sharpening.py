@@ -233,7 +233,7 @@ def test_checks_of_a_coefficient_end_at_16_times_the_least_intervals(monkeypatch
     monkeypatch.setattr(sharpening, "_KNOWN", 0.0)
     for least, doublings in ((2, 1), (6, 2)):
         made.clear()
-        point, = circle_branch(moebius, 0.4, least, tolerance=1.0, state_tolerance=1e-6).special
+        _ = circle_branch(moebius, 0.4, least, tolerance=1.0, state_tolerance=1e-6).special
         first = made[0] // 2
         assert first > 2 * least
         assert made == [2**k * first for k in range(1, doublings + 1)]
