@@ -64,7 +64,7 @@ def follow_mode(
         assert mode is not None
         with waiting("Writing"):
             files = write_mode_results(study, mode, observe, folder)
-    echo(f"\nnonlinear mode {number}: {mode.branch.status.value}")
+    echo(f"\nnonlinear mode {number}: {mode.branch.end}")
     if mode.branch.message:
         echo(f"note: {mode.branch.message}")
     show(mode_table(mode))

@@ -90,7 +90,18 @@ class Branch(Summarised):
             *([("stable", f"{sum(known)} of {len(known)} regular points")] if known else []),
             *self._accuracy(),
             ("end", self.status.name.lower()),
+            *([("message", self.message)] if self.message else []),
         ]
+
+    @property
+    def end(self) -> str:
+        """How the forward end was reached, in a sentence; where points ran out, how far it got."""
+        regular = sum(point.kind is None for point in self.points)
+        if self.status is not BranchStatus.POINTS or not regular:
+            return self.status.value
+        return (f"The branch has as many points as were asked for and ends at "
+                f"{self.parameter_name} = {self.points[-1].parameter:.6g}: raise points = "
+                f"{regular} to go on, or largest_step to go farther with each.")
 
     def _accuracy(self) -> list[tuple[str, str]]:
         """Error of the states and intervals of orbits by collocation."""

@@ -95,6 +95,9 @@ class Problem(Protocol):
     keeps_matrix : bool
         Whether the corrector reuses its factorised matrix (chord method with Broyden updates); for
         problems whose factorisation costs far more than a residual and a solve.
+    long_steps : bool
+        Whether steps may be longer than the largest one where a branch is straight, as long as the
+        parameter changes by no more than that.
     polishes : bool
         Whether a solution found with such a matrix gets one more step with its own one.
     precision : float
@@ -109,6 +112,7 @@ class Problem(Protocol):
     """
 
     keeps_matrix: ClassVar[bool] = False
+    long_steps: ClassVar[bool] = False
     polishes: ClassVar[bool] = False
     precision: float = 1e-12
     event_precision: ClassVar[float] = 1e-12
@@ -268,7 +272,8 @@ class ContinuationOptions:
     Parameters
     ----------
     step, smallest_step, largest_step : float
-        First step, and limits of the steps.
+        First step, and limits of the steps. On straight parts of branches of equilibria the largest
+        step is the largest change of the parameter, in widths of the diagram.
     points : int
         Number of regular points after which the branch ends. To both sides they count together; if
         they do not suffice, each gets half of them, or what the other one leaves.

@@ -33,6 +33,9 @@ _CORNER_STEP = 1e-3
 _HALVINGS = 2
 # Factor between lengths tried beyond close corners.
 _FARTHER = 8.0
+# Newton steps of one that converges at once, turn on a step [rad] that counts as straight, and rate
+# of the parameter, in widths of the diagram, below which it rests.
+_AT_ONCE, _STRAIGHT, _RESTS = 2, 0.02, 1e-8
 # Overshoot of a bound by at most this factor: beyond it the motion may not exist.
 _OVERSHOOT = 1.2
 # Relative distance from a bound at which a start lies on it.
@@ -111,7 +114,8 @@ def continuation(
                 problem, here, before = stride.problem, stride.here, stride.before
                 step = stride.step
                 continue
-        step = min(step, _OVERSHOOT * _room(here, options))
+        # Scales that have grown make the same step longer.
+        step = min(step, _longest(problem, here, options), _OVERSHOOT * _room(here, options))
         rounded = False
         try:
             reached = _step(problem, here, step, options)
@@ -306,12 +310,26 @@ def _believable(
 def _next_step(
     problem: Problem, here: Solution, there: Solution, step: float, options: ContinuationOptions
 ) -> float:
-    """Step length from the Newton steps that the last one took, and from the turn on it."""
+    """Step length from the Newton steps that the last one took, and from the turn on it.
+
+    The largest step is one along the branch; where the branch is straight and Newton's method
+    converges at once, it is one of the parameter, if the problem allows that.
+    """
     factor = {1: 2.0, 2: 2.0, 3: 1.5, 4: 1.1}.get(there.iterations, 0.7)
     turn = np.arccos(min(1.0, float(problem.weights() * here.tangent @ there.tangent)))
     if turn > 0.0:
         factor = min(factor, max(0.5, 0.5 * options.largest_turn / turn))
-    return min(factor * step, options.largest_step)
+    straight = there.iterations <= _AT_ONCE and turn < _STRAIGHT
+    return min(factor * step,
+               _longest(problem, there, options) if straight else options.largest_step)
+
+
+def _longest(problem: Problem, here: Solution, options: ContinuationOptions) -> float:
+    """Largest step of a straight branch."""
+    rate = abs(float(here.tangent[-1])) * float(np.sqrt(problem.weights()[-1]))
+    if not (problem.long_steps and _RESTS < rate < 1.0):
+        return options.largest_step
+    return options.largest_step / rate
 
 
 def _passes(

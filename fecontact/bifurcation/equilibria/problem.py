@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -59,6 +59,8 @@ class _Bordered:
 
 class EquilibriumProblem(Problem):
     """f(x, p) = 0 with one parameter of the field free; unknowns u = [x, p]."""
+
+    long_steps: ClassVar[bool] = True
 
     def __init__(
         self, field: VectorField, values: Array, index: int, scales: Array, width: float,

@@ -59,9 +59,9 @@ def branch(
             files = write_branch_results(result, wanted, folder, described.name, beneath,
                                          described.to_toml(), described.folder)
         for name, found in result.found.items():
-            echo(f"\n{name}: {found.status.value}")
+            echo(f"\n{name}: {found.end}")
             if found.message:
-                echo(f"The last step failed: {found.message}")
+                echo(f"note: {found.message}")
             show(special_table(found))
         for note in result.notes:
             echo(f"note: {note}")

@@ -131,10 +131,10 @@ def _scales(seen: Motions, count: int) -> list[float]:
 
 def _status(named: Mapping[str, Branch]) -> str:
     """How the branches ended: one sentence where all ended alike."""
-    ends = {branch.status for branch in named.values()}
+    ends = {branch.end for branch in named.values()}
     if len(ends) == 1 and len(named) > 1:
-        return f"All branches: {ends.pop().value}"
-    return "; ".join(f"{name}: {branch.status.value.removesuffix('.')}"
+        return f"All branches: {ends.pop()}"
+    return "; ".join(f"{name}: {branch.end.removesuffix('.')}"
                      for name, branch in named.items()) + "."
 
 
