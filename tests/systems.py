@@ -158,7 +158,7 @@ def rotor(speed, stiffness=1e4, external=2.0, rotating=1.0):
     circulatory = rotating * speed * np.array([[0.0, 1.0], [-1.0, 0.0]])
     return basis_from_matrices(np.eye(2), stiffness * np.eye(2) + circulatory,
                                {"contact": row[None], "B": row},
-                               damping=(external + rotating) * np.eye(2))
+                               damping=(external + rotating) * np.eye(2), symmetric=False)
 
 
 def beam(n=4, modes=6, **parts):

@@ -734,6 +734,13 @@ Rodas5P(inline_laws=True,series="always")
 simulate(osc,1,solver=Rodas5P(checkpoint="/dev/zero"))
 HeightMap(file="/dev/zero")
 read_table("/dev/zero")
+basis_from_matrices(np.eye(2),np.eye(2),None)
+basis_from_matrices(np.eye(2),[[2.0,1.0],[0.0,2.0]],{"contact":np.zeros((1,3,2))})
+Mesh([[0,0],[1,0],[0,1],[0.5,0.4]],[[0,1,2],[0,1,3]])
+Load(normal=1e300)
+Drive(stiffness_x=1e300)
+Ground(speed=1e300)
+basins(osc,(Axis("B","y"),np.linspace(0,1,10**5)),(Axis("B","y","velocity"),np.linspace(0,1,10**6)),transient_periods=3)
 """
 
 NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "study",

@@ -9,6 +9,7 @@ from cyclopts import CycloptsError, UnusedCliTokensError
 from fecontact.cli.app import app
 from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code
 from fecontact.core.errors import FecontactError, ModelWarning
+from fecontact.core.resources.memory import available_memory, shown_memory
 
 
 def main() -> None:
@@ -66,6 +67,13 @@ def _execute(tokens: list[str]) -> int:
             raise
         return fail(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}.",
                     1)
+    except MemoryError as error:
+        if debug:
+            raise
+        detail = f" ({str(error).rstrip('.')})" if str(error) else ""
+        return fail(f"the memory is not enough{detail}, {shown_memory(available_memory())} are "
+                    f"free; take a coarser mesh, fewer modes, nodes or outputs, or raise the "
+                    f"limit.", 1)
     except Exception as error:
         if _was_interrupted(error):
             return fail("interrupted.", INTERRUPTED)

@@ -118,8 +118,7 @@ class Mesh(Summarised):
                 f"The {what} {' and '.join(map(str, crowded[0]))} belongs to more than two cells; "
                 f"remove overlapping cells."
             )
-        if dimension == 3:
-            require_apart(self._facets, self._facet_number, count, nodes)
+        require_apart(self._facets, self._facet_number, count, nodes)
         boundaries = {name: self._on_outline(name, facets) for name, facets in boundaries.items()}
         object.__setattr__(self, "boundaries", boundaries)
         for array in (nodes, cells, curved, middles, *boundaries.values(), *points.values()):

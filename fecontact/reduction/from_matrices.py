@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import as_floats
+from fecontact.core.checks import as_floats, require_flags
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
@@ -27,6 +27,8 @@ _ALL = 2000
 _DENSE = 600
 # Abaqus writes 1e36 on the diagonal of the stiffness for boundary conditions.
 _HELD = 1e35
+_DECLARE = ("; give both triangles of a symmetric matrix, or symmetric=False if its skew part "
+            "stands for circulatory forces")
 _ASYMMETRY = 1e-10
 
 
@@ -65,6 +67,7 @@ def basis_from_matrices(
     translations: ArrayLike | None = None,
     dimension: Literal[2, 3] = 2,
     contact_places: ArrayLike | None = None,
+    symmetric: bool = True,
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
@@ -75,8 +78,9 @@ def basis_from_matrices(
     ----------
     mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
         The mass symmetric and positive definite [kg]. The symmetric part of the stiffness [N/m] is
-        positive semi-definite; its skew part, as of follower forces, is circulatory (differences
-        below 1e-10 of the largest entry count as zero). A diagonal of 1e35 or more fixes.
+        positive semi-definite; its skew part, as of follower forces, is circulatory and needs
+        ``symmetric=False`` (differences below 1e-10 of the largest entry count as zero). A diagonal
+        of 1e35 or more fixes.
     rows : mapping
         ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
@@ -101,14 +105,18 @@ def basis_from_matrices(
         gravity and base acceleration.
     dimension : 2 or 3
         3 for space.
+    symmetric : bool
+        False allows a stiffness with a skew part.
 
     Raises
     ------
     InputError
-        For matrices of other kinds than these, or of different sizes, and rows of wrong width.
+        For matrices of other kinds than these, or of different sizes, and rows of wrong width; for
+        a stiffness that is not symmetric, unless ``symmetric`` is False.
     AnalysisError
         If the modes cannot be computed accurately.
     """
+    require_flags("basis_from_matrices", symmetric=symmetric)
     M, K = given_matrix("mass", mass), given_matrix("stiffness", stiffness)
     same_dofs(M, K)
     d = M.matrix.shape[0]
@@ -124,7 +132,7 @@ def basis_from_matrices(
         C = None if C is None else C[~held][:, ~held]
         inertia = None if inertia is None else inertia[~held]
         d = M.matrix.shape[0]
-    M, (K, skew) = _symmetric(M), _parts(K)
+    M, (K, skew) = _symmetric(M), _parts(_symmetric(K, _DECLARE) if symmetric else K)
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
     return basis_of_modes(
@@ -268,8 +276,8 @@ def _parts(given: Given) -> tuple[Given, Any]:
     return replace(given, matrix=sp.csc_array(0.5 * (given.matrix + given.matrix.T))), skew
 
 
-def _symmetric(given: Given) -> Given:
-    """The symmetric part of a matrix that must be symmetric up to rounding."""
+def _symmetric(given: Given, remedy: str = "") -> Given:
+    """The symmetric part of a matrix that must be symmetric up to rounding, else InputError."""
     import scipy.sparse as sp
 
     symmetric, skew = _parts(given)
@@ -281,7 +289,7 @@ def _symmetric(given: Given) -> Given:
             f"{given.name} is not symmetric: the entries in row {row}, column {column} "
             f"({given.matrix[row, column]:.6g}) and in row {column}, column {row} "
             f"({given.matrix[column, row]:.6g}), counted from 0, differ by "
-            f"{difference.data[worst] / largest:.1e} of the largest entry."
+            f"{difference.data[worst] / largest:.1e} of the largest entry{remedy}."
         )
     return symmetric
 

@@ -101,6 +101,7 @@ def stack_restriction(rows: Mapping[str, Any], d: int, dimension: int = 2) -> Re
         raise InputError(f"dimension = {dimension!r} must be 2, the plane, or 3, space.")
     import scipy.sparse as sp
 
+    require_kind("basis_from_matrices", Mapping, rows=rows)
     given = rows.get("contact", {})
     named = given if isinstance(given, Mapping) else {"contact": given}
     blocks = {name: _contact_block(block, d, dimension) for name, block in named.items()}

@@ -803,3 +803,15 @@ def test_fields_that_cannot_be_written(
     with pytest.raises(InputError, match=message):
         write_fields(tmp_path / name, points, cells, fields)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", [
+    b"BINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 45812984490 double\n",
+    b"ASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 45812984490 double\n0 0 0\n",
+    b"ASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 1000000 1000000 10\n"
+    b"SPACING 1 1 1\nORIGIN 0 0 0\n"])
+def test_a_file_that_declares_a_terabyte(content, tmp_path):
+    path = tmp_path / "a.vtk"
+    path.write_bytes(b"# vtk DataFile Version 3.0\nx\n" + content)
+    with pytest.raises(MeshError, match=r"a\.vtk: The file (declares more data|cannot be read)"):
+        read_mesh(path)

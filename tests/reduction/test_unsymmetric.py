@@ -30,7 +30,8 @@ def test_full_matrices_keep_the_equations(form):
     K = K + 5.0 * np.eye(5)
     rows = np.zeros((1, 3, 5))
     rows[0, :2, :2] = np.eye(2)
-    basis = basis_from_matrices(form(M), form(K), {"contact": rows, "B": rows[0]}, damping=form(C))
+    basis = basis_from_matrices(form(M), form(K), {"contact": rows, "B": rows[0]}, damping=form(C),
+                                symmetric=False)
     assert basis.stiffness is not None
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(M, 0.5 * (K + K.T))).real)
     assert basis.angular_frequencies**2 == pytest.approx(squares, rel=1e-10)
@@ -43,6 +44,14 @@ def test_full_matrices_keep_the_equations(form):
     dynamic = K + 2j * np.pi * f * C - (2.0 * np.pi * f) ** 2 * M
     response = receptance(basis, f, [("B", "x")], [("B", "x"), ("B", "y")]).values[0, :, 0]
     assert response == pytest.approx(np.linalg.inv(dynamic)[:2, 0], rel=1e-9)
+
+
+@pytest.mark.parametrize("form", [np.triu, np.tril, lambda K: K + np.eye(5, k=2)])
+def test_a_stiffness_that_is_not_symmetric_must_be_declared(form):
+    M, K, _ = random_matrices()
+    K = form(0.5 * (K + K.T) + 5.0 * np.eye(5))
+    with pytest.raises(InputError, match=r"stiffness is not symmetric.*symmetric=False"):
+        basis_from_matrices(M, K, {"contact": np.zeros((1, 3, 5))})
 
 
 def test_rounding_is_no_circulatory_force():
@@ -85,7 +94,8 @@ def test_gyroscopic_forces_do_no_work():
 
 def test_stiffness_is_selected_stored_and_checked(tmp_path):
     M, K, C = random_matrices()
-    basis = basis_from_matrices(M, K + 5.0 * np.eye(5), {"contact": np.zeros((1, 3, 5))}, damping=C)
+    basis = basis_from_matrices(M, K + 5.0 * np.eye(5), {"contact": np.zeros((1, 3, 5))}, damping=C,
+                                symmetric=False)
     assert "stiffness: full matrix, in part circulatory" in str(basis)
     write_basis(tmp_path / "basis.h5", basis)
     assert (read_basis(tmp_path / "basis.h5").stiffness == basis.stiffness).all()

@@ -19,6 +19,7 @@ from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
@@ -166,6 +167,8 @@ def basins(
     if not lengths.all() or np.linalg.matrix_rank(rows / lengths[:, None], tol=1e-9) < 2:
         raise InputError(f"first = {first[0]} and second = {second[0]} cannot be chosen each by "
                          f"itself, as the modes of a body or the same state; take other axes.")
+    # Of each start: its state, the values of both axes with their copies, and the kept states.
+    require_memory("basins: the number of starts", len(a) * len(b), 8.0 * (8 + (3 + keep) * size))
     wanted = np.stack(np.meshgrid(a, b, indexing="ij"), axis=-1).reshape(-1, 2)
     states = start + (wanted - rows @ start) @ np.linalg.pinv(rows).T
     place = Place.checked("basins", folder, executor, workers)

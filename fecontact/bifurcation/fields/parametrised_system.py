@@ -9,6 +9,7 @@ parameter values alone and not on earlier calls. Where ranges are given, they ar
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from itertools import product
 from numbers import Real
 from typing import Any
@@ -326,11 +327,12 @@ def _parameter(system: ContactSystem, name: str, given: Any) -> tuple[float, Set
     if not isinstance(value, Real) or isinstance(value, bool):
         raise InputError(f"Parameter {name!r} has the value {value!r}, which is not one number; "
                          f"give a pair (value, function) instead.")
+    return float(value), partial(_with_value, name)
 
-    def setter(whole: ContactSystem, number: float) -> ContactSystem:
-        return whole.with_(**{name: number})
 
-    return float(value), setter
+def _with_value(name: str, system: ContactSystem, number: float) -> ContactSystem:
+    """The system with another value of a parameter; a function of its own can be pickled."""
+    return system.with_(**{name: number})
 
 
 def _named(parameters: Mapping[str, float], values: Array) -> str:

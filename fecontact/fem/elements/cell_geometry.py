@@ -61,18 +61,20 @@ def facets_of(cells: Integers, kind: CellKind) -> Integers:
 
 
 def require_apart(facets: Integers, number: Integers, count: Integers, nodes: Array) -> None:
-    """Raise :class:`MeshError` where two cells lie on the same side of the face they share.
+    """Raise :class:`MeshError` where two cells lie on the same side of the side they share.
 
-    ``facets`` are the outward faces of all cells, ``number`` those without orientation.
+    ``facets`` are the outward faces or edges of all cells, ``number`` those without orientation.
     """
     first = np.argmin(facets, axis=1)
     rows, width = np.arange(len(facets)), facets.shape[1]
-    ahead = (facets[rows, (first + 1) % width] < facets[rows, first - 1]).astype(np.int64)
+    ahead = first if width == 2 else (
+        facets[rows, (first + 1) % width] < facets[rows, first - 1]).astype(np.int64)
     twice = (count == 2) & (np.bincount(number, ahead, minlength=len(count)) != 1)
     if twice.any():
-        x, y, z = nodes[facets[np.flatnonzero(twice[number])[0]]].mean(axis=0)
-        raise MeshError(f"{np.count_nonzero(twice)} faces have both of their cells on one side, "
-                        f"the first at ({x:g}, {y:g}, {z:g}): the mesh has inverted or "
+        place = nodes[facets[np.flatnonzero(twice[number])[0]]].mean(axis=0)
+        raise MeshError(f"{np.count_nonzero(twice)} {'edges' if width == 2 else 'faces'} have both "
+                        f"of their cells on one side, the first at "
+                        f"({', '.join(f'{x:g}' for x in place)}): the mesh has inverted or "
                         f"overlapping elements; mesh the body anew.")
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import as_path, require_kind, require_regular_file
 from fecontact.core.errors import InputError, MeshError
 from fecontact.core.files.atomic_write import replaced
+from fecontact.core.resources.memory import available_memory, shown_memory
 from fecontact.core.types import ArrayLike, Coordinates, Integers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.abaqus import read_inp
@@ -178,8 +179,12 @@ def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
 def _read(reader: Callable[[Path], RawMesh], path: Path, format_name: str) -> RawMesh:
     try:
         return reader(path)
-    except (MeshError, MemoryError):
+    except MeshError:
         raise
+    except MemoryError:
+        raise MeshError(f"The file declares more data than fits into memory, of which "
+                        f"{shown_memory(available_memory())} are free; it is damaged, or too "
+                        f"large.") from None
     except OSError as error:
         raise MeshError(f"The file cannot be opened ({error.strerror or error}).") from None
     except Exception as error:

@@ -48,6 +48,10 @@ class FieldRun(Summarised):
     statistics: dict[str, Any] = field(default_factory=dict)
     events: Events | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Views of mappings cannot be pickled.
+        return vars(self) | {"parameters": dict(self.parameters)}
+
     def summary(self) -> list[tuple[str, str]]:
         """Status, time span, states and parameters."""
         return [

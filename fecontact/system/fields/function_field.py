@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
+from dataclasses import replace
 from types import CodeType, MappingProxyType
 from typing import Any, Self
 
@@ -66,6 +67,11 @@ class FunctionField(VectorField):
         # A value may pass zero, and be rounding there.
         base = np.abs(self.values)
         self._sizes = np.where(base > 0.0, base, 1.0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Without the compiled code, which belongs to this process.
+        return {name: replace(value) if isinstance(value, CompiledLaw) else value
+                for name, value in super().__getstate__().items()}
 
     @property
     def functions(self) -> tuple[Any, ...]:

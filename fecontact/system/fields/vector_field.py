@@ -95,6 +95,19 @@ class VectorField(ABC):
         made.parameters = MappingProxyType(dict(zip(self.parameters, changed, strict=True)))
         return made
 
+    def __copy__(self) -> Self:
+        made = object.__new__(type(self))
+        vars(made).update(vars(self))
+        return made
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Views of mappings cannot be pickled.
+        return vars(self) | {"parameters": dict(self.parameters)}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        vars(self).update(state)
+        self.parameters = MappingProxyType(state["parameters"])
+
     @property
     def dimension(self) -> int:
         """Number d of states."""
