@@ -50,7 +50,7 @@ def test_full_matrices_keep_the_equations(form):
 def test_a_stiffness_that_is_not_symmetric_must_be_declared(form):
     M, K, _ = random_matrices()
     K = form(0.5 * (K + K.T) + 5.0 * np.eye(5))
-    with pytest.raises(InputError, match=r"stiffness is not symmetric.*symmetric=False"):
+    with pytest.raises(InputError, match=r"stiffness matrix is not symmetric.*symmetric=False"):
         basis_from_matrices(M, K, {"contact": np.zeros((1, 3, 5))})
 
 
