@@ -9,6 +9,7 @@ from .periodicity import (
     Strobe,
     count_periods,
     periodicity,
+    section_states,
     steadiness,
     strobed_states,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "power_spectral_density",
     "prestressed_modes",
     "receptance",
+    "section_states",
     "spectrogram",
     "steadiness",
     "strobed_states",

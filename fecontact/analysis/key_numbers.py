@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.analysis.histories import point_name
 from fecontact.analysis.periodicity import Steadiness, drive_period, steadiness
+from fecontact.analysis.sampling import alias_message
 from fecontact.analysis.summaries import RUN_SUMMARIES, Point, usual_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -118,7 +119,8 @@ def key_numbers(
     found = steadiness(trajectory)
     chosen = tuple(points) or (usual_point(trajectory),)
     for point in chosen:
-        if found.kind != "at rest":
+        # Outputs too far apart show frequencies that the motion does not have.
+        if found.kind != "at rest" and not alias_message(late):
             take(f"dominant_frequency@{point}", f"dominant frequency at {point_name(point, basis)}",
                  point=point)
     for point in chosen:

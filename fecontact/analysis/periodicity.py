@@ -1,12 +1,14 @@
-"""Periodicity: strobed states, the periods after which they repeat, and steady motion."""
+"""Periodicity: Poincare sections, the returns after which a motion repeats, and steady motion."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Literal
 
 import numpy as np
 
+from fecontact.analysis.histories import Point
+from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
@@ -14,6 +16,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
 
 _LEAST_CHECKS = 8  # returns that must agree before a motion is called periodic
+_SLOW = 0.05  # of the range of the velocity: slower reversals are no maxima of the motion
 
 _FEWEST = 32  # output times of a run that can be called steady
 _MOST_GRID, _MOST_CHECKS = 2**15, 2000  # times of the search for a lag, and of its check
@@ -31,7 +34,7 @@ def drive_period(system: ContactSystem) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Strobe:
-    """States of a motion, once per period.
+    """States of a motion on a Poincare section: once per period, or at maxima of a displacement.
 
     Attributes
     ----------
@@ -40,12 +43,15 @@ class Strobe:
     states : (k, 2 m + n s) array
         y = [q, q', z].
     period : float
-        [s].
+        [s]; for maxima their mean distance.
+    maxima_of : (point, component) or None
+        The displacement whose maxima these are; None for states once per period.
     """
 
     time: Array
     states: Array
     period: float
+    maxima_of: tuple[Point, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -55,18 +61,22 @@ class Periodicity:
     Attributes
     ----------
     periods : int or None
-        Number of drive periods after which the motion repeats; None if it does not.
+        Number of drive periods, without a drive of maxima of the motion, after which it repeats;
+        None if it does not.
     misfit : float
         Largest difference between points ``periods`` periods apart (the best number tried if the
         motion does not repeat), relative to the size of the attractor.
     settled : bool
         False if the motion still approaches or leaves an orbit of fewer periods; ``periods`` is
         then None, and a longer run is needed.
+    period : float or None
+        Time after which the motion repeats [s]; None if it does not.
     """
 
     periods: int | None
     misfit: float
     settled: bool = True
+    period: float | None = None
 
 
 @dataclass(frozen=True)
@@ -103,8 +113,11 @@ def strobed_states(
 ) -> Strobe:
     """States of a run once per period, at the times ``(k + phase) period``.
 
-    Between output times states are interpolated by cubic Hermite polynomials; states at output
-    times are returned unchanged.
+    Without a drive and a period, as for self-excited motion, at the maxima of a displacement; see
+    :func:`section_states`.
+
+    Between output times the motion is computed again where these are too far apart, and states are
+    interpolated by cubic Hermite polynomials; states at output times are returned unchanged.
 
     Parameters
     ----------
@@ -120,13 +133,14 @@ def strobed_states(
     Raises
     ------
     InputError
-        If the system has no drive and no period is given, for values out of range, or if the run
-        ends before ``t_start``.
+        For values out of range, or if the run ends before ``t_start``.
     """
     require_kind("strobed_states", Trajectory, trajectory=trajectory)
-    system, t = trajectory.system, trajectory.time
+    t = trajectory.time
+    if period is None and not trajectory.system.drive.frequency_hz > 0.0:
+        return section_states(trajectory, t_start=t_start)
     if period is None:
-        period = drive_period(system)
+        period = drive_period(trajectory.system)
     require_positive("strobed_states", period=period)
     if not 0.0 <= phase <= 1.0:
         raise InputError(f"strobed_states: phase = {phase!r} must be from 0 to 1.")
@@ -138,21 +152,98 @@ def strobed_states(
         raise InputError(f"The run ends at {t[-1]:g} s, before a period of {period:g} s is over "
                          f"after {begin:g} s; run it for longer.")
     times = np.clip((np.arange(first, last + 1) + phase) * period, t[0], t[-1])
+    nearest = np.minimum(np.searchsorted(t, times), len(t) - 1)
+    apart = np.minimum(np.abs(t[nearest] - times), np.abs(t[np.maximum(nearest - 1, 0)] - times))
+    run = trajectory if (apart <= tiny).all() else resolved(trajectory).trajectory
+    return Strobe(times, _states_at(run, times, tiny), period)
+
+
+def section_states(
+    trajectory: Trajectory, point: Point | None = None, component: str = "x", *,
+    t_start: float | None = None,
+) -> Strobe:
+    """States of a run at the maxima of a displacement: its velocity falls through zero.
+
+    A Poincare section of self-excited motion, which has no period of its own to be strobed with.
+    The velocity must exceed a twentieth of its range between two maxima, so that creep in stick is
+    none. The motion between outputs is computed again where these are too far apart.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run.
+    point, component
+        As for :meth:`Trajectory.displacement`; by default the component with the fastest motion of
+        B and the contact nodes.
+    t_start : float, optional
+        Start of the evaluation, after the transient [s]; the middle of the run by default.
+
+    Raises
+    ------
+    InputError
+        For a point or component that does not exist, a time out of range, or a motion with fewer
+        than two maxima.
+    """
+    require_kind("section_states", Trajectory, trajectory=trajectory)
+    begin = _start(trajectory, t_start)
+    basis, m = trajectory.system.basis, trajectory.system.basis.modes
+    if point is None:
+        points: list[str | int] = ["B", *range(basis.contact_nodes)]
+        axes = basis.components[: basis.dimension]
+        rates = trajectory.modal_velocities[trajectory.time >= begin]
+        ranges = {(one, axis): float(np.ptp(rates.dot(basis.point_row(one, axis))))
+                  for one in points for axis in axes}
+        point, component = max(ranges, key=lambda key: ranges[key])
+    run = resolved(trajectory).trajectory
+    t, states = run.time, run.states
+    row = trajectory._rows(point)[basis.components.index(component)]
+    v = states[:, m : 2 * m] @ row
+    late = t >= begin
+    least = _SLOW * float(np.ptp(v[late]))
+    crossing, risen = [], False
+    for k in np.flatnonzero(late[:-1]).tolist():
+        risen = risen or v[k] > least
+        if risen and v[k] > 0.0 >= v[k + 1]:
+            crossing.append(k)
+            risen = False
+    if len(crossing) < 2:
+        raise InputError(f"The displacement {component} of {point} has {len(crossing)} maxima "
+                         f"after {begin:g} s, too few for a section; run it for longer, choose "
+                         f"another point, or give a period.")
+    times = np.array([_crossing(run, k, row) for k in crossing])
+    return Strobe(times, _states_at(run, times, 0.0), float(np.diff(times).mean()),
+                  (point, component))
+
+
+def _crossing(run: Trajectory, k: int, row: Array) -> float:
+    """Time within interval k at which a velocity, interpolated in cubics, falls through zero."""
+    m = run.system.basis.modes
+    t0, t1 = float(run.time[k]), float(run.time[k + 1])
+    low, high = t0, t1
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        velocity = float(_states_at(run, np.array([middle]), 0.0)[0, m : 2 * m] @ row)
+        low, high = (middle, high) if velocity > 0.0 else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _states_at(run: Trajectory, times: Array, tiny: float) -> Array:
+    """States (k, 2 m + n s) of a run, cubic between outputs, unchanged within ``tiny`` of one."""
+    t, states = run.time, run.states
     interval = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
-    step = t[interval + 1] - t[interval]
-    part = (times - t[interval]) / step
-    states = trajectory.states
     points = np.empty((len(times), states.shape[1]))
-    for k, (i, s, h) in enumerate(zip(interval, part, step, strict=True)):
+    for k, i in enumerate(interval):
+        h = t[i + 1] - t[i]
+        s = (times[k] - t[i]) / h
         if min(s, 1.0 - s) * h <= tiny:
             points[k] = states[i if s < 0.5 else i + 1]
             continue
         y0, y1 = states[i], states[i + 1]
-        r0, r1 = h * system.rhs(t[i], y0), h * system.rhs(t[i + 1], y1)
+        r0, r1 = h * run.system.rhs(t[i], y0), h * run.system.rhs(t[i + 1], y1)
         rise = y1 - y0
         points[k] = y0 + s * (r0 + s * ((3.0 * rise - 2.0 * r0 - r1)
                                         + s * (r0 + r1 - 2.0 * rise)))
-    return Strobe(times, points, period)
+    return points
 
 
 def count_periods(
@@ -217,6 +308,9 @@ def periodicity(
 ) -> Periodicity:
     """Number of drive periods after which a run repeats, or None.
 
+    Without a drive and a period, the number of maxima of its fastest displacement; see
+    :func:`section_states`.
+
     Compares displacements and velocities of B and the contact nodes once per period. The
     tolerance of each is relative to its range in the run after ``t_start``.
 
@@ -255,9 +349,11 @@ def periodicity(
     halves = np.split(size, 2)
     moves = np.concatenate([half > 1e-9 * half.max(initial=0.0) for half in halves])
     if not moves.any():
-        return Periodicity(1, 0.0)
-    return count_periods(observed(found.states)[:, moves], size[moves], largest=largest,
-                         tolerance=tolerance)
+        return Periodicity(1, 0.0, period=found.period)
+    counted = count_periods(observed(found.states)[:, moves], size[moves], largest=largest,
+                            tolerance=tolerance)
+    time = None if counted.periods is None else counted.periods * found.period
+    return replace(counted, period=time)
 
 
 def steadiness(trajectory: Trajectory, *, tolerance: float = 1e-2) -> Steadiness:

@@ -10,6 +10,8 @@ from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 
 _EVEN = 1e-6  # largest deviation of times from even spacing, relative to the spacing
+# Fewest periods of the mean frequency in a window, and those in a window by default.
+_FEWEST, _USUAL = 5.0, 10.0
 
 
 class Peak(NamedTuple):
@@ -158,6 +160,12 @@ def amplitude_spectrum(
         for histories of whole periods.
     padding : int
         Zero-padding factor: frequencies are spaced this much more closely than the resolution.
+
+    Raises
+    ------
+    InputError
+        As :func:`evenly_sampled`, and for fewer than five periods of the mean frequency, except
+        with the window 'boxcar'.
     """
     from scipy.signal import get_window
 
@@ -166,6 +174,8 @@ def amplitude_spectrum(
         raise InputError(f"amplitude_spectrum: padding = {padding!r} must be a whole number above "
                          f"zero.")
     n, step = len(x), float(t[1] - t[0])
+    if window != "boxcar":
+        _require_periods(t, x, n * step)
     weights = get_window(window, n)
     transform = np.fft.rfft(weights * (x - x.mean()), padding * n)
     amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform), dtype=np.float64)
@@ -196,21 +206,22 @@ def power_spectral_density(
     time, values, resample
         As for :func:`evenly_sampled`.
     piece : float, optional
-        Length of the segments [s]; an eighth of the history by default.
+        Length of the segments [s]; by default an eighth of the history, or ten periods of its
+        mean frequency if these are longer.
     window : str
         Of :func:`scipy.signal.get_window`.
 
     Raises
     ------
     InputError
-        For a segment longer than the history or shorter than eight of its times.
+        For a segment longer than the history, or shorter than eight of its times or five periods
+        of its mean frequency.
     """
     from scipy.signal import welch
 
     t, x = evenly_sampled(time, values, resample=resample)
     step = float(t[1] - t[0])
-    count = _piece(piece if piece is not None else (t[-1] - t[0]) / 8.0, len(t), step,
-                   given=piece is not None)
+    count = _piece(t, x, piece, 8.0)
     f, density = welch(x, 1.0 / step, window, count, detrend="constant", scaling="density")
     return Spectrum(f, density, "density", 1.0 / (count * step))
 
@@ -233,7 +244,8 @@ def spectrogram(
     time, values, resample
         As for :func:`evenly_sampled`.
     piece : float, optional
-        Length of the segments [s]; 1/32 of the history by default.
+        Length of the segments [s]; by default 1/32 of the history, or ten periods of its mean
+        frequency if these are longer.
     overlap : float
         Fraction by which adjacent segments overlap, at least 0 and below 1.
     window : str
@@ -250,8 +262,7 @@ def spectrogram(
     if not 0.0 <= overlap < 1.0:
         raise InputError(f"spectrogram: overlap = {overlap!r} must be from 0 to below 1.")
     step = float(t[1] - t[0])
-    count = _piece(piece if piece is not None else (t[-1] - t[0]) / 32.0, len(t), step,
-                   given=piece is not None)
+    count = _piece(t, x, piece, 32.0)
     hop = max(1, round(count * (1.0 - overlap)))
     weights = get_window(window, count)
     pieces = np.lib.stride_tricks.sliding_window_view(x, count)[::hop]
@@ -268,13 +279,46 @@ def _frequencies(count: int, step: float) -> Array:
     return np.asarray(np.fft.rfftfreq(count, step), dtype=np.float64)
 
 
-def _piece(length: float, times: int, step: float, *, given: bool) -> int:
-    """Number of samples in a segment of given length."""
-    require_positive("A spectrum", piece=length)
-    count = round(length / step)
-    if not given:
-        return min(max(count, 8), times)
-    if not 8 <= count <= times:
-        raise InputError(f"A spectrum: piece = {length!r} s must be from {8 * step:.4g} s, eight "
-                         f"times of the history, to {times * step:.4g} s, all of it.")
+def mean_frequency(time: Array, values: Array) -> float:
+    r"""Mean frequency of a history [Hz], ``rms(x') / (2 pi rms(x))`` about the mean of x.
+
+    For a sine its frequency, for noise Rice's frequency of zero crossings; zero for a constant.
+    """
+    step = np.diff(time)
+    duration = float(time[-1] - time[0])
+    x = values - float(0.5 * (values[1:] + values[:-1]) @ step) / duration
+    # Mean square of the straight lines between the samples.
+    square = float((x[1:] ** 2 + x[1:] * x[:-1] + x[:-1] ** 2) @ step) / 3.0
+    rate = float((np.diff(values) ** 2 / step).sum())
+    if not square > 1e-24 * float(np.abs(values).max()) ** 2 * duration:
+        return 0.0
+    return float(np.sqrt(rate / square)) / (2.0 * np.pi)
+
+
+def _require_periods(t: Array, x: Array, window: float) -> None:
+    """Refuse a window [s] of fewer than five periods of the mean frequency of a history."""
+    frequency = mean_frequency(t, x)
+    if 0.0 < window * frequency < _FEWEST:
+        raise InputError(f"A spectrum: a window of {window:.4g} s has {window * frequency:.2g} "
+                         f"periods of the mean frequency of the history, {frequency:.4g} Hz, but "
+                         f"needs {_FEWEST:g}; run for longer, or take windows of at least "
+                         f"{_FEWEST / frequency:.4g} s.")
+
+
+def _piece(t: Array, x: Array, piece: float | None, parts: float) -> int:
+    """Number of samples in a segment of given length, or of a part of the history."""
+    step, times = float(t[1] - t[0]), len(t)
+    if piece is None:
+        frequency = mean_frequency(t, x)
+        piece = (t[-1] - t[0]) / parts
+        if frequency > 0.0:
+            piece = max(piece, _USUAL / frequency)
+        count = min(max(round(piece / step), 8), times)
+    else:
+        require_positive("A spectrum", piece=piece)
+        count = round(piece / step)
+        if not 8 <= count <= times:
+            raise InputError(f"A spectrum: piece = {piece!r} s must be from {8 * step:.4g} s, "
+                             f"eight times of the history, to {times * step:.4g} s, all of it.")
+    _require_periods(t, x, count * step)
     return count

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.analysis.sampling import warn_of_aliases
 from fecontact.core.docstrings import summary
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
@@ -181,6 +182,7 @@ def dominant_frequency(trajectory: Trajectory, point: Point | None = None) -> fl
         raise InputError(f"the frequency needs at least 8 output times, not {len(t)}.")
     if not np.allclose(np.diff(t), t[1] - t[0], rtol=1e-6):
         raise InputError("the frequency needs equally spaced output times.")
+    warn_of_aliases(trajectory)
     window = np.hanning(len(t))[:, None]
     if not np.ptp(velocity, axis=0).any():
         return float("nan")
@@ -195,7 +197,7 @@ def dominant_frequency(trajectory: Trajectory, point: Point | None = None) -> fl
 
 
 def periods(trajectory: Trajectory) -> float:
-    """Number of drive periods after which the run repeats; 0 if it does not."""
+    """Number of drive periods, else of maxima, after which the run repeats; 0 if it does not."""
     from fecontact.analysis.periodicity import periodicity
 
     found = periodicity(trajectory, t_start=float(trajectory.time[0]))

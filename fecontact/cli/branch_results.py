@@ -29,8 +29,12 @@ _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "per
 def write_branch_results(
     result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
     beneath: "PoincareScan | None" = None, study: str | None = None, root: Path | None = None,
+    highest_hz: float = math.inf,
 ) -> list[Path]:
-    """Write branches as HDF5, CSV and a page, and plot them; returns the files."""
+    """Write branches as HDF5, CSV and a page, and plot them; returns the files.
+
+    The plot of the stability shows modes up to ``highest_hz``.
+    """
     from fecontact.output.plots.bifurcation_diagram import plot_branches
     from fecontact.output.plots.stability import plot_eigenvalues
     from fecontact.output.report.branch_report import report_branches
@@ -51,7 +55,7 @@ def write_branch_results(
         y=f"observed_{show}", title=name, study=study))
     if wanted.kind != "orbits":
         files.append(folder / f"{name}-stability.png")
-        plot_eigenvalues(several[0], path=files[-1])
+        plot_eigenvalues(several[0], range_hz=(0.0, highest_hz), path=files[-1])
     return files
 
 
@@ -91,17 +95,25 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
     return text.getvalue()
 
 
-def special_table(branch: Branch) -> Any:
-    """Table of ends and special points of a branch: parameter, frequency, change of stability."""
+def special_table(branch: Branch, usable_hz: float = math.inf) -> Any:
+    """Table of ends and special points of a branch: parameter, frequency, change of stability.
+
+    Points above ``usable_hz``, the frequency up to which the basis is usable, are marked.
+    """
     from fecontact.cli.tables import table
+    from fecontact.core.units import quantity
 
     rows = []
     for index, point in enumerate(branch.points):
         if point.kind is None and 0 < index < len(branch) - 1:
             continue
         period = _period(point)
+        remark = _remark(point)
+        if period is not None and 1.0 / period > usable_hz:
+            beyond = f"beyond {quantity(usable_hz, 'Hz')}, where the basis ends"
+            remark = f"{remark}; {beyond}" if remark else beyond
         rows.append((point.kind or ("start" if index == 0 else "end"), point.parameter_text(),
-                     "" if period is None else f"{1.0 / period:.5g}", _remark(point)))
+                     "" if period is None else f"{1.0 / period:.5g}", remark))
     return table("point", branch.parameter_name, "frequency [Hz]", "", rows=rows)
 
 

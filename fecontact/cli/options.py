@@ -24,3 +24,5 @@ AtHz = Annotated[float | None, Parameter(
     name="--at-hz", help="The same of an angular frequency, in Hz.")]
 Which = Annotated[int, Parameter(
     help="Which of several orbits at this value, counted along the branch from 0.")]
+All = Annotated[bool, Parameter(
+    name="--all", negative=(), help="Beyond the frequency up to which the basis is usable, too.")]

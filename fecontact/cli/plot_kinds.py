@@ -18,6 +18,7 @@ from fecontact.output.plots import analysis
 from fecontact.output.plots import run as plots
 from fecontact.output.plots.contact_map import plot_contact_map
 from fecontact.output.plots.modes import plot_modes
+from fecontact.reduction.report import usable_hz
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,16 +36,24 @@ class PlotRequest:
         Named points and contact nodes; a history shows all of them, other plots only the first.
     highest_hz : float or None
         Highest frequency to plot [Hz].
+    period : float or None
+        Time between the points of a Poincare section [s].
+    beyond : bool
+        Whether receptances go beyond the frequency up to which the basis is usable.
     """
 
     quantity: str = "velocity"
     points: tuple[Point, ...] = ()
     component: str | None = None
     highest_hz: float | None = None
+    period: float | None = None
+    beyond: bool = False
 
     def __post_init__(self) -> None:
         if self.highest_hz is not None:
             require_positive("plot", highest_hz=self.highest_hz)
+        if self.period is not None:
+            require_positive("plot", period=self.period)
 
     @property
     def point(self) -> Point:
@@ -62,7 +71,8 @@ Draw = Callable[[Trajectory, PlotRequest, Path | None], "Figure"]
 
 def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
     basis = run.system.basis
-    end = c.highest_hz or 1.2 * float(basis.frequencies_hz[-1] or 100.0)
+    whole, usable = 1.2 * float(basis.frequencies_hz[-1] or 100.0), usable_hz(basis)
+    end = c.highest_hz or (whole if c.beyond else min(whole, usable))
     f = np.linspace(end / 2000.0, end, 2000)
     if not isinstance(c.point, str | int):
         raise InputError(f"The receptance is one of named points and contact nodes, not of "
@@ -74,7 +84,7 @@ def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
     with suppress(AnalysisError):
         found.append(receptance(run.system, f, place, linearised_at="sliding"))
         labels.append("steadily sliding")
-    return analysis.plot_receptance(found, labels, path=path)
+    return analysis.plot_receptance(found, labels, usable_hz=usable, path=path)
 
 
 KINDS: dict[str, Draw] = {
@@ -91,7 +101,7 @@ KINDS: dict[str, Draw] = {
     "spectrogram": lambda run, c, path: analysis.plot_spectrogram(
         run, c.quantity, c.point, c.shown_component, highest_hz=c.highest_hz, path=path),
     "poincare": lambda run, c, path: analysis.plot_poincare(
-        run, c.point, c.shown_component, path=path),
+        run, c.point, c.shown_component, period=c.period, path=path),
     "friction_work": lambda run, c, path: analysis.plot_friction_work(run, path=path),
     "receptance": _receptance,
 }

@@ -14,6 +14,21 @@ from fecontact.reduction.modal_basis import ModalBasis
 _GOOD = 0.1
 
 
+def usable_hz(basis: ModalBasis) -> float:
+    """Frequency up to which a basis is usable [Hz], its highest vibration mode over 1.5.
+
+    Infinite where it is not known: without a finite-element body, and without elastic modes.
+    """
+    if basis.quality is None:
+        return np.inf
+    known = basis.frequencies_hz[: basis.quality.vibration_modes]
+    elastic = known[known > 0.0]
+    if elastic.size:
+        return float(elastic[-1]) / 1.5
+    above = basis.frequencies_hz[basis.frequencies_hz > 0.0]
+    return float(above[len(above) // 2]) / 1.5 if above.size else np.inf
+
+
 @dataclass(frozen=True, eq=False)
 class BasisReport:
     """Figures of merit of a basis; ``str(report)`` is a table with a recommendation.
@@ -106,7 +121,7 @@ class BasisReport:
         if self.interfaces:
             noun = "interface" if len(self.interfaces) == 1 else "interfaces"
             return (f"The body has contact at the {noun} {choices(self.interfaces)}; the basis "
-                    f"can be used up to about {self._valid_hz:.4g} Hz.")
+                    f"can be used up to about {usable_hz(self.basis):.4g} Hz.")
         if not error.size:
             return ("The body touches nothing at an interface." if self.interfaces is not None else
                     "The basis has no contact nodes of its own; if the body is one of several, "
@@ -115,21 +130,10 @@ class BasisReport:
         worst = float(error[node, axis])
         if worst <= _GOOD:
             return (f"Static deflections of the contact nodes are right to {100 * worst:.2g} %; "
-                    f"the basis can be used up to about {self._valid_hz:.4g} Hz.")
+                    f"the basis can be used up to about {usable_hz(self.basis):.4g} Hz.")
         return (f"Contact node {node} is too stiff: {100 * worst:.0f} % of its elastic compliance "
                 f"in {'xyz'[axis]} is missing. Complete the modes with reduction = \"residual\" "
                 f"(tolerance {_GOOD:g} or less), or keep more modes.")
-
-    @property
-    def _valid_hz(self) -> float:
-        quality = self.basis.quality
-        assert quality is not None
-        known = self.basis.frequencies_hz[: quality.vibration_modes]
-        elastic = known[known > 0.0]
-        if elastic.size:
-            return float(elastic[-1]) / 1.5
-        above = self.basis.frequencies_hz[self.basis.frequencies_hz > 0.0]
-        return float(above[len(above) // 2]) / 1.5 if above.size else 0.0
 
     def _loaded_points(self) -> list[tuple[str, str, float]]:
         """B along each axis, C along the normal, where they have rows."""

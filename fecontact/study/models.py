@@ -12,6 +12,7 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.report import usable_hz
 from fecontact.study.bodies_section import (
     BodySections,
     InterfaceSettings,
@@ -97,6 +98,12 @@ class StudyModels:
         """Modal bases of several bodies by name."""
         self._require_several("modal_bases", "modal_basis")
         return dict(self._bases)
+
+    @property
+    def usable_hz(self) -> float:
+        """Lowest frequency up to which the modal bases of the bodies are usable [Hz]."""
+        bases = self._bases.values() if self.bodies else [self._reduced.basis]
+        return min(usable_hz(basis) for basis in bases)
 
     @property
     def thickness(self) -> float | None:

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from systems import belt
 
 from fecontact import ContactSystem, Drive, InputError, ModalBasis, simulate
-from fecontact.analysis import count_periods, periodicity, strobed_states
+from fecontact.analysis import count_periods, periodicity, section_states, strobed_states
 from fecontact.analysis.periodicity import drive_period
 from fecontact.laws import ConstantFriction, RoughSurface
 
@@ -126,8 +127,8 @@ def test_strobe_of_a_linear_oscillator(outputs):
 def test_strobe_says_what_it_lacks():
     still = linear_oscillator(0.0)
     run = simulate(still, 1.0, initial=np.array([0.0, 0.1]), outputs=11)
-    with pytest.raises(InputError, match="has no period; give the period"):
-        strobed_states(run)
+    with pytest.raises(InputError, match=r"has 0 maxima after 0\.5 s, too few for a section"):
+        strobed_states(run.between(0.0, 0.6), t_start=0.5)
     with pytest.raises(InputError, match="has no period"):
         drive_period(still)
     with pytest.raises(InputError, match="run it for longer"):
@@ -138,3 +139,22 @@ def test_strobe_says_what_it_lacks():
         strobed_states(run, period=0.1, t_start=2.0)
     with pytest.raises(InputError, match="at least eight per period"):
         periodicity(run, period=0.1, largest=1)
+
+
+def test_self_excited_motion_is_counted_by_its_maxima():
+    """Stick-slip of the friction oscillator without a drive: one period, sampled coarsely too."""
+    fine = simulate(belt(speed=5e-3), 6.0, outputs=6001)
+    found = periodicity(fine, t_start=1.5, largest=4)
+    assert found.periods == 1
+    # The period by the times at which the spring is longest, apart from the section.
+    late = fine.between(1.5, None)
+    x = late.displacement("B")[:, 0]
+    tops = np.flatnonzero((x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])) + 1
+    assert found.period == pytest.approx(np.diff(late.time[tops]).mean(), rel=1e-3)
+    section = section_states(fine, "B", "x", t_start=1.5)
+    assert section.maxima_of == ("B", "x")
+    m = fine.system.basis.modes
+    assert np.abs(section.states[:, m:] @ fine._rows("B")[0]).max() < 1e-6
+    sparse = simulate(belt(speed=5e-3), 6.0, outputs=121)
+    again = section_states(sparse, "B", "x", t_start=1.5)
+    assert again.period == pytest.approx(section.period, rel=1e-4)

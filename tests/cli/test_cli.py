@@ -55,10 +55,12 @@ def test_a_study_without_a_normal_law_is_told_what_to_give(cli, study):
 
 
 def test_keys_of_the_law_before_are_left_out_with_a_note(cli, study):
+    text = study.read_text()
+    study.write_text(text.replace("static_coefficient = 0.8", "static_coefficient = 0.7"))
     code, out, err = cli("mesh", study, "--set", "friction.law=constant")
     assert (code, err) == (0, "")
-    assert ("note: [friction]: the law constant has no static_coefficient, kinetic_coefficient; "
-            "these keys are left out.") in out
+    assert ("note: [friction]: the law constant has no static_coefficient; this key is left "
+            "out.") in out
 
 
 def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
@@ -516,6 +518,12 @@ def test_complex_modes_and_a_movie_of_one(cli, study, monkeypatch):
     assert code == 0
     # On the spring, 1.57 kg/m over 0.1 m: sqrt(1e4 / 0.157) / (2 pi) = 40.17 Hz.
     assert re.search(r"steady sliding:\s+mode .*\s+\S+\s+0 +40\.1\d+ ", out)
+    every = cli("modes", study, "--complex", "--all", *spring)[1]
+    left_out = int(re.search(r"note: (\d+) modes beyond .* --all shows them", out)[1])
+    assert left_out > 0
+    assert "modes beyond" not in every
+    table, whole = (len(text.partition("steady sliding:")[2].splitlines()) for text in (out, every))
+    assert whole - table >= left_out - 2
     assert cli("modes", study, "--movie", "0")[0] == 0
     assert [name for name, _, _ in drawn] == ["tiny-complex-mode-1.mp4", "tiny-mode-0.mp4"]
     assert drawn[1][2] is None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from fecontact.cli.console import echo, echo_written, fail, show
-from fecontact.cli.options import Changes, Folder, StudyFile
+from fecontact.cli.options import All, Changes, Folder, StudyFile
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.diagram_options import BranchSettings
@@ -25,15 +25,19 @@ def branch(
         help="Starting value; the lower bound by default.")] = None,
     set_: Changes = None,
     output: Folder = None,
+    all_: All = False,
 ) -> int:
     """Follow steady sliding or periodic orbits over a parameter: folds, Hopf points, doublings.
 
     The section [branch] of the study selects the solutions; without it, steady sliding is
     followed. Writes all branches (NAME-branch.h5, NAME-branch.csv), a page whose diagram shows
     the orbit of a point that is clicked (NAME-branch.html), and plots: the diagram, and
-    frequencies and growth rates of the modes in steady sliding. Ctrl-C stops it; the points
+    frequencies and growth rates of the modes in steady sliding, up to the frequency up to which the
+    basis is usable; special points beyond are marked. Ctrl-C stops it; the points
     computed so far are written.
     """
+    import numpy as np
+
     from fecontact.cli.console import INTERRUPTED, waiting
     from fecontact.cli.run_files import read_study
     from fecontact.core.files.atomic_write import output_folder
@@ -49,7 +53,7 @@ def branch(
 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
-            system = described.system()
+            system, usable = described.system(), described.usable_hz
         with titled_bar() as progress:
             result = follow_branches(system, wanted, described.initial(), progress)
         beneath = None
@@ -57,12 +61,13 @@ def branch(
             beneath = runs_beneath(system, wanted, described.initial())
         with waiting("Writing"):
             files = write_branch_results(result, wanted, folder, described.name, beneath,
-                                         described.to_toml(), described.folder)
+                                         described.to_toml(), described.folder,
+                                         np.inf if all_ else usable)
         for name, found in result.found.items():
             echo(f"\n{name}: {found.end}")
             if found.message:
                 echo(f"note: {found.message}")
-            show(special_table(found))
+            show(special_table(found, usable))
         for note in result.notes:
             echo(f"note: {note}")
         echo_written(*map(Path, files))

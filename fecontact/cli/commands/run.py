@@ -13,7 +13,7 @@ from fecontact.cli.console import (
     waiting,
     warn_if_stale,
 )
-from fecontact.cli.options import At, AtHz, Branches, Changes, RunFile, Trust, Which
+from fecontact.cli.options import All, At, AtHz, Branches, Changes, RunFile, Trust, Which
 
 
 def report(
@@ -177,6 +177,9 @@ def plot(
     quantity: Annotated[str, Parameter(
         help="Quantity for spectra: velocity, displacement, normal_force, ...")] = "velocity",
     highest_hz: Annotated[float | None, Parameter(help="Highest frequency to plot [Hz].")] = None,
+    period: Annotated[float | None, Parameter(help=(
+        "Time between the points of a Poincare section [s]; by default the period of the drive, "
+        "without one the section is at the maxima of the displacement."))] = None,
     t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
     t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
     style: Annotated[str | None, Parameter(
@@ -187,6 +190,7 @@ def plot(
     at: At = None,
     at_hz: AtHz = None,
     which: Which = 0,
+    all_: All = False,
     trust: Trust = False,
 ) -> None:
     """Plot a stored run, branches or a response, or an orbit of these as a run."""
@@ -212,7 +216,7 @@ def plot(
         return
     stored = stored_orbit_or_run(file, trust, set_, chosen)
     choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
-                         highest_hz)
+                         highest_hz, period, all_)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"), styled(style or {}):
         redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, show
-from fecontact.cli.options import Changes, Folder, StudyFile
+from fecontact.cli.options import All, Changes, Folder, StudyFile
 from fecontact.core.errors import InputError
 
 
@@ -91,6 +91,7 @@ def modes(
         "Smallest and largest amplitude of a nonlinear mode [m]."))] = None,
     resume: Annotated[bool, Parameter(negative=(), help=(
         "Go on with an interrupted nonlinear mode."))] = False,
+    all_: All = False,
 ) -> int:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
@@ -102,10 +103,13 @@ def modes(
     grows; Ctrl-C stops it, --resume goes on where it was. With a `tolerance` it is stored at the
     end only, and followed anew.
     """
+    import numpy as np
+
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import interfaces_of, read_study
     from fecontact.cli.tables import complex_table, compliance_table
     from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.units import quantity
     from fecontact.reduction.report import BasisReport
 
     described = read_study(study, set_)
@@ -137,8 +141,15 @@ def modes(
             from fecontact.analysis.complex_modes import complex_modes
 
             sliding = complex_modes(described.system(), "sliding")
+            usable = np.inf if all_ else described.usable_hz
+            beyond = sliding.frequencies_hz > usable
             echo("\nsteady sliding:")
-            show(complex_table(sliding))
+            show(complex_table(sliding, usable))
+            if beyond.any():
+                growing = np.count_nonzero(sliding.grows & beyond)
+                echo(f"note: {np.count_nonzero(beyond)} modes beyond {quantity(usable, 'Hz')}, up "
+                     f"to which the basis is usable, are left out, {growing} of them growing; "
+                     f"--all shows them.")
         if movie is not None:
             from fecontact.output.render.mode_movie import render_mode
 

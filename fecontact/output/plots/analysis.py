@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.histories import Point, history, point_name
-from fecontact.analysis.periodicity import strobed_states
+from fecontact.analysis.periodicity import section_states, strobed_states
 from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.resolved import resolved
+from fecontact.analysis.sampling import evenly_sampled_history
 from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -42,7 +43,10 @@ def plot_spectrum(
     highest_hz: float | None = None,
     path: str | Path | None = None,
 ) -> "Figure":
-    """Plot the spectrum of a quantity of a run at evenly spaced output times, with its peaks.
+    """Plot the spectrum of a quantity of a run, with its peaks.
+
+    It is that of the motion between the outputs, which is computed again where they are too far
+    apart.
 
     Parameters
     ----------
@@ -60,16 +64,23 @@ def plot_spectrum(
     Raises
     ------
     InputError
-        For a quantity or a point that does not exist, uneven times, another suffix, or a file
-        that cannot be written.
+        For a quantity or a point that does not exist, fewer than five periods, another suffix, or
+        a file that cannot be written.
+
+    Warns
+    -----
+    ModelWarning
+        If outputs are too far apart and the motion between them is not known.
     """
     from matplotlib.patheffects import withStroke
 
     require_kind("plot_spectrum", Trajectory, trajectory=trajectory)
-    shown = history(trajectory, quantity, point, component)
+    sampled = evenly_sampled_history(trajectory, quantity, point, component)
+    shown = sampled.history
     make = power_spectral_density if density else amplitude_spectrum
-    found = make(trajectory.time, shown.values)
+    found = make(sampled.time, shown.values)
     with new_figure(9.0, 4.6, path) as figure:
+        add_note(figure, sampled)
         panel = figure.subplots()
         factor, symbol = (1.0, f"({shown.unit})²/Hz") if density else suitable_unit(
             float(found.values.max()), shown.unit)
@@ -116,7 +127,8 @@ def plot_spectrogram(
     trajectory, quantity, point, component, highest_hz, path
         As for :func:`plot_spectrum`.
     piece : float, optional
-        Length of the pieces that are transformed [s]; a thirty-second of the run by default.
+        Length of the pieces that are transformed [s]; by default a thirty-second of the run, or
+        ten periods of the mean frequency if these are longer.
 
     Raises
     ------
@@ -126,8 +138,9 @@ def plot_spectrogram(
     from matplotlib.colors import LogNorm
 
     require_kind("plot_spectrogram", Trajectory, trajectory=trajectory)
-    shown = history(trajectory, quantity, point, component)
-    found = spectrogram(trajectory.time, shown.values, piece=piece, overlap=0.9)
+    sampled = evenly_sampled_history(trajectory, quantity, point, component)
+    shown = sampled.history
+    found = spectrogram(sampled.time, shown.values, piece=piece, overlap=0.9)
     with new_figure(9.5, 5.6, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
         time_unit, time_symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
@@ -165,6 +178,9 @@ def plot_poincare(
 ) -> "Figure":
     """Plot a Poincare section: the state of a point once per period, over its motion.
 
+    Without a drive and a period, as for self-excited motion, when the point passes its largest
+    displacements.
+
     Parameters
     ----------
     trajectory, path
@@ -179,13 +195,16 @@ def plot_poincare(
     Raises
     ------
     InputError
-        For a point or a component that does not exist, a system without a period, another suffix,
-        or a file that cannot be written.
+        For a point or a component that does not exist, a motion without maxima, another suffix, or
+        a file that cannot be written.
     """
     require_kind("plot_poincare", Trajectory, trajectory=trajectory)
     row = direction_row(trajectory, component)
-    found = strobed_states(trajectory, period=period, phase=phase,
-                           t_start=float(trajectory.time[0]))
+    start = float(trajectory.time[0])
+    if period is None and not trajectory.system.drive.frequency_hz > 0.0:
+        found = section_states(trajectory, point, component, t_start=start)
+    else:
+        found = strobed_states(trajectory, period=period, phase=phase, t_start=start)
     basis = trajectory.system.basis
     drawn = resolved(trajectory)
     x, v = (values(point)[:, row] for values in (
@@ -200,7 +219,8 @@ def plot_poincare(
         plane.plot(x / unit, v / factor, color="#b9c4cc", linewidth=0.6, label="motion")
         once = found.states[:, :m] @ rows / unit, found.states[:, m : 2 * m] @ rows / factor
         plane.plot(*once, "o", markersize=3.5, color=COLOURS[1],
-                   label=f"once per {found.period:.4g} s")
+                   label=f"once per {found.period:.4g} s" if found.maxima_of is None else
+                   f"maxima of {component}, {found.period:.4g} s apart")
         plane.set_xlabel(f"displacement {component} [{symbol}]")
         plane.set_ylabel(f"velocity {component} [{rate_symbol}]")
         plane.legend(loc="best")
@@ -260,7 +280,7 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
 
 def plot_receptance(
     responses: Receptance | Sequence[Receptance], labels: Sequence[str] = (), *,
-    path: str | Path | None = None,
+    usable_hz: float = np.inf, path: str | Path | None = None,
 ) -> "Figure":
     """Plot magnitude and phase of frequency responses; those of unstable states are dashed.
 
@@ -275,6 +295,8 @@ def plot_receptance(
         kind.
     labels : sequence of str
         A name for each.
+    usable_hz : float
+        Frequency up to which the basis is usable [Hz]; what lies beyond is shaded.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -315,6 +337,11 @@ def plot_receptance(
             figure.supxlabel(f"not drawn, as zero but for round-off: {listed(still)}", x=0.99,
                              ha="right", fontsize=8.0, color="#6a6a6a")
         first = responses[0]
+        if usable_hz < (highest := float(first.frequency_hz.max())):
+            for number, axis in enumerate((upper, lower)):
+                axis.axvspan(usable_hz, highest, color="#e4e0d8", zorder=0.5,
+                             label="" if number else "beyond the basis")
+            many = True
         upper.set_ylabel(f"{first.kind} [{units[0]}]" if len(units) == 1 else first.kind)
         if many or not first.stable:
             upper.legend(loc="best")

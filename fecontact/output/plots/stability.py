@@ -35,7 +35,7 @@ def plot_eigenvalues(
     x_label : str, optional
         Label of the parameter, with its SI unit; ticks are in a unit that suits the values.
     range_hz : (float, float)
-        Modes that are never in this range are left out.
+        Modes that are never in this range, and Hopf points outside it, are left out.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -61,6 +61,8 @@ def plot_eigenvalues(
             lower.plot(values, mode.real, color=colour)
         lower.axhline(0.0, color="#303030", linewidth=0.8)
         for point in branch.of_kind("Hopf"):
+            if not range_hz[0] <= point.frequency_hz <= range_hz[1]:
+                continue
             for axis in (upper, lower):
                 axis.axvline(point.parameter, color="#6a6a6a", linestyle=DASHES, linewidth=0.9)
             upper.annotate(f"{point.frequency_hz:.4g} Hz",

@@ -7,6 +7,7 @@ import numpy as np
 from cycler import cycler
 
 from fecontact.analysis.resolved import Resolved
+from fecontact.analysis.sampling import Sampled
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 
@@ -69,7 +70,7 @@ def stress_limit(sizes: Array) -> float:
     return usual if 0.0 < usual < _SHARP * largest else largest
 
 
-def add_note(figure: "Figure", drawn: Resolved) -> None:
+def add_note(figure: "Figure", drawn: Resolved | Sampled) -> None:
     """Note below a figure that its curves are coarser than the motion."""
     if not drawn.note:
         return
