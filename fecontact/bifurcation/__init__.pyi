@@ -32,6 +32,8 @@ from .orbit_family import orbit_family
 from .orbit_forms import with_normal_form
 from .orbit_methods import Collocation, Shooting
 from .orbits.branches import orbit_branch
+from .orbits.constant_state import floquet_multipliers
+from .orbits.floquet import Floquet
 from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range
@@ -55,6 +57,7 @@ __all__ = [
     "DiscontinuityPoint",
     "DoubleHopfPoint",
     "Equilibrium",
+    "Floquet",
     "FoldPoint",
     "FrequencyResponse",
     "HarmonicBalance",
@@ -81,6 +84,7 @@ __all__ = [
     "contact_field",
     "equilibrium_branch",
     "find_equilibrium",
+    "floquet_multipliers",
     "frequency_response",
     "lyapunov_exponents",
     "mode_response",

@@ -322,3 +322,25 @@ def test_friction_with_memory():
 
     assert hopf.parameter == pytest.approx(brentq(hurwitz, 8e-3, 25e-3, xtol=1e-16), rel=1e-10)
     assert branch.column("unstable")[[0, -1]].tolist() == [2, 0]
+
+
+def chained(t, x, p, out):
+    # Nearly linear, with states of 3,000 times the parameter.
+    out[0] = 3000.0 * p[0] - x[0] + 1e-3 * x[1]
+    out[1] = -2.0 * x[1] + x[0] + 0.01 * x[0] ** 2 / 3000.0
+
+
+def test_steps_along_straight_branches_grow():
+    """Their length counts by the parameter: 20 steps of a twentieth, and some to get there."""
+    field = vector_field(chained, {"p": 0.0}, 2)
+    for high in (1.0, 30.0):
+        branch = equilibrium_branch(field, np.zeros(2), bounds=(0.0, high))
+        assert branch.status is BranchStatus.BOUND
+        assert len(branch) < 60
+        assert np.diff(branch.parameter).max() <= 0.0501 * high
+        assert branch.end == BranchStatus.BOUND.value
+    short = equilibrium_branch(field, np.zeros(2), bounds=(0.0, 1.0),
+                               options=ContinuationOptions(points=12))
+    assert short.end == (f"The branch has as many points as were asked for and ends at p = "
+                         f"{short.points[-1].parameter:.6g}: raise points = 12 to go on, or "
+                         f"largest_step to go farther with each.")
