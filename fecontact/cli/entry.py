@@ -9,7 +9,11 @@ from cyclopts import CycloptsError, UnusedCliTokensError
 from fecontact.cli.app import app
 from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code
 from fecontact.core.errors import FecontactError, ModelWarning
-from fecontact.core.resources.memory import available_memory, shown_memory
+from fecontact.core.resources.memory import (
+    available_memory,
+    require_address_space,
+    shown_memory,
+)
 
 
 def main() -> None:
@@ -48,6 +52,7 @@ def _execute(tokens: list[str]) -> int:
     if "" in tokens:
         return fail('an argument is empty (""); give it a value, or leave its option out.', 2)
     try:
+        require_address_space()
         return int(app.meta(tokens, exit_on_error=False, print_error=False,
                             result_action="return_value") or 0)
     except CycloptsError as error:
@@ -79,6 +84,9 @@ def _execute(tokens: list[str]) -> int:
             return fail("interrupted.", INTERRUPTED)
         if debug:
             raise
+        if isinstance(error, RuntimeError) and "start new thread" in str(error):
+            return fail("no more threads can be started: memory (ulimit -v) or the number of "
+                        "processes (ulimit -u) is limited too much; raise the limit.", 1)
         return fail(f"this should not happen ({type(error).__name__}: {error}); run it again "
                     f"with --debug and report what it prints.", 1)
 

@@ -624,3 +624,12 @@ def test_pictures_into_the_present_folder(place, tmp_path, monkeypatch):
     assert execute(["render", str(place / "run.vtkhdf"), "--frames", "2", "--size", "320", "180",
                     "-o", "."]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["frame_0000.png", "frame_0001.png"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of a shell")
+def test_too_little_memory_for_the_libraries_is_said():
+    done = subprocess.run(["sh", "-c", f"ulimit -v 500000; {sys.executable} -m fecontact keys"],
+                          text=True, capture_output=True, check=False)
+    assert done.returncode == 1
+    assert_kind(done.stderr)
+    assert "ulimit -v" in done.stderr

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fecontact.core.errors import InputError
 
+_LEAST = 0.8e9  # [bytes]
 _UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
 
@@ -42,6 +43,18 @@ def require_memory(name: str, count: float, each: float, remedy: str = "") -> No
     raise InputError(f"{name} = {shown_count(count)} would need {shown_memory(count * each)} of "
                      f"memory, where {shown_memory(free)} are free; take at most "
                      f"{fits}{remedy}.")
+
+
+def require_address_space() -> None:
+    """Raise :class:`InputError` if this process may not take the memory that libraries need.
+
+    They end it by a signal, or fail to load, where the limit of ``ulimit -v`` is reached.
+    """
+    free = _own_limit()
+    if free < _LEAST:
+        raise InputError(f"This process may take {shown_memory(max(free, 0.0))} of memory only "
+                         f"(ulimit -v), but libraries alone need {shown_memory(_LEAST)}; raise the "
+                         f"limit.")
 
 
 def shown_memory(size: float) -> str:

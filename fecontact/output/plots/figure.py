@@ -134,8 +134,11 @@ def new_figure(
         FigureCanvasAgg(figure)
         yield figure
     if target is not None:
+        # Written at once: matplotlib loses the error of a full disk while it draws a PDF.
+        drawn = BytesIO()
+        figure.savefig(drawn, format=target.suffix[1:].lower())
         with replaced(target) as part:
-            figure.savefig(part, format=target.suffix[1:].lower())
+            part.write_bytes(drawn.getbuffer())
 
 
 def _target(path: str | Path) -> Path:
