@@ -13,13 +13,18 @@ BENCHMARKS := integrator+a+b+b2+c+d integrator+a+b+c+--tight integrator+--inline
   continuation harmonic ensemble nonsmooth bodies solids contact_kernels laws sweep output \
   eigen eigen+--solids+cube eigen+--solids+150000+plate reduction+1 reduction+--solid
 
+# Processor that kernels are compiled for, kernels of OpenBLAS, and tests to run, for test-variant.
+CPU   := haswell
+BLAS  := Haswell
+TESTS :=
+
 # Tests start many processes, and pytest rewrites their files: what Python keeps of this saves time.
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
 # Targets share $(VENV), and compiling takes two cores of itself: none run at the same time.
 .NOTPARALLEL:
-.PHONY: help setup demo test test-fast test-slow check bench docs validation clean
+.PHONY: help setup demo test test-fast test-slow test-variant check bench docs validation clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' $(MAKEFILE_LIST) | \
@@ -38,6 +43,10 @@ test: $(READY) $(ALL) $(SYSTEM) ## run all tests but the slow ones
 
 test-slow: $(READY) $(ALL) $(SYSTEM) ## run documents and examples, and what takes a minute or more
 	@$(BIN)/python -m pytest -q -n auto -m slow
+
+test-variant: $(READY) $(SYSTEM) ## all tests as on another processor: CPU=haswell BLAS=Haswell
+	@NUMBA_CPU_NAME=$(CPU) NUMBA_CPU_FEATURES= OPENBLAS_CORETYPE=$(BLAS) \
+	  NUMBA_CACHE_DIR=$(CURDIR)/build/kernels-$(CPU) $(BIN)/python -m pytest -q -n auto $(TESTS)
 
 check: $(READY) ## ruff and mypy
 	@$(BIN)/ruff check .

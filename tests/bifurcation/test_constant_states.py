@@ -51,7 +51,7 @@ def test_damping_another_state_and_two_periods():
 
 
 def test_what_is_no_constant_state():
-    with pytest.raises(InputError, match="the state is not at rest: at t = 1.5708 s"):
+    with pytest.raises(InputError, match="the state is not at rest"):
         floquet_multipliers(mathieu_field(), [1.0, 0.0])
     with pytest.raises(InputError, match="must hold 2 numbers"):
         floquet_multipliers(mathieu_field(), [0.0])

@@ -12,9 +12,9 @@ from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Degree of the polynomials, and least and largest number of intervals over one period of the rates.
 _DEGREE, _LEAST, _MOST = 4, 20, 2560
-# Change of the multipliers, in the largest one or in 1, at which the intervals suffice. On a border of
-# stability two of them meet, and rounding changes each by its root: there a change below the second
-# number ends the search once it falls no more on twice the intervals.
+# Change of the multipliers, in the largest one or in 1, at which the intervals suffice. On a border
+# of stability two of them meet, and rounding changes each by its root: there a change below the
+# second number ends the search once it falls no more on twice the intervals.
 _CONVERGED, _MET = 1e-9, 1e-5
 # Largest rate at the state, in parts of its largest derivative times the scale of the states.
 _AT_REST = 1e-9
