@@ -14,7 +14,7 @@ from fecontact.system.kernels import right_hand_side
 from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import NODE_POWERS, POWERS, powers
 
-# Most periods of what is given in time, and steps of a given length, in a run, which then takes hours.
+# Most periods of what is given in time, and steps of max_step, in a run, which then takes hours.
 MOST_PERIODS = 1e9
 
 
