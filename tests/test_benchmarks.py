@@ -27,6 +27,8 @@ BENCHMARKS = {
                        (r"^b smoothed +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4),
                        (r"^c event-driven +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4)]),
     "output": ((), [(r"^(\d+) nodes", 205.0, 50.0)]),
+    "random_systems": ((), [(r"^all +10 +(\S+)", 1e-5, 1e-5),
+                            (r"^finished (\d+) of 10", 10.0, 0.0)]),
     # With all residual vectors nothing is missing of the compliance.
     "reduction": ((), [(r"^slender beam, P2 +0 .* (\S+)$", 0.0, 1e-9)]),
     "shooting": ((), [(r"^ +(3) ", 3.0, 0.0)]),

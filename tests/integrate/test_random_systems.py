@@ -1,0 +1,47 @@
+"""Random systems of the benchmark: their equations, written independently, and their errors."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fecontact.laws import FrictionLaw, NormalLaw, law_names
+
+FOLDER = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture
+def systems(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    import random_systems
+
+    return random_systems
+
+
+def test_equations_are_those_of_the_package(systems):
+    """Every law, in the plane and in space, against formulas in plain Python."""
+    met = set()
+    for number in range(64):
+        case = systems.random_case(number)
+        met |= set(case.names)
+        m, rng = case.system.basis.modes, np.random.default_rng([1, number])
+        for _ in range(4):
+            y = case.state * rng.uniform(0.0, 2.0, len(case.state))
+            y[:m] = 10.0 ** rng.uniform(-6.0, -4.5) * rng.standard_normal(m)
+            y[2 * m :] = 0.3 * rng.standard_normal(len(y) - 2 * m) * case.scale[2 * m :]
+            t = rng.uniform(0.0, case.end)
+            expected = systems.rates(case, t, y)
+            found = case.system.rhs(t, y)
+            size = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max())
+            assert (np.abs(found - expected) / size).max() < 1e-8, (number, case.names)
+    assert met == {*law_names()[NormalLaw], *law_names()[FrictionLaw]}
+
+
+def test_errors_at_the_default_tolerance(systems):
+    """Errors stay below 1e-4 of the amplitude on four laws, with slip, stick and impacts."""
+    for number in (0, 2, 4, 12):
+        case = systems.random_case(number)
+        times = np.linspace(0.0, 0.25 * case.end, 51)
+        wanted = systems.reference(case, times)
+        run = systems.fc.simulate(case.system, times[-1], initial=case.state, outputs=times)
+        assert systems.distance(case, run.states, wanted) < 1e-4, number
