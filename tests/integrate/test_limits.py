@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import friction_oscillator, impact_oscillator
+from systems import beam, friction_oscillator, impact_oscillator
 from test_events import START, drop
 
 from fecontact import (
@@ -28,6 +28,7 @@ from fecontact.laws import (
     normal_law,
 )
 from fecontact.reduction import PointPairing, point_masses
+from fecontact.system.model_limits import limits_exceeded
 
 
 def test_cvode_agrees():
@@ -192,3 +193,12 @@ def test_sliding_far_along_the_ground_is_within_the_limits():
     # v^2 / (2 mu N / m)
     assert run.displacement(0)[-1, 0] == pytest.approx(2.0, rel=1e-3)
     assert run.limits_exceeded == ()
+
+
+def test_rotations_beyond_small_angles_are_told():
+    """A free beam turned as a whole by 0.38 rad, and by 0.05 rad."""
+    system = beam()
+    for angle, told in ((0.38, True), (0.05, False)):
+        state = initial_state(system, RigidStart((0.0, 0.0, angle)), 0.0)
+        found = limits_exceeded(system, np.zeros(1), state[None])
+        assert any("the body turns by 0.38 rad" in one for one in found) == told

@@ -56,7 +56,7 @@ height = 0.02
 element_size = 0.01
 
 [body]
-thickness = 1.0
+thickness = 0.1
 
 [basis]
 modes = 6
@@ -268,7 +268,7 @@ file = "part.msh"
 left = [-0.11, -0.001, -0.04, 0.001]
 right = [0.04, -0.001, 0.11, 0.001]
 [body]
-thickness = 1.0
+thickness = 0.1
 [basis]
 modes = 6
 contact = ["left", "right"]

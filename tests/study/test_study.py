@@ -1,5 +1,6 @@
 """Study files: what they describe, round trips, and what is said of mistakes."""
 
+import re
 from dataclasses import fields
 
 import numpy as np
@@ -34,6 +35,7 @@ from fecontact.integrate import SetValued
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.solvers import SOLVERS
 from fecontact.laws import ExponentialFriction, RoughSurface
+from fecontact.system.model_limits import Planned, implausible_values
 
 TINY = """
 gap = 1e-6
@@ -495,3 +497,22 @@ def test_a_decimal_comma_is_recognised(tiny):
         tiny.with_(**{"ground.speed": "0,5"})
     with pytest.raises(InputError, match=r"not valid TOML: .*; write 2\.5e-3 with a decimal point"):
         Study.from_toml("[ground]\nspeed = 2,5e-3  # m/s\n")
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"geometry.length": 100.0, "geometry.height": 10.0, "geometry.element_size": 10.0,
+      "body.thickness": 20.0}, "extent of 100 m, not from 0.0001 to 5 m.*scale 1e-3"),
+    ({"body.youngs_modulus": 2.1e5}, r"youngs_modulus = 2\.1e\+05 Pa of the body is not from"),
+    ({"body.density": 0.5}, "density = 0.5 kg/m3 of the body is not from 1 to 25000"),
+    ({"body.thickness": 20.0}, "thickness = 20 m of the body is more than its extent of 0.1 m"),
+    ({"friction.static_coefficient": 40.0}, "static_coefficient = 40 of .* is above 2"),
+    ({"normal.roughness_height": 5.2e-3}, "roughness_height = 0.0052 m is more than a hundredth"),
+    ({"ground.speed": 1000.0}, r"ground\.speed = 1e\+03 m/s is above 100 m/s"),
+    ({"gap": 50.0}, "smallest gap of 50 m is more than 100 times"),
+    ({"simulation.t_end": 1e5}, "periods of the fastest mode")])
+def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
+    study = tiny.with_(**changes)
+    planned = Planned(study.system(), {"": study.elastic_body()}, study.t_end)
+    found, = implausible_values(planned)
+    assert re.search(message, found)
+    assert not implausible_values(Planned(tiny.system(), {"": tiny.elastic_body()}, tiny.t_end))
