@@ -160,12 +160,6 @@ def amplitude_spectrum(
         for histories of whole periods.
     padding : int
         Zero-padding factor: frequencies are spaced this much more closely than the resolution.
-
-    Raises
-    ------
-    InputError
-        As :func:`evenly_sampled`, and for fewer than five periods of the mean frequency, except
-        with the window 'boxcar'.
     """
     from scipy.signal import get_window
 
@@ -174,8 +168,6 @@ def amplitude_spectrum(
         raise InputError(f"amplitude_spectrum: padding = {padding!r} must be a whole number above "
                          f"zero.")
     n, step = len(x), float(t[1] - t[0])
-    if window != "boxcar":
-        _require_periods(t, x, n * step)
     weights = get_window(window, n)
     transform = np.fft.rfft(weights * (x - x.mean()), padding * n)
     amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform), dtype=np.float64)
@@ -295,7 +287,7 @@ def mean_frequency(time: Array, values: Array) -> float:
     return float(np.sqrt(rate / square)) / (2.0 * np.pi)
 
 
-def _require_periods(t: Array, x: Array, window: float) -> None:
+def require_periods(t: Array, x: Array, window: float) -> None:
     """Refuse a window [s] of fewer than five periods of the mean frequency of a history."""
     frequency = mean_frequency(t, x)
     if 0.0 < window * frequency < _FEWEST:
@@ -320,5 +312,5 @@ def _piece(t: Array, x: Array, piece: float | None, parts: float) -> int:
         if not 8 <= count <= times:
             raise InputError(f"A spectrum: piece = {piece!r} s must be from {8 * step:.4g} s, "
                              f"eight times of the history, to {times * step:.4g} s, all of it.")
-    _require_periods(t, x, count * step)
+    require_periods(t, x, count * step)
     return count

@@ -189,7 +189,7 @@ def _roughness(planned: Planned) -> Iterator[str]:
 
 def _ground(planned: Planned) -> Iterator[str]:
     """Speed and distance of the ground."""
-    ground, gap = planned.system.ground, float(np.min(planned.system.gap))
+    ground, gap = planned.system.ground, float(np.min(planned.system.arrays.gap))
     if abs(ground.speed) > SPEED:
         yield f"ground.speed = {ground.speed:.3g} m/s is above {SPEED:g} m/s; check its unit."
     extents = [float(np.ptp(body.mesh.nodes, axis=0).max()) for body in planned.bodies.values()]

@@ -12,7 +12,12 @@ from fecontact.analysis.periodicity import section_states, strobed_states
 from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.sampling import evenly_sampled_history
-from fecontact.analysis.spectra import amplitude_spectrum, power_spectral_density, spectrogram
+from fecontact.analysis.spectra import (
+    amplitude_spectrum,
+    power_spectral_density,
+    require_periods,
+    spectrogram,
+)
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
@@ -78,6 +83,8 @@ def plot_spectrum(
     sampled = evenly_sampled_history(trajectory, quantity, point, component)
     shown = sampled.history
     make = power_spectral_density if density else amplitude_spectrum
+    if not density:
+        require_periods(sampled.time, shown.values, float(sampled.time[-1] - sampled.time[0]))
     found = make(sampled.time, shown.values)
     with new_figure(9.0, 4.6, path) as figure:
         add_note(figure, sampled)
