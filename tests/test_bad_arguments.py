@@ -737,9 +737,6 @@ read_table("/dev/zero")
 basis_from_matrices(np.eye(2),np.eye(2),None)
 basis_from_matrices(np.eye(2),[[2.0,1.0],[0.0,2.0]],{"contact":np.zeros((1,3,2))})
 Mesh([[0,0],[1,0],[0,1],[0.5,0.4]],[[0,1,2],[0,1,3]])
-Load(normal=1e300)
-Drive(stiffness_x=1e300)
-Ground(speed=1e300)
 basins(osc,(Axis("B","y"),np.linspace(0,1,10**5)),(Axis("B","y","velocity"),np.linspace(0,1,10**6)),transient_periods=3)
 """
 

@@ -61,26 +61,21 @@ def require_positive(owner: str, **values: float) -> None:
 
 
 def require_not_negative(owner: str, **values: float) -> None:
-    """Raise :class:`InputError` unless every value is a number from zero to 1e60."""
+    """Raise :class:`InputError` unless every value is a finite number of at least zero."""
     for name, value in values.items():
         if not (_is_number(value) and 0.0 <= value <= sys.float_info.max):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number, zero or "
                              f"above.")
-        if value > _MOST:
-            raise InputError(f"{owner}: {name} = {shown(value)} must be at most {_MOST:g}.")
 
 
 def require_finite(owner: str, **values: float) -> None:
-    """Raise :class:`InputError` unless every value is a number from -1e60 to 1e60."""
+    """Raise :class:`InputError` unless every value is a finite number."""
     for name, value in values.items():
         if not _is_number(value):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number.")
         # Whole numbers may be larger than any other.
         if not abs(value) <= sys.float_info.max:
             raise InputError(f"{owner}: {name} = {shown(value)} must be finite.")
-        if abs(value) > _MOST:
-            raise InputError(f"{owner}: {name} = {shown(value)} must be a number from {-_MOST:g} "
-                             f"to {_MOST:g}.")
 
 
 def require_choice(owner: str, name: str, value: object, names: Iterable[str]) -> None:
