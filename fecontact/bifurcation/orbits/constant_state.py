@@ -104,7 +104,7 @@ def _apart(one: Floquet, other: Floquet) -> float:
 
 def _require_rest(field: VectorField, state: Array, values: Array, period: float) -> None:
     """Raise InputError unless the rates at a state are zero at all times of a period."""
-    times = period * np.arange(32) / 32.0
+    times: Array = np.linspace(0.0, period, 32, endpoint=False)
     rates, slopes, _ = field.derivatives(times, np.tile(state, (len(times), 1)), values)
     scale = float(np.abs(slopes).max()) * max(1.0, float(np.abs(state).max()))
     place = int(np.abs(rates).max(axis=1).argmax())
