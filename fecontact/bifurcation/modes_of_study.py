@@ -55,7 +55,8 @@ def follow_mode(
     progress : callable, optional
         Told the number of points.
     earlier : NonlinearMode, optional
-        What an interrupted computation of the same has left: it goes on at its last point. With a
+        What an interrupted computation of the same has left: it goes on at the end of the last
+        whole part, so that the numbers are those of a computation without interruption. With a
         tolerance the mode is followed anew, since harmonics or samples may still grow.
     keep : callable, optional
         Given what there is after each part, as interrupted.
@@ -63,8 +64,8 @@ def follow_mode(
         Whose end elements that never slide keep.
     """
     observe, method = observed_point(system, wanted), wanted.method()
-    parts = not method.refines and keep is not None
-    mode = earlier if earlier is not None and not method.refines else None
+    parts = not method.refines
+    mode = _whole_parts(earlier) if earlier is not None and parts else None
     while True:
         done = 0 if mode is None else _regular(mode)
         most = min(wanted.points, done + _PART) if parts else wanted.points
@@ -85,6 +86,20 @@ def follow_mode(
 
 def _regular(mode: NonlinearMode) -> int:
     return sum(point.kind is None for point in mode.branch.points)
+
+
+def _whole_parts(mode: NonlinearMode) -> NonlinearMode | None:
+    """The mode up to the end of its last whole part; None without one.
+
+    Each part begins with the first step, in an uninterrupted computation too.
+    """
+    regular = [k for k, point in enumerate(mode.branch.points) if point.kind is None]
+    whole = len(regular) // _PART * _PART
+    if whole == 0:
+        return None
+    return replace(mode, branch=replace(
+        mode.branch, points=mode.branch.points[: regular[whole - 1] + 1],
+        status=BranchStatus.POINTS))
 
 
 def _interrupted(mode: NonlinearMode) -> NonlinearMode:

@@ -39,14 +39,15 @@ class ResponseSettings:
     harmonics : int
         Harmonics of the period of the excitation.
     samples : int, optional
-        Samples a period, at least 2 harmonics + 2; by default 8 harmonics, at least 32. Kinks of
-        laws need more.
+        Samples a period, at least 2 harmonics + 2; by default as many as ``sampling_tolerance``
+        needs, from 8 harmonics or 32.
     tolerance : float, optional
         Largest truncation error, relative to the orbit, for which harmonics are added.
     most_harmonics : int
         Limit for that.
     sampling_tolerance : float, optional
-        Largest error from few samples, relative to the orbit, for which samples are doubled.
+        Largest error from few samples, relative to the orbit, for which samples are doubled;
+        5e-4 by default where ``samples`` are not given.
     stability : 'transitions', 'Koopman-Hill' or 'none'
         How it is told whether orbits are stable; without it points take a fraction of the time and
         folds alone are found.

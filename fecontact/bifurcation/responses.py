@@ -7,14 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecontact.analysis.histories import usual_component
-from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, titled
-from fecontact.bifurcation.fields.contact_field import contact_field
-from fecontact.bifurcation.harmonic.response import (
-    FrequencyResponse,
-    continued,
-    frequency_response,
-)
+from fecontact.bifurcation.continuation.problem import BranchStatus, titled
+from fecontact.bifurcation.harmonic.response import FrequencyResponse, frequency_response
 from fecontact.core.errors import FecontactError
 
 if TYPE_CHECKING:
@@ -73,7 +67,8 @@ def follow_responses(
         Told the level that is being followed, and which part of its range is done.
     earlier : FrequencyResponse, optional
         What an interrupted computation of the same has left: finished levels are taken from it, the
-        one that was interrupted goes on at its last point.
+        one that was interrupted is followed anew, so that the numbers are those of a computation
+        without interruption.
     keep : callable, optional
         Given what there is after each level.
     preload : LoadHistory, optional
@@ -91,9 +86,7 @@ def follow_responses(
         known = _level_of(earlier, value)
         try:
             options = titled(wanted.options(), title, progress)
-            if known is not None and _goes_on(known, wanted):
-                found = _with_rest(system, known, observe, options)
-            elif known is not None and known.branches[0].status is not BranchStatus.INTERRUPTED:
+            if known is not None and known.branches[0].status is not BranchStatus.INTERRUPTED:
                 found = known
             else:
                 found = frequency_response(
@@ -129,26 +122,6 @@ def _level_of(earlier: FrequencyResponse | None, value: float) -> FrequencyRespo
         if level == value or (np.isnan(level) and np.isnan(value)):
             return replace(earlier, branches=(branch,), levels=np.array([level]))
     return None
-
-
-def _goes_on(known: FrequencyResponse, wanted: "ResponseSettings") -> bool:
-    """Whether an interrupted level is continued; otherwise it is followed anew.
-
-    Followed to both sides it has parts on one of them only, and with a tolerance of its own the
-    number of harmonics may still change.
-    """
-    low, high = wanted.checked_bounds
-    return (known.branches[0].status is BranchStatus.INTERRUPTED
-            and not low < wanted.first < high and not wanted.method().refines)
-
-
-def _with_rest(
-    system: "ContactSystem", known: FrequencyResponse, observe: tuple[str | int, str],
-    options: ContinuationOptions,
-) -> FrequencyResponse:
-    branch: Branch = known.branches[0]
-    row = contact_field(system, [known.parameter_name]).displacement_row(*observe)
-    return replace(known, branches=(continued(system, branch, row, options),))
 
 
 def _joined(one: FrequencyResponse, other: FrequencyResponse) -> FrequencyResponse:

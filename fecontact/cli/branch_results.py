@@ -3,13 +3,19 @@
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.points import HopfPoint, UnresolvedPoint
+from fecontact.bifurcation.continuation.points import (
+    UNRESOLVED,
+    UNRESOLVED_MEANING,
+    HopfPoint,
+    UnresolvedPoint,
+)
+from fecontact.cli.console import echo
 from fecontact.core.files.atomic_write import write_text
 from fecontact.output.files.branches import write_branches
 
@@ -115,6 +121,12 @@ def special_table(branch: Branch, usable_hz: float = math.inf) -> Any:
         rows.append((point.kind or ("start" if index == 0 else "end"), point.parameter_text(),
                      "" if period is None else f"{1.0 / period:.5g}", remark))
     return table("point", branch.parameter_name, "frequency [Hz]", "", rows=rows)
+
+
+def echo_unresolved(branches: Iterable[Branch]) -> None:
+    """Say what unresolved points of branches are, if there are any."""
+    if any(point.kind == UNRESOLVED for branch in branches for point in branch.points):
+        echo(f"{UNRESOLVED}: {UNRESOLVED_MEANING}.")
 
 
 def _period(point: BranchPoint) -> float | None:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import (
+    UNRESOLVED,
+    UNRESOLVED_MEANING,
     CrossingPoint,
     FoldPoint,
     HopfPoint,
@@ -87,6 +89,8 @@ class Branch(Summarised):
             ("parameter", self.parameter_name), ("range", span(self.parameter)),
             ("points", f"{len(self)}"),
             ("special", listed(special, 5)),
+            *([(UNRESOLVED, UNRESOLVED_MEANING)]
+              if any(point.kind == UNRESOLVED for point in self.points) else []),
             *([("stable", f"{sum(known)} of {len(known)} regular points")] if known else []),
             *self._accuracy(),
             ("end", self.status.name.lower()),

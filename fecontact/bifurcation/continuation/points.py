@@ -14,6 +14,8 @@ from fecontact.core.types import Array, ComplexArray
 # Kind of a point at which the stability changes though no test function has a zero, or that finer
 # meshes do not have.
 UNRESOLVED = "unresolved"
+UNRESOLVED_MEANING = ("the stability changes and no bifurcation explains it: multipliers are too "
+                      "inaccurate there, or a force has a kink")
 
 
 class _NormalForm(BranchPoint):

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from fecontact.bifurcation.continuation.crossings import counted, with_count
 from fecontact.bifurcation.continuation.newton import Solution, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
@@ -12,7 +14,7 @@ from fecontact.bifurcation.continuation.step import Step
 # Largest distance of a solution from the cubic through both ends of a step: part of the distance
 # of the end from the tangent, and relative to the size of the solution.
 _OFF_CUBIC, _ROUNDING = 0.2, 1e-7
-# Part of a step to which a jump of the stability is located.
+# Part of a step to which a jump of the stability or of a slope is located.
 _JUMP = 1e-3
 # Part of a step to which a bound of the parameter is located.
 _BOUND = 1e-12
@@ -91,6 +93,8 @@ def _zeros(step: Step, strict: bool) -> list[BranchPoint] | None:
                          remeshed=name in problem.confirms)
         if name == "branch point" and strict and _off_cubic(step, zero and zero[0]):
             return None
+        if zero is None and name == "fold":
+            zero = _turn(step)
         if zero is None:
             continue
         at, bracket = zero
@@ -104,6 +108,25 @@ def _zeros(step: Step, strict: bool) -> list[BranchPoint] | None:
                 rest |= {"located": False, "parameter_error": bracket * step.parameter_rate()}
             found.append(special_point(at.u, at.tangent, at.values, kind, rest))
     return found
+
+
+def _turn(step: Step) -> tuple[Solution, float]:
+    """The solution next to a corner at which the parameter turns, and the length around it.
+
+    The slope of the parameter jumps there, so that it has no zero.
+    """
+    low, high, known = 0.0, step.length, [step.here, step.there]
+    slope = step.here.tests["fold"]
+    while high - low > _JUMP * step.length:
+        reached = step.solution(0.5 * (low + high))
+        if reached is None:
+            break
+        known.append(reached)
+        if reached.tests["fold"] * slope > 0.0:
+            low = 0.5 * (low + high)
+        else:
+            high = 0.5 * (low + high)
+    return max(known, key=lambda at: float(np.sign(slope) * at.u[-1])), high - low
 
 
 def _changed(here: Solution, there: Solution) -> list[str]:

@@ -8,6 +8,7 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
+from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
@@ -126,6 +127,34 @@ class Balance:
         return values
 
     @cached_property
+    def onsets(self) -> Array:
+        """Penetrations (k, n) at which normal forces of contact nodes have kinks."""
+        if not isinstance(self.field, ContactField):
+            return np.zeros((0, 0))
+        return kink_onsets(self.field, self.values, self.free)
+
+    def add_kinks(
+        self, times: Array, states: Array, values: Array, period: float, rates: Array,
+        derivatives: Array | None = None,
+    ) -> Array:
+        """Add to rates (N, d), and derivatives (N, d, d), what kinks between samples change.
+
+        Returns ``widths`` (m, N) of :func:`compiled.kinks.add_kinks`.
+        """
+        widths = np.zeros((self.layout.displacements, len(rates)))
+        if self.onsets.size and isinstance(self.field, ContactField):
+            add_kinks(times, states, self.field.arrays(values), self.onsets, period / self.samples,
+                      derivatives is not None, rates,
+                      np.zeros((1, 1, 1)) if derivatives is None else derivatives, widths)
+        return widths
+
+    def rates(self, times: Array, states: Array, values: Array, period: float) -> Array:
+        """Rates (N, d) at the samples, with kinks between them."""
+        found = self.field.rates(times, states, values)
+        self.add_kinks(times, states, values, period, found)
+        return found
+
+    @cached_property
     def directions(self) -> Array | None:
         """Columns (m, r) of what contact nodes see, where these are few; see FewContacts."""
         return contact_directions(self.field, self.values, self.harmonics)
@@ -193,6 +222,7 @@ class Linearised:
         self.problem, self.u = problem, u
         self.period = problem.period(u)
         self._factors: tuple[Factors | FewContacts, Array] | None = None
+        self._widths: Array | None = None
 
     @cached_property
     def times(self) -> Array:
@@ -222,14 +252,23 @@ class Linearised:
         """Rates f (N, d) at the samples."""
         if "derivatives" in self.__dict__:
             return self.derivatives[0]
-        return self.problem.field.rates(self.times, self.states, self.problem.parameters(self.u))
+        return self.problem.rates(self.times, self.states, self.problem.parameters(self.u),
+                                  self.period)
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array, Array]:
         """Rates and their derivatives to states and parameter at the samples."""
-        problem = self.problem
-        return problem.field.derivatives(self.times, self.states, problem.parameters(self.u),
-                                         (problem.free,))
+        problem, values = self.problem, self.problem.parameters(self.u)
+        f, J, P = problem.field.derivatives(self.times, self.states, values, (problem.free,))
+        if problem.onsets.size:
+            self._widths = problem.add_kinks(self.times, self.states, values, self.period, f, J)
+            h = _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
+            for side in (1.0, -1.0):
+                beside, change = values.copy(), np.zeros_like(f)
+                beside[problem.free] += side * h
+                problem.add_kinks(self.times, self.states, beside, self.period, change)
+                P[:, :, 0] += side * change / (2.0 * h)
+        return f, J, P
 
     @cached_property
     def residual(self) -> Array:
@@ -258,14 +297,17 @@ class Linearised:
         if problem.autonomous:
             turned = differentiated(problem.coefficients(u)) / T**2
             turned[:, :m] = 2.0 * differentiated(turned[:, :m]) / T
-            by_period = -turned.reshape(-1) + self._by_rates(self._slowed(J, self.states))
+            slowed = self._slowed(J, self.states)
+            if self._widths is not None:
+                slowed[:, m : 2 * m] += self._widths.T / T
+            by_period = -turned.reshape(-1) + self._by_rates(slowed)
             return np.stack([by_period, self._by_rates(P[:, :, 0])], axis=1)
         ends = self._beside()
         if ends is None:
             return self._by_rates(P[:, :, 0])[:, None]
-        sides = [self._balance(end, period, problem.field.rates(
+        sides = [self._balance(end, period, problem.rates(
             problem.times(period), problem.states(end, period, self.memory),
-            problem.parameters(end))) for end, period, _ in ends]
+            problem.parameters(end), period)) for end, period, _ in ends]
         return ((sides[0] - sides[1]) / (2.0 * ends[0][2]))[:, None]
 
     def _slowed(self, J: Array, x: Array) -> Array:

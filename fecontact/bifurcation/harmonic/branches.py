@@ -1,6 +1,6 @@
 """Branches of orbits by harmonic balance, from motions, Hopf points and points of branches."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from fecontact.bifurcation.continuation.problem import (
     sizes_of,
 )
 from fecontact.bifurcation.harmonic import starts
-from fecontact.bifurcation.harmonic.method import MOST, HarmonicBalance
+from fecontact.bifurcation.harmonic.method import MOST, MOST_SAMPLED, HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.same_orbit import HALVING
@@ -30,6 +30,15 @@ _FIRST_STEPS = (1.0, 0.2, 0.04)
 _MORE = 1.5
 # Size below which orbits are at rest, in that of the largest on the branch, means included.
 _AT_REST = 1e-8
+# Number of points at which the error from few samples is estimated by default, and error that is
+# told of.
+_LOOKED_AT, _NOTED = 24, 5e-3
+_FEW = ("The error of the branch from its {} samples is {:.2g} of the orbit: folds may be those of "
+        "kinks of the contact laws between samples; take more samples or smoother laws.")
+_CORNERS = ("The parameter turns at corners of the branch at {} folds: forces have kinks between "
+            "samples; take more samples, or smoother forces.")
+# Distance of the nearest multiplier from 1 at a fold from which multipliers count as wrong.
+_OFF_AT_FOLD = 0.1
 # Points at which two branches meet.
 _ON_TWO = ("branch point", HALVING)
 
@@ -146,35 +155,108 @@ def follow(
 ) -> Branch:
     """Follow a branch, with more harmonics and samples until its errors meet the tolerances.
 
-    ``further`` are attributes of the branch.
+    ``further`` are attributes of the branch. Stability is left out where folds show it to be wrong.
 
     Raises
     ------
     AnalysisError
         If they do not with as many as the method allows.
     """
+    if problem.stability is None or problem.autonomous or not problem.kinked:
+        return _refined(problem, u, tangent, method, options, further, how)[0]
+    # What takes the time is done once, on a branch that is known.
+    branch, plain, u, tangent = _refined(
+        replace(problem, stability=None), u, tangent, replace(method, stability=None), options,
+        further, how)
+    if branch.status is BranchStatus.INTERRUPTED:
+        return branch
+    whole = replace(plain, stability=problem.stability)
+    wrong = _wrong_at_folds(whole, branch)
+    if wrong:
+        return replace(branch, message=_joined(branch.message, wrong))
+    known = {name: branch.attributes[name] for name in ("sampling_error",)
+             if name in branch.attributes}
+    found = _followed(whole, u, tangent, options, {**(further or {}), **known}, how)
+    return replace(found, message=_joined(found.message, branch.message)
+                   if _FEW[:20] in branch.message else found.message)
+
+
+def _followed(
+    problem: HarmonicProblem, u: Array, tangent: Array | None, options: ContinuationOptions,
+    further: Mapping[str, Any] | None, how: Mapping[str, Any],
+) -> Branch:
+    """Follow a branch with the harmonics and samples of a problem."""
     name = list(problem.field.parameters)[problem.free]
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
-    ended = replace(options, stop_at=[*stops, HALVING])
+    branch = continue_branch(
+        problem, u, replace(options, stop_at=[*stops, HALVING]), name=name, tangent=tangent,
+        attributes={**attributes_of(problem), **(further or {})}, **how)
+    if branch.points[-1].kind == HALVING and HALVING not in stops:
+        branch = replace(branch, status=BranchStatus.CLOSED)
+    return branch
+
+
+def _refined(
+    problem: HarmonicProblem, u: Array, tangent: Array | None, method: HarmonicBalance,
+    options: ContinuationOptions, further: Mapping[str, Any] | None, how: Mapping[str, Any],
+) -> tuple[Branch, HarmonicProblem, Array, Array | None]:
+    """A branch that meets the tolerances, with the problem, start and tangent that it has."""
+    explicit = method.sampling_tolerance is not None
+    sampling = method.sampling_tolerance if problem.autonomous else method.sampling
+    most = MOST if explicit else max(MOST_SAMPLED, method.count)
     while True:
-        branch = continue_branch(problem, u, ended, name=name, tangent=tangent,
-                                 attributes={**attributes_of(problem), **(further or {})},
-                                 **how)
-        if branch.points[-1].kind == HALVING and HALVING not in stops:
-            branch = replace(branch, status=BranchStatus.CLOSED)
-        if not method.refines or branch.status is BranchStatus.INTERRUPTED:
-            return branch
-        finer = _with_more_harmonics(method, branch)
-        if finer is None and method.sampling_tolerance is not None:
-            error = _largest_error(problem, branch.points)
-            branch = replace(branch, attributes={**branch.attributes, "sampling_error": error})
-            finer = _with_more_samples(method, error)
+        branch = _followed(problem, u, tangent, options, further, how)
+        if branch.status is BranchStatus.INTERRUPTED:
+            break
+        finer, error = _with_more_harmonics(method, branch), 0.0
+        if finer is None and (explicit or (problem.kinked and not problem.autonomous)):
+            # By default a part of the points is looked at.
+            error = _largest_error(problem, branch.points if explicit else _some(branch.points))
+            if sampling is not None:
+                branch = replace(branch, attributes={**branch.attributes, "sampling_error": error})
+                finer = _with_more_samples(method, error, sampling, most)
         if finer is None:
-            return branch
+            if error > max(_NOTED, sampling or 0.0):
+                branch = replace(branch, message=_joined(
+                    branch.message, _FEW.format(method.count, error)))
+            corners = sum(point.kind == "fold" and not point.located for point in branch.points)
+            if corners and not problem.autonomous:
+                branch = replace(branch, message=_joined(branch.message, _CORNERS.format(corners)))
+            break
         method = finer
         if tangent is not None:
             _, tangent = starts.with_more(problem, tangent, method)
         problem, u = starts.with_more(problem, u, method)
+    return branch, problem, u, tangent
+
+
+def _joined(*sentences: str) -> str:
+    return " ".join(filter(None, sentences))
+
+
+def _some(points: Sequence[BranchPoint]) -> Sequence[BranchPoint]:
+    """Some points of a branch, evenly distributed, and its folds."""
+    step = max(1, len(points) // _LOOKED_AT)
+    return [point for k, point in enumerate(points) if k % step == 0 or point.kind == "fold"]
+
+
+def _wrong_at_folds(problem: HarmonicProblem, branch: Branch) -> str:
+    """Why multipliers of a branch are not to be trusted; empty where its folds say nothing.
+
+    One of them is 1 at a fold of forced orbits.
+    """
+    worst, place = 0.0, np.nan
+    for point in branch.points:
+        if point.kind == "fold" and point.located:
+            found = problem.linearise(np.asarray(point.u)).floquet.multipliers
+            off = float(np.abs(found - 1.0).min())
+            if off > worst:
+                worst, place = off, point.parameter
+    if worst <= _OFF_AT_FOLD:
+        return ""
+    return (f"Stability is left out: at the fold at {branch.parameter_name} = {place:.6g} one "
+            f"multiplier must be 1, but the nearest is off by {worst:.2g} with "
+            f"{problem.harmonics} harmonics; take more harmonics.")
 
 
 def _with_more_harmonics(method: HarmonicBalance, branch: Branch) -> HarmonicBalance | None:
@@ -195,15 +277,21 @@ def _with_more_harmonics(method: HarmonicBalance, branch: Branch) -> HarmonicBal
     return replace(method, harmonics=harmonics, samples=samples)
 
 
-def _with_more_samples(method: HarmonicBalance, error: float) -> HarmonicBalance | None:
-    """The method with twice the samples; None where an error from samples is small enough."""
-    assert method.sampling_tolerance is not None
-    if error <= method.sampling_tolerance:
+def _with_more_samples(
+    method: HarmonicBalance, error: float, allowed: float, most: int
+) -> HarmonicBalance | None:
+    """The method with twice the samples; None where an error from samples is small enough.
+
+    Also where there would be more than ``most``, unless these are the most of all.
+    """
+    if error <= allowed:
         return None
-    if 2 * method.count > MOST:
+    if 2 * method.count > most:
+        if most < MOST:
+            return None
         raise AnalysisError(f"The error of the branch from its {method.count} samples is "
-                            f"{error:.2g}, above sampling_tolerance = "
-                            f"{method.sampling_tolerance:g}; raise the tolerance.")
+                            f"{error:.2g}, above sampling_tolerance = {allowed:g}; raise the "
+                            f"tolerance.")
     return replace(method, samples=2 * method.count)
 
 

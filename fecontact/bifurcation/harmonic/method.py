@@ -9,8 +9,10 @@ from fecontact.core.errors import InputError, require_positive
 _STABILITY = ("transitions", "Koopman-Hill", None)
 # Samples per harmonic, and at least.
 _PER_HARMONIC, _LEAST = 8, 32
-# Largest number of harmonics or samples.
-MOST = 100_000
+# Largest number of harmonics or samples, and of samples that are taken for a tolerance.
+MOST, MOST_SAMPLED = 100_000, 4096
+# Largest error from few samples by default.
+_SAMPLING = 5e-4
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class HarmonicBalance:
     harmonics : int
         H, at least 1: harmonics of the period of the orbit.
     samples : int, optional
-        N, at least 2 H + 2, samples a period; by default 8 H, at least 32. Kinks of laws need more;
+        N, at least 2 H + 2, samples a period. By default 8 H, at least 32, and on branches of
+        forced orbits as many more as ``sampling_tolerance`` needs. Kinks of laws need many;
         products of three harmonics are exact above 4 H.
     tolerance : float, optional
         Largest truncation error allowed on a branch: it is followed again with more harmonics, by
@@ -37,11 +40,14 @@ class HarmonicBalance:
         Limit for that.
     sampling_tolerance : float, optional
         Largest error from few samples allowed on a branch, relative to the orbit: it is followed
-        again with twice the samples until the estimate is met, 'sampling_error' of the branch.
+        again with twice the samples until the estimate is met, 'sampling_error' of the branch. By
+        default 5e-4 for forced orbits if ``samples`` are not given, up to 4096 samples; if they
+        are, ``branch.message`` warns of an error above 5e-3.
     stability : 'transitions', 'Koopman-Hill' or None
         How Floquet multipliers are found: from the linearised equations along the orbit, or by the
         projection of Bayer and Leine with 2 H harmonics, which suits smooth systems of few states.
-        None for none: folds alone are found then, but points take a fraction of the time.
+        None for none: folds alone are found then, but points take a fraction of the time. Branches
+        whose folds show that multipliers are wrong have none either, and say so.
 
     Raises
     ------
@@ -78,6 +84,13 @@ class HarmonicBalance:
     def refines(self) -> bool:
         """Whether branches may be followed again."""
         return self.tolerance is not None or self.sampling_tolerance is not None
+
+    @property
+    def sampling(self) -> float | None:
+        """Largest error from few samples on a branch of forced orbits; None where any is taken."""
+        if self.sampling_tolerance is None and self.samples is None:
+            return _SAMPLING
+        return self.sampling_tolerance
 
     @property
     def count(self) -> int:

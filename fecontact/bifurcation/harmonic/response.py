@@ -8,7 +8,12 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
-from fecontact.bifurcation.continuation.points import details_of, special_point
+from fecontact.bifurcation.continuation.points import (
+    UNRESOLVED,
+    UNRESOLVED_MEANING,
+    details_of,
+    special_point,
+)
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -18,7 +23,6 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import (
     ContactField,
-    contact_field,
     field_between,
 )
 from fecontact.bifurcation.harmonic import branches, starts
@@ -114,7 +118,11 @@ class FrequencyResponse(Summarised):
                   if self.level_name else []),
                 ("observed", self.observed),
                 ("points", listed([str(len(branch)) for branch in self.branches], 6)),
-                ("special", listed(special, 5)), ("ends", ", ".join(ends))]
+                ("special", listed(special, 5)),
+                *([(UNRESOLVED, UNRESOLVED_MEANING)]
+                  if any(point.kind == UNRESOLVED for branch in self.branches
+                         for point in branch.special) else []),
+                ("ends", ", ".join(ends))]
 
 
 @one_blas_thread
@@ -405,22 +413,6 @@ def _require_observable(layout: Layout, row: Array) -> None:
 def _told(observed: str, level_name: str | None, level: float) -> dict[str, Any]:
     """Attributes of a branch of responses."""
     return {"observed": observed, "level": level, "level_name": level_name or ""}
-
-
-def continued(
-    system: ContactSystem, branch: Branch, row: Array, options: ContinuationOptions
-) -> Branch:
-    """An interrupted branch of a response followed to its end; ``row`` (d,) of what is observed."""
-    known, name = branch.attributes, branch.parameter_name
-    level_name = str(known["level_name"])
-    field = contact_field(system, dict.fromkeys([name, level_name] if level_name else [name]))
-    rest = branches.goes_on(
-        field, branch.points[-1], None,
-        replace(options, points=max(2, options.points - len(branch) + 1)), None, None, 1.0, False)
-    more = with_observed(rest, row, str(known["observed"]), level_name or None,
-                          float(known["level"]))
-    return replace(branch, points=(*branch.points[:-1], *more.points), status=more.status,
-                   message=more.message)
 
 
 def response_of(branches_by_name: Mapping[str, Branch]) -> FrequencyResponse:

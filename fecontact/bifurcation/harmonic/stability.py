@@ -21,8 +21,9 @@ from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
 
 # Collocation of the linearised equations: degree, intervals per harmonic, at least, and samples for
-# each: who takes more samples, for kinks, gets more intervals too.
-_DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE = 4, 3, 20, 4
+# each: who takes more samples, for kinks, gets more intervals too. Kinks of normal forces are means
+# over four samples, which two intervals resolve.
+_DEGREE, _INTERVALS, _LEAST, _PER_SAMPLE, _PER_KINK = 4, 3, 20, 4, 2
 # From so many states on multipliers are those of the product of all transitions, which takes a
 # fraction of the time, unless it has had entries of this size: smaller multipliers than 1e-12 of
 # it are then rounding.
@@ -69,7 +70,10 @@ def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
     tau, series = _grid(N, radau, problem.harmonics)
     x = np.concatenate([series @ problem.whole(u, T), around(z, tau)], axis=1)
     t = np.zeros(len(tau)) if problem.autonomous else tau * T
-    return _floquet(problem, T, problem.field.derivatives(t, x, problem.parameters(u))[1])
+    values = problem.parameters(u)
+    f, J, _ = problem.field.derivatives(t, x, values)
+    problem.add_kinks(t, x, values, T, f, J)
+    return _floquet(problem, T, J)
 
 
 def along_orbits(
@@ -94,7 +98,8 @@ def _intervals(problem: Balance) -> tuple[int, bool]:
     """Number of intervals, and whether Radau's collocation is taken."""
     if problem.layout.memory:
         return problem.samples, True
-    return max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // _PER_SAMPLE), False
+    per_sample = _PER_KINK if problem.onsets.size else _PER_SAMPLE
+    return max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // per_sample), False
 
 
 def _floquet(problem: Balance, T: float, J: Array) -> Floquet:

@@ -51,6 +51,9 @@ _CONSERVATIVE = 1e-8
 _LEAST_SCALE, _LEAST_SEEN = 1e-3, 1e-4
 # Part of the smallest amplitude below which the mode ends.
 _BELOW = 0.99
+# Relative distance of frequencies that are the same, and of amplitudes; most points between two of
+# the mode.
+_SAME, _MET, _MOST_BETWEEN = 1e-12, 1e-6, 200
 _ENDS = ("largest amplitude", "smallest amplitude")
 
 
@@ -161,6 +164,44 @@ class NonlinearMode(Summarised):
     def orbit(self, index: int, samples: int = 1000) -> PeriodicMotion:
         """The motion at one of the points over a period, both ends included."""
         return self.branch.points[index].orbit(samples=samples)
+
+    def at(
+        self, system: ContactSystem, *, amplitude: float | None = None,
+        frequency: float | None = None,
+    ) -> "NonlinearMode":
+        """The mode at one amplitude or one frequency: a mode of a single point, solved there.
+
+        Parameters
+        ----------
+        system : ContactSystem
+            The system of the mode.
+        amplitude : float, optional
+            Amplitude of the observed displacement, in its unit.
+        frequency : float, optional
+            Frequency [Hz], in place of the amplitude.
+
+        Raises
+        ------
+        InputError
+            If the mode has no such amplitude or frequency, or has it several times.
+        """
+        if (amplitude is None) == (frequency is None):
+            raise InputError("NonlinearMode.at: give either amplitude or frequency.")
+        if amplitude is not None:
+            return _solved(self, system, _bracket("amplitude", self.amplitude, amplitude, ""),
+                           float(amplitude))
+        assert frequency is not None
+        place = _bracket("frequency", self.frequency, frequency, " Hz")
+        ends, known = self.amplitude[place : place + 2], self.frequency[place : place + 2]
+        if known[0] == frequency or known[1] == frequency:
+            return _solved(self, system, place, float(ends[int(known[1] == frequency)]))
+
+        def off(A: float) -> float:
+            return float(_solved(self, system, place, A).frequency[0]) - float(frequency)
+
+        from scipy.optimize import brentq
+
+        return _solved(self, system, place, float(brentq(off, *ends, rtol=1e-12)))
 
     @property
     def _square(self) -> Array:
@@ -276,6 +317,51 @@ def continued_mode(
     return replace(mode, branch=replace(
         mode.branch, points=(*points, *ended.points[1:]), status=ended.status,
         message=ended.message))
+
+
+def _bracket(name: str, values: Array, wanted: float, unit: str) -> int:
+    """Index of the point behind which values (N,) pass a wanted one, once."""
+    value = as_floats(wanted, f"NonlinearMode.at: {name}")
+    if value.ndim or not np.isfinite(value):
+        raise InputError(f"NonlinearMode.at: {name} = {wanted!r} must be a finite number.")
+    off = values - float(value)
+    near = np.abs(off) <= (_MET if name == "amplitude" else _SAME) * np.abs(values)
+    passed = np.flatnonzero((off[:-1] * off[1:] < 0.0) & ~near[:-1] & ~near[1:])
+    found = [*passed.tolist(), *np.minimum(np.flatnonzero(near), len(values) - 2).tolist()]
+    if not found:
+        raise InputError(f"NonlinearMode.at: {name} = {float(value):g}{unit} must lie within the "
+                         f"mode, from {values.min():.6g} to {values.max():.6g}{unit}.")
+    if len(found) > 1 and name == "frequency":
+        raise InputError(f"NonlinearMode.at: the mode has the frequency {float(value):g} Hz "
+                         f"{len(found)} times; give the amplitude.")
+    if len(found) > 1 and max(found) - min(found) > 1:
+        raise InputError(f"NonlinearMode.at: the mode has the amplitude {float(value):g} "
+                         f"{len(found)} times; take a point of its branch.")
+    return int(min(found))
+
+
+def _solved(
+    mode: NonlinearMode, system: ContactSystem, place: int, amplitude: float
+) -> NonlinearMode:
+    """The mode at an amplitude between two neighbouring points."""
+    points, A = mode.branch.points, mode.amplitude
+    for k in (place, place + 1):
+        if abs(A[k] - amplitude) <= _MET * amplitude:
+            return replace(mode, branch=replace(mode.branch, points=(points[k],)))
+    rises = A[place + 1] > A[place]
+    bounds = (0.5 * A[place], amplitude) if rises else (amplitude / _BELOW, 2.0 * A[place])
+    point, _, component = mode.observed.rpartition(" ")
+    known = replace(mode, branch=replace(mode.branch, points=points[: place + 1]))
+    length = float(np.log(max(A[place + 1], amplitude) / min(A[place], amplitude)))
+    step = float(np.clip(abs(length), 1e-4, _STEP))
+    found = continued_mode(
+        system, known, bounds, (int(point) if point.isdigit() else point, component),
+        ContinuationOptions(points=place + _MOST_BETWEEN, step=step, largest_step=_LARGEST))
+    last = found.branch.points[-1]
+    if abs(float(last.values["observed_amplitude"]) / amplitude - 1.0) > _MET:
+        raise AnalysisError(f"The mode was not found at the amplitude {amplitude:g}; take its "
+                            f"points beside it.")
+    return replace(mode, branch=replace(mode.branch, points=(last,)))
 
 
 def mode_of(branch: Branch) -> NonlinearMode:

@@ -49,7 +49,12 @@ def branch(
     with located(f"{described.title}:"):
         _ = wanted.checked_parameter, wanted.checked_bounds
     from fecontact.bifurcation.diagram import follow_branches
-    from fecontact.cli.branch_results import runs_beneath, special_table, write_branch_results
+    from fecontact.cli.branch_results import (
+        echo_unresolved,
+        runs_beneath,
+        special_table,
+        write_branch_results,
+    )
 
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
@@ -68,6 +73,7 @@ def branch(
             if found.message:
                 echo(f"note: {found.message}")
             show(special_table(found, usable))
+            echo_unresolved([found])
         for note in result.notes:
             echo(f"note: {note}")
         echo_written(*map(Path, files))

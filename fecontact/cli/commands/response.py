@@ -62,6 +62,7 @@ def response(
         _ = wanted.checked_bounds
     described = replace(described, response=wanted)
     from fecontact.bifurcation.responses import follow_responses, observed_point
+    from fecontact.cli.branch_results import echo_unresolved
     from fecontact.cli.response_results import (
         keep_response,
         response_file,
@@ -87,6 +88,7 @@ def response(
         with waiting("Writing"):
             files = write_response_results(described, found.response, observe, folder)
         show(response_table(found.response))
+        echo_unresolved(found.response.branches)
         for branch in found.response.branches:
             if branch.message:
                 echo(f"note: {branch.message}")

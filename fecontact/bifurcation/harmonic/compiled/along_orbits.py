@@ -5,6 +5,7 @@ from numba import types
 
 from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS
 from fecontact.bifurcation.harmonic.compiled.evaluation import speed_coefficient, take_parameter
+from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
 from fecontact.core.compiled import block, f8, helper, kernel, matrix, vector
 from fecontact.core.references import borrowed
 from fecontact.system.jacobian import batch_derivatives
@@ -23,6 +24,8 @@ def _take_coefficients(u, T, X):
 def derivatives_along(us, zs, tau, series, e, J):
     """Fill J (K, P, d, d) with the derivatives of the rates at times tau (P,) of K orbits.
 
+    Kinks of normal forces are means over samples, as in the equations of the orbits.
+
     ``series`` (2 H + 1, P) holds the functions of the series there. Internal variables zs
     (K, N, c) are linear between the samples.
     """
@@ -32,6 +35,7 @@ def derivatives_along(us, zs, tau, series, e, J):
     L = X.shape[2]
     P = len(tau)
     t, x, f, row = np.empty(P), np.empty((P, 2 * m + c)), np.empty((P, 2 * m + c)), np.empty(P)
+    widths = np.empty((m, P))
     for k in range(len(us)):
         T = take_parameter(us[k, us.shape[1] - 1], e)
         _take_coefficients(us[k], T, X)
@@ -53,6 +57,7 @@ def derivatives_along(us, zs, tau, series, e, J):
                 x[p, 2 * m + i] = ((1.0 - part_of) * zs[k, first % N, i]
                                    + part_of * zs[k, (first + 1) % N, i])
         batch_derivatives(t, x, e.contact, e.contact, 0.0, f, J[k], np.empty((0, 0)))
+        add_kinks(t, x, e.contact, e.onsets, T / N, 1, f, J[k], widths)
         for p in range(P):
             for i in range(m):
                 for j in range(m):

@@ -20,7 +20,9 @@ class Room(NamedTuple):
     k + 1); ``column`` (n,) is the derivative to the parameter, ``linear`` (2, m, m) are stiffness
     and damping. ``along`` (n + 1,) is the solution of the equations without right side that has one
     in the last row. Plain contact forces are found row by row over the samples: ``motion`` (2 m, N)
-    displacements and velocities, ``pushes`` (m, N) forces, ``node`` (8, N) what belongs to a node.
+    displacements and velocities, ``pushes`` (m, N) forces, ``node`` (9, N) what belongs to a
+    node; ``widths`` (m, N) is what kinks add, see
+    :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`.
     """
 
     t: Array
@@ -55,6 +57,7 @@ class Room(NamedTuple):
     motion: Array
     pushes: Array
     node: Array
+    widths: Array
 
 
 class Equations(NamedTuple):
@@ -65,7 +68,8 @@ class Equations(NamedTuple):
     and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N,
     m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
     whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
-    which internal variables return. Numbers are the period times p or 0, the period, least and
+    which internal variables return, ``onsets`` (k, n) the penetrations at which normal forces have
+    kinks. Numbers are the period times p or 0, the period, least and
     largest p for which this holds, whether contact forces do not depend on p and t, whether they
     are plain, of displacements and velocities in the plane alone, bounds of the branch, tolerance,
     largest step, largest turn, Newton's rounding, whether folds are located, whether all
@@ -89,6 +93,7 @@ class Equations(NamedTuple):
     pulls: Array
     springs: Array
     offsets: Array
+    onsets: Array
     limits: Array
     numbers: Array
     nodes: int
@@ -102,9 +107,10 @@ _blocks = types.Array(f8, 4, "C")
 ROOM = types.NamedTuple(
     [vector, *[matrix] * 6, block, block, block, matrix, vector, vector,
      block, block, _blocks, vector, vector, integers, integers, integers, matrix, block,
-     block, *[vector] * 4, *[matrix] * 4], Room)
+     block, *[vector] * 4, *[matrix] * 5], Room)
 EQUATIONS = types.NamedTuple(
-    [SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, *[vector] * 3, i8, ROOM],
+    [SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, vector, matrix, vector, vector,
+     i8, ROOM],
     Equations)
 
 
@@ -151,4 +157,4 @@ def room_for(
         np.empty((k + 1) ** 2), np.empty(k + 1, dtype=np.int64), np.arange(m),
         np.array([coupled]), np.empty((2, m)), np.empty((3, m, 2 * m)), np.empty((2, m, m)),
         np.empty(n), np.empty(n), np.empty(n), np.empty(n + 1), np.empty((16, n + 1)),
-        np.empty((d - c, N)), np.empty((m, N)), np.empty((8, N)))
+        np.empty((d - c, N)), np.empty((m, N)), np.empty((9, N)), np.zeros((m, N)))

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY, TURN
+from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
 from fecontact.bifurcation.harmonic.compiled.plain_forces import combine, plain_forces, project
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
@@ -129,7 +130,7 @@ def evaluate_at(u, derivatives, e):
     T = take_parameter(u[len(u) - 1], e)
     if e.numbers[PLAIN] != 0.0:
         take_motion(u, T, e)
-        plain_forces(derivatives, e)
+        plain_forces(derivatives, T / len(e.tau), e)
         balance(u, T, 1.0, e, room.residual)
         return T
     take_states(u, T, e, room.x)
@@ -149,6 +150,8 @@ def evaluate_at(u, derivatives, e):
                           np.empty((0, 0)))
     else:
         batch_rates(room.t, room.x, e.contact, room.f)
+    add_kinks(room.t, room.x, e.contact, e.onsets, T / len(e.tau), derivatives, room.f, room.J,
+              room.widths)
     take_pushes(room.f, e)
     balance(u, T, 1.0, e, room.residual)
     return T
@@ -226,6 +229,9 @@ def _by_parameter(u, T, e):
                 slope = by_speed[n] if plain else room.J[n, m + j, m + i]
                 moves = moves or slope != 0.0
                 row[n] -= rise * room.motion[m + i, n] * slope
+        if moves and len(e.onsets) > 0:
+            for n in range(N):
+                row[n] += rise * room.widths[j, n]
         if moves:
             project(e.projection, row, pushed[j])
         else:
@@ -272,6 +278,8 @@ def _beside(u, central, e, followed):
         T = take_parameter(there[n], e)
         take_states(there, T, e, room.x)
         batch_rates(room.t, room.x, e.contact, room.f)
+        add_kinks(room.t, room.x, e.contact, e.onsets, T / len(e.tau), 0, room.f, room.J,
+                  room.widths)
         take_pushes(room.f, e)
         balance(there, T, 1.0, e, room.beside)
         for k in range(n):

@@ -5,6 +5,7 @@ motion, forces and derivatives are rows over the samples, so that laws are calle
 other and all else is done on whole rows.
 """
 
+from fecontact.bifurcation.harmonic.compiled.kinks import is_near, kink_change
 from fecontact.core.compiled import helper, routine
 from fecontact.laws.signatures import friction_at, ground_at, normal_at
 from fecontact.system.nodes import ground_motion
@@ -66,11 +67,35 @@ def _node_motion(j, e):
             node[2, n] += tx * motion[m + i, n]
 
 
+@helper
+def _near_kinks(j, level, h, e):
+    """Add to the rows of the normal force of node j what its kinks between samples change.
+
+    Row 1, of the rate, becomes 1, or -1 where the force changes its sign thereby; row 8 is the part
+    of velocities times derivatives that is due to the width of kinks.
+    """
+    s, node = e.contact, e.room.node
+    for n in range(len(e.tau)):
+        u, v, far, found = level - node[0, n], -node[1, n], 0.0, False
+        node[8, n] = 0.0
+        for k in range(len(e.onsets)):
+            if is_near(u, v, e.onsets[k, j], h):
+                F, F_u, F_v, by_width, far = kink_change(u, v, e.onsets[k, j], h, s.normal[j],
+                                                         s.normal_parameters[j])
+                node[8, n] += by_width
+                node[3, n] += F
+                node[4, n] -= F_u
+                node[5, n] -= F_v
+                found = True
+        node[1, n] = -1.0 if found and node[3, n] * far < 0.0 else 1.0
+
+
 @routine
-def plain_forces(derivatives, e):
+def plain_forces(derivatives, h, e):
     """Fill ``pushes`` (m, N) from ``motion``, and the ``rows`` of their derivatives if asked for.
 
     Row (part m + i) m + k of these is that of force i to displacement (part 0) or velocity k.
+    h [s] is the distance of samples.
     """
     room, s = e.room, e.contact
     m, N = e.springs.shape[1], len(e.tau)
@@ -79,6 +104,9 @@ def plain_forces(derivatives, e):
         for n in range(N):
             pushes[i, n] = 0.0
     if derivatives:
+        for i in range(m):
+            for n in range(N):
+                room.widths[i, n] = 0.0
         for p in range(2 * m * m):
             for n in range(N):
                 rows[p, n] = 0.0
@@ -97,14 +125,17 @@ def plain_forces(derivatives, e):
             if F == 0.0:
                 F_u, F_v = 0.0, 0.0
             node[3, n], node[4, n], node[5, n] = F, -F_u, -F_v
+        if len(e.onsets) > 0:
+            _near_kinks(j, level, h, e)
         if rubs:
             for n in range(N):
                 F, R, R_v, R_F = node[3, n], 0.0, 0.0, 0.0
                 if F != 0.0:
                     R, R_v, R_F = friction_at(s.friction[j])(node[2, n], abs(F),
                                                              s.friction_parameters[j])
-                node[0, n], node[6, n] = R, R_v
-                node[7, n] = R_F if F >= 0.0 else -R_F
+                side = node[1, n] if len(e.onsets) > 0 else 1.0
+                node[0, n], node[6, n] = side * R, side * R_v
+                node[7, n] = side * (R_F if F >= 0.0 else -R_F)
         for i in range(m):
             tx, ty = s.Tx[j, i], s.Ty[j, i]
             for n in range(N):
@@ -114,6 +145,9 @@ def plain_forces(derivatives, e):
                     pushes[i, n] -= tx * node[0, n]
             if not derivatives:
                 continue
+            if len(e.onsets) > 0:
+                for n in range(N):
+                    room.widths[i, n] += (ty - tx * (node[7, n] if rubs else 0.0)) * node[8, n]
             for k in range(m):
                 by, sx = s.Ty[j, k], tx * s.Tx[j, k]
                 q, v = rows[i * m + k], rows[(m + i) * m + k]
