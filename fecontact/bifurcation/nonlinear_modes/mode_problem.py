@@ -86,6 +86,11 @@ class ModeProblem(HarmonicProblem):
         return ModeLinearisation(self, u)
 
     @property
+    def onsets(self) -> Array:  # type: ignore[override]
+        """None: means over samples would reach a stiff stop before a mode grazes it."""
+        return np.zeros((0, 0))
+
+    @property
     def rounding(self) -> float:
         """Relative size of Newton steps below which growing steps are rounding."""
         return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
