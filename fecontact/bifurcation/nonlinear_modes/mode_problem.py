@@ -86,7 +86,7 @@ class ModeProblem(HarmonicProblem):
         return ModeLinearisation(self, u)
 
     @property
-    def onsets(self) -> Array:  # type: ignore[override]
+    def onsets(self) -> Array:
         """None: means over samples would reach a stiff stop before a mode grazes it."""
         return np.zeros((0, 0))
 

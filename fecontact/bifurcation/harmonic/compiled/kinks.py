@@ -18,11 +18,12 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.kernels import normal_values
 from fecontact.system.nodes import (
@@ -226,7 +227,7 @@ def _onsets(field: ContactField, values: Array) -> Array:
     return found
 
 
-def _bent(s: SystemArrays, nodes: Array, b: Array, scale: float) -> Array:
+def _bent(s: SystemArrays, nodes: Integers, b: Array, scale: float) -> NDArray[np.bool_]:
     """Whether force or stiffness of nodes (k,) jumps at penetrations b (k,)."""
     off = _NEAR * scale + _ROUNDING * np.abs(b)
 
