@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from numbers import Real
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,6 +14,9 @@ from fecontact.core.types import Array
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
+
+# One number, one for each contact node, or such by the names of interfaces.
+Coefficient = float | Sequence[float] | Mapping[str, float | Sequence[float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +176,34 @@ class Rodas5P(Solver):
         return found
 
 
+class _Coefficients(dict[str, Any]):
+    """Coefficients by interfaces, hashable as part of a frozen solver."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(frozenset(self.items()))
+
+
+def _coefficient(name: str, given: Any, most: float) -> Any:
+    """A coefficient as a number, a tuple, or a mapping of these by interfaces.
+
+    Raises
+    ------
+    InputError
+        For what is no number from 0 to ``most``.
+    """
+    if isinstance(given, Mapping):
+        return _Coefficients((str(key), _coefficient(f"{name}.{key}", value, most))
+                             for key, value in given.items())
+    values = None if isinstance(given, str | bool) else as_floats(given, f"SetValued: {name}")
+    if values is None or values.ndim > 1 or not ((values >= 0.0) & (values <= most)
+                                                 & np.isfinite(values)).all():
+        limits = "a number from 0 to 1" if most == 1.0 else "a number, zero or above"
+        raise InputError(f"SetValued: {name} = {shown(given)} must be {limits}, one for each "
+                         f"contact node, or a mapping from interfaces to such numbers.")
+    # Tuples make the solver hashable, and plain numbers go into files.
+    return float(values) if values.ndim == 0 else tuple(values.tolist())
+
+
 @dataclass(frozen=True)
 class SetValued(Solver):
     r"""Friction without smoothing, sticking by constraint, and rigid stops.
@@ -188,18 +218,21 @@ class SetValued(Solver):
 
     Parameters
     ----------
-    restitution : float, optional
-        Rigid stops in place of the normal law, with a coefficient of restitution from 0 to 1.
-    static_coefficient : float or (n,) sequence, optional
-        Limit of \|R\|/F in stick [-], for all contact nodes or each; default that of the law.
+    restitution : float, (n,) sequence or mapping, optional
+        Rigid stops in place of the normal law, with a coefficient of restitution from 0 to 1: for
+        all contact nodes, for each, or by the names of interfaces, ``{"stop": 0.5}``. Interfaces
+        that are not named have 0.
+    static_coefficient : float, (n,) sequence or mapping, optional
+        Limit of \|R\|/F in stick [-], given in the same ways; default that of the law.
     scheme : 'auto', 'events' or 'stepping'
         Event-driven, for few nodes, or time-stepping, for any number of nodes and for solids.
     impact_law : 'newton' or 'poisson'
         Whether restitution is a ratio of velocities or of impulses. With friction, Newton's law
         gains energy in some impacts unless both coefficients are equal; the status of a run
         says so. Poisson's law does not; it is for plane bodies.
-    tangential_restitution : float
-        Newton's coefficient along the ground, from 0 to 1, of contacts that stick in an impact.
+    tangential_restitution : float, (n,) sequence or mapping
+        Newton's coefficient along the ground, from 0 to 1, of contacts that stick in an impact;
+        given in the same ways. Nodes that always move along the ground together need one value.
 
     Raises
     ------
@@ -207,11 +240,11 @@ class SetValued(Solver):
         For values out of range.
     """
 
-    restitution: float | None = None
-    static_coefficient: float | Sequence[float] | None = None
+    restitution: Coefficient | None = None
+    static_coefficient: Coefficient | None = None
     scheme: str = "auto"
     impact_law: str = "newton"
-    tangential_restitution: float = 0.0
+    tangential_restitution: Coefficient = 0.0
 
     locates_events: ClassVar[bool] = True
     smooth: ClassVar[bool] = False
@@ -219,12 +252,11 @@ class SetValued(Solver):
     impact_laws: ClassVar[tuple[str, ...]] = ("newton", "poisson")
 
     def __post_init__(self) -> None:
-        for name in ("restitution", "tangential_restitution"):
+        for name, most in (("restitution", 1.0), ("tangential_restitution", 1.0),
+                           ("static_coefficient", np.inf)):
             value = getattr(self, name)
-            if value is not None and not (isinstance(value, Real) and not value < 0.0
-                                          and value <= 1.0):
-                raise InputError(f"SetValued: {name} = {shown(value)} must be a number from 0 "
-                                 f"to 1.")
+            if value is not None:
+                object.__setattr__(self, name, _coefficient(name, value, most))
         if self.impact_law not in self.impact_laws:
             raise InputError(f"SetValued: impact_law = {self.impact_law!r} must be one of "
                              f"{choices(self.impact_laws)}"
@@ -239,14 +271,6 @@ class SetValued(Solver):
         if self.scheme not in self.schemes:
             raise InputError(f"SetValued: scheme = {self.scheme!r} must be one of "
                              f"{choices(self.schemes)}{nearest(str(self.scheme), self.schemes)}.")
-        if self.static_coefficient is not None:
-            values = as_floats(self.static_coefficient, "SetValued: static_coefficient")
-            if values.ndim > 1 or not (np.isfinite(values).all() and (values >= 0.0).all()):
-                raise InputError(f"SetValued: static_coefficient = {self.static_coefficient!r} "
-                                 f"must be a number, zero or above, or one for each contact node.")
-            # Tuples make the solver hashable, and plain numbers go into files.
-            object.__setattr__(self, "static_coefficient",
-                               float(values) if values.ndim == 0 else tuple(values.tolist()))
 
     @property
     def name(self) -> str:

@@ -22,6 +22,7 @@ from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import PointStart, RigidStart
 from fecontact.integrate.solvers import Solver, solver_by_name
+from fecontact.laws.base import PerNode
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
@@ -224,14 +225,17 @@ class SimulationSettings:
     max_step : float, optional
         Longest step [s]; by default limited only by the tolerance and by the periods and
         breakpoints of the excitation.
-    restitution : float, optional
-        For 'set-valued': rigid stops with this coefficient in place of the normal law.
+    restitution : float, tuple of float or mapping, optional
+        For 'set-valued': rigid stops with this coefficient in place of the normal law; one for all
+        contact nodes, one for each, or by interfaces.
     impact_law : str, optional
         For 'set-valued': 'newton', restitution of velocities, or 'poisson', of impulses.
-    tangential_restitution : float, optional
-        For 'set-valued': coefficient along the ground of contacts that stick in an impact.
-    static_coefficient : float, optional
-        For 'set-valued': limit of R/F in stick [-]; default that of the law.
+    tangential_restitution : float, tuple of float or mapping, optional
+        For 'set-valued': coefficient along the ground of contacts that stick in an impact; given as
+        ``restitution``.
+    static_coefficient : float, tuple of float or mapping, optional
+        For 'set-valued': limit of R/F in stick [-], given as ``restitution``; default that of the
+        law.
     scheme : str, optional
         For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
     series : str, optional
@@ -264,10 +268,10 @@ class SimulationSettings:
     solver: str = "rodas5p"
     rtol: float = 1e-6
     max_step: Annotated[float | None, Unit("s")] = None
-    restitution: float | None = None
+    restitution: PerNode | dict[str, PerNode] | None = None
     impact_law: str | None = None
-    tangential_restitution: float | None = None
-    static_coefficient: float | None = None
+    tangential_restitution: PerNode | dict[str, PerNode] | None = None
+    static_coefficient: PerNode | dict[str, PerNode] | None = None
     scheme: str | None = None
     series: str | None = None
     collocation: str | None = None

@@ -89,6 +89,90 @@ def test_an_impact_at_the_start_is_an_event_like_others(along, mu, e, gap):
     assert resting.statistics["impacts"] == 0
 
 
+def two_masses(k, nodes=2, **parts):
+    """Masses of 1 kg above one another, joined by a spring, of which so many touch the ground."""
+    rows = np.zeros((2, 3, 2))
+    rows[0, 1, 0] = rows[1, 1, 1] = 1.0
+    basis = basis_from_matrices(np.eye(2), [[k, -k], [-k, k]], {
+        "contact": rows[:nodes], "C": rows[0], "D": rows[1]})
+    return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-4),
+                                   "friction": ConstantFriction(0.0), **parts})
+
+
+def thrown(system, speeds, times, **options):
+    """A run of two masses that start at the ground, and their speeds at all times."""
+    rows = system.basis.T[[1, -1], 1]
+    state = np.concatenate([np.zeros(2), np.linalg.solve(rows, speeds)])
+    run = integrate_set_valued(system, state, np.asarray(times), events=[ContactEvents()],
+                               **{"rtol": 1e-10, **options})
+    return run, run.states[:, 2:] @ rows.T
+
+
+@pytest.mark.parametrize(("speed", "contact"), [(-1.0, True), (0.5, False)])
+@pytest.mark.parametrize("k", [1.3, 4.4e2, 1e5])
+def test_a_spring_that_is_about_to_press_closes_a_stop(k, speed, contact):
+    """Behind the impact there is neither force nor speed: the spring's rate decides."""
+    w = np.sqrt(k)
+    times = np.linspace(0.0, 3.0 / w, 4)
+    run, speeds = thrown(two_masses(k, 1), [-1.0, speed], times, restitution=0.0)
+    assert run.status is Status.FINISHED
+    assert run.statistics["events"] < 10
+    assert run.work[:, CONTACT_DAMPING] == pytest.approx(np.full(4, 0.5), abs=1e-9)
+    if contact:
+        assert speeds == pytest.approx(
+            np.stack([np.zeros(4), speed * np.cos(w * times)], axis=1), abs=1e-6)
+    else:
+        turn = np.cos(np.sqrt(2.0) * w * times)
+        assert speeds == pytest.approx(
+            0.5 * speed * np.stack([1.0 - turn, 1.0 + turn], axis=1), abs=1e-6)
+
+
+def test_a_stop_lets_go_where_the_spring_pulls():
+    run, _ = thrown(two_masses(100.0, 1), [-1.0, -1.0], [0.0, 0.4], restitution=0.0)
+    assert run.events.only("lift-off").time[-1] == pytest.approx(0.1 * np.pi, abs=1e-6)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.1])
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+@pytest.mark.parametrize("e", [(0.8, 0.3), {"contact": (0.8, 0.3)}])
+def test_every_stop_has_its_own_restitution(e, law, start):
+    system = two_masses(0.0, gap=start)
+    run, speeds = thrown(system, [-1.0, -2.0], [0.0, 0.2], restitution=SetValued(e).restitution,
+                         impact_law=law)
+    assert speeds[-1] == pytest.approx([0.8, 0.6], abs=1e-12)
+    assert run.work[-1, CONTACT_DAMPING] == pytest.approx(
+        0.5 * (1.0 - 0.64) + 2.0 * (1.0 - 0.09), abs=1e-11)
+
+
+def test_restitution_along_the_ground_of_each_node():
+    rows = np.zeros((2, 3, 4))
+    rows[0, 0, 0] = rows[0, 1, 1] = rows[1, 0, 2] = rows[1, 1, 3] = 1.0
+    basis = basis_from_matrices(np.eye(4), np.zeros((4, 4)), {"contact": rows, "C": rows[0]})
+    system = ContactSystem(basis, normal=RoughSurface(1e5, 1e-4), friction=ConstantFriction(5.0))
+    shapes = basis.T[2:4, :2].reshape(4, 4)
+    state = np.concatenate([np.zeros(4), np.linalg.solve(shapes, [0.5, -1.0, 0.5, -1.0])])
+    run = integrate_set_valued(system, state, np.array([0.0, 0.1]), restitution=(1.0, 0.5),
+                               tangential_restitution=(1.0, 0.2))
+    assert shapes @ run.states[-1, 4:] == pytest.approx([-0.5, 1.0, -0.1, 0.5], abs=1e-12)
+
+
+@pytest.mark.parametrize(("given", "message"), [
+    ({"stop": 0.5}, "names the interface 'stop', but the interfaces are: 'contact'"),
+    ((0.5, 0.5, 0.5), "restitution has 3 values; give one number, or one for each of the 2"),
+    ({"contact": (0.5, 0.5, 0.5)}, r"restitution\.contact has 3 values"),
+])
+def test_restitutions_that_no_stop_has_are_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        thrown(two_masses(1.0), [0.0, 0.0], [0.0, 0.1], restitution=given)
+
+
+def test_nodes_that_move_along_the_ground_together_need_one_restitution_there():
+    system = body([(-0.5, 0.0), (0.5, 0.0)], 0.3)
+    with pytest.raises(InputError, match="must be equal, for both move along the ground"):
+        go(system, np.zeros(3), np.zeros(3), [0.0, 0.1], restitution=0.5,
+           tangential_restitution=(0.1, 0.2))
+
+
 def test_bouncing_particle_slides_on_when_it_no_longer_bounces():
     """Every impact takes mu (1 + e) v; over all, friction takes mu g t of the speed."""
     system = body([(0.0, 0.0)], 0.1, load=Load(10.0))
@@ -334,6 +418,8 @@ def test_stops_whose_forces_cannot_be_told_apart_are_refused():
     ({"restitution": 0.5, "impact_law": "poisson", "tangential_restitution": 0.2}, "'newton'"),
     ({"restitution": 0.5, "tangential_restitution": 1.5}, r"tangential_restitution = 1\.5"),
     ({"tangential_restitution": 0.5}, "give a restitution"),
+    ({"restitution": (0.5, 1.5)}, "must be a number from 0 to 1, one for each"),
+    ({"restitution": {"stop": -0.5}}, r"restitution\.stop = -0\.5 must be a number from 0 to 1"),
 ])
 def test_options_are_checked(options, message):
     with pytest.raises(InputError, match=message):

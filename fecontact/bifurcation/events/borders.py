@@ -285,7 +285,7 @@ def _at_stop(
             found = Successor(problem, u)
             found.split(i, after, phase.ending(event, touch))
             yield found
-    elif phase.lifts_off(event) and motion.problem.restitution == 0.0 and (
+    elif phase.lifts_off(event) and motion.problem.restitution[stop] == 0.0 and (
             condition.what == WITHIN
             or (condition.what == BEGIN and problem.phases[i - 1].event == event)):
         yield from _with_flight(problem, u, condition)
@@ -337,7 +337,7 @@ def _other_impacts(
     found = Successor(problem, u)
     found.phases[i] = phase.ending(phase.event, replace(phase.strike, modes=tuple(modes)))
     # With tangential restitution what it stops rebounds, and slips behind it on either side.
-    rests = stopped and found.motion.problem.tangential == 0.0
+    rests = stopped and found.motion.problem.tangential[cluster] == 0.0
     if rests and behind.status[cluster] in (STICK, -sense):
         found.insert((i + 1) % problem.count, _with(behind, cluster, sense, 2 * cluster))
     yield found

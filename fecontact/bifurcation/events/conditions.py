@@ -166,7 +166,7 @@ def _at_begin(course: Course, i: int) -> Iterator[Condition]:
             continue
         elif own is not None and place == 2 * own and before.strike is not None and (
                 before.strike.modes[own] == STICK and phase.status[own] in (1, -1)
-                and course.motion.problem.tangential == 0.0):
+                and course.motion.problem.tangential[own] == 0.0):
             # What an impact has stopped slips again at once.
             turning.append(own)
             continue

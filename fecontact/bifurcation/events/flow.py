@@ -251,13 +251,13 @@ def observe(held_p, held_w, times, states, status, closed, full, rate, margins, 
                 margins[row, 2 * c + 1] = w.limit[c] + w.total[c]
             elif status[c] == 1 or status[c] == -1:
                 margins[row, 2 * c] = status[c] * w.slip[c]
-                if p.restitution < 0.0:
+                if p.rigid == 0:
                     margins[row, 2 * c + 1] = w.pressing[c]
                     if not w.pressing[c] > 0.0:
                         margins[row, 2 * c + 1] = -np.inf
         for j in range(n):
             place = 2 * clusters + j
-            if p.restitution >= 0.0:
+            if p.rigid != 0:
                 margins[row, place] = w.nodes[j, FORCE] if closed[j] else -w.nodes[j, PENETRATION]
                 continue
             margins[row, place] = _pressed(j, p, w)
@@ -298,7 +298,7 @@ def decide(held_p, held_w, held_progress, held_room, t, near, slow):
     """
     p, w, progress, room = (borrowed(held_p), borrowed(held_w), borrowed(held_progress),
                             borrowed(held_room))
-    if p.restitution >= 0.0:
+    if p.rigid != 0:
         return change_contacts_at(p.change)(t, p, progress, room, w, slow, 0.0, 0.0,
                                             room.slopes[0])
     decide_clusters(t, p, progress, room, near, w, room.slopes[0])

@@ -163,17 +163,16 @@ class Motion:
     def _unwatched(self) -> NDArray[np.bool_]:
         """Nodes (n,) whose opening is no event of their own: their forces begin from zero."""
         found = np.zeros(self.nodes)
-        if self.problem.restitution < 0.0:
+        if self.problem.rigid == 0:
             forces_of_touch(self.problem, found)
             return found == 0.0
         return found > 0.0
 
     def _problem(self, values: Array) -> tuple[NonsmoothProblem, NDArray[np.bool_]]:
         solver = self.solver
-        found, rubbing = nonsmooth_problem(
+        return nonsmooth_problem(
             self._field.system(values), solver.restitution, solver.static_coefficient,
-            self.longest)
-        return found._replace(tangential=float(solver.tangential_restitution)), rubbing
+            self.longest, tangential=solver.tangential_restitution)
 
     @cached_property
     def _beside(self) -> tuple[NonsmoothProblem, NonsmoothProblem, float]:
@@ -329,8 +328,9 @@ class Motion:
         stopped = [n + c for c, mode in enumerate(strike.modes) if mode == STICK]
         active = [*strike.nodes, *stopped]
         matrix = held[active] @ pushing[active].T
-        e, across = float(chosen.restitution), float(chosen.tangential)
-        wanted = np.concatenate([(1.0 + e) * speeds[list(strike.nodes)],
+        struck_nodes = list(strike.nodes)
+        across = chosen.tangential[np.array(stopped, dtype=int) - n]
+        wanted = np.concatenate([(1.0 + chosen.restitution[struck_nodes]) * speeds[struck_nodes],
                                  -(1.0 + across) * speeds[stopped]])
         try:
             found = np.linalg.solve(matrix, wanted)

@@ -100,7 +100,7 @@ def order_of(motion: Motion, before: Phase, phase: Phase) -> int:
             return 0
         # Behind an impact without rebound the speed vanishes too, and where the force of a stop
         # has vanished the acceleration.
-        return 3 if before.closed[stop] else 2 if motion.problem.restitution == 0.0 else 1
+        return 3 if before.closed[stop] else 2 if motion.problem.restitution[stop] == 0.0 else 1
     if phase.status[cluster] == STICK or before.status[cluster] == OPEN:
         return 0
     if before.status[cluster] != STICK:
@@ -131,7 +131,7 @@ def _followed(
     phases: list[Phase] = []
     begins, states, t = [begin], [start], begin
     _first_state(motion, progress, room, t)
-    if motion.problem.restitution < 0.0:
+    if motion.problem.rigid == 0:
         progress.closed[:] = 1
     while True:
         phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
@@ -142,7 +142,7 @@ def _followed(
         if found is None:
             return [*phases, phase], np.array(begins), np.array(states)
         after, event, end = found
-        if motion.problem.restitution < 0.0 and phase.opens(event):
+        if motion.problem.rigid == 0 and phase.opens(event):
             raise AnalysisError("A compliant contact opens.")
         ending = phase.ending(event)
         t += after
@@ -159,7 +159,7 @@ def _followed(
 
 
 def _require_known(motion: Motion, phase: Phase) -> None:
-    if motion.problem.restitution < 0.0 and OPEN in phase.status:
+    if motion.problem.rigid == 0 and OPEN in phase.status:
         raise AnalysisError("A compliant contact opens.")
 
 
@@ -170,7 +170,7 @@ def _first_state(motion: Motion, progress: Progress, room: Room, t: float) -> No
     heights = motion.observed(np.array([t]), progress.state[None, :d], phase)[0][0]
     for flags in (room.released, room.arrived, room.touched, room.parting):
         flags[:] = False
-    if motion.problem.restitution >= 0.0:
+    if motion.problem.rigid:
         scale = float(motion.sizes[: motion.modes].max())
         room.touched[:] = heights[2 * motion.clusters :] <= _AT_REST * scale
     _require_decided(motion, progress, room, t)

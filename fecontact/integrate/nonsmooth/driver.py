@@ -1,7 +1,7 @@
 """Runs with set-valued friction and rigid stops: the limit of infinite smoothing slope."""
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent, Events
@@ -20,8 +20,10 @@ from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between_events, stops_of
 from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_kernels import FOUND
+from fecontact.integrate.solvers import Coefficient
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import POWER_COUNT
 
@@ -44,10 +46,10 @@ def integrate_set_valued(
     *,
     rtol: float = 1e-6,
     scheme: str = "auto",
-    restitution: float | None = None,
+    restitution: Coefficient | None = None,
     impact_law: str = "newton",
-    tangential_restitution: float = 0.0,
-    static_coefficient: float | Sequence[float] | None = None,
+    tangential_restitution: Coefficient = 0.0,
+    static_coefficient: Coefficient | None = None,
     longest: float | None = None,
     max_step: float | None = None,
     events: Sequence[AnyEvent] = (),
@@ -78,16 +80,16 @@ def integrate_set_valued(
         From event to event with steps of order 8: for nodes whose slip velocities, equal ones
         counted once, are independent. Or by implicit steps of order 3, for any number of nodes and
         for solids.
-    restitution : float, optional
+    restitution : float, sequence or mapping, optional
         Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and a coefficient
-        e from 0 to 1 gives their rebound. Penetration at the start is taken away. Friction has to
-        be proportional to the normal force.
+        e from 0 to 1 gives their rebound; one for all nodes, one for each, or by interfaces.
+        Penetration at the start is taken away. Friction has to be proportional to the normal force.
     impact_law : 'newton' or 'poisson'
         Whether e is a ratio of velocities, ``u'+ = -e u'-``, or of impulses; see
         :mod:`fecontact.integrate.nonsmooth.rigid_stops`.
-    tangential_restitution : float
+    tangential_restitution : float, sequence or mapping
         Newton's coefficient along the ground of contacts that stick in an impact, from 0 to 1.
-    static_coefficient : float or (n,) sequence, optional
+    static_coefficient : float, sequence or mapping, optional
         Limit of \|R\|/F in stick, at least the law's mu(0+) [-]; default is that.
     longest : float, optional
         Longest step [s]; default from the run, the excitation and the ground. Event-driven runs
@@ -182,10 +184,10 @@ def start(
     *,
     rtol: float,
     scheme: str = "auto",
-    restitution: float | None = None,
+    restitution: Coefficient | None = None,
     impact_law: str = "newton",
-    tangential_restitution: float = 0.0,
-    static_coefficient: float | Sequence[float] | None = None,
+    tangential_restitution: Coefficient = 0.0,
+    static_coefficient: Coefficient | None = None,
     longest: float | None = None,
     max_step: float | None = None,
     events: Sequence[AnyEvent] = (),
@@ -194,9 +196,9 @@ def start(
     times = np.ascontiguousarray(times, dtype=float)
     default = longest_step(system, times)
     longest = default if longest is None else longest
-    problem, rubbing = nonsmooth_problem(system, restitution, static_coefficient, longest)
-    problem = problem._replace(tangential=float(tangential_restitution),
-                               poisson=int(impact_law == "poisson"))
+    problem, rubbing = nonsmooth_problem(system, restitution, static_coefficient, longest,
+                                         tangential=tangential_restitution)
+    problem = problem._replace(poisson=int(impact_law == "poisson"))
     scheme = _chosen(problem, scheme)
     solid = system.basis.dimension == 3
     course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
@@ -266,9 +268,11 @@ class _Found:
 
 def nonsmooth_problem(
     system: ContactSystem,
-    restitution: float | None,
-    static_coefficient: float | Sequence[float] | None,
+    restitution: Coefficient | None,
+    static_coefficient: Coefficient | None,
     longest: float,
+    *,
+    tangential: Coefficient = 0.0,
 ) -> tuple[kinds.NonsmoothProblem, NDArray[np.bool_]]:
     """The problem, and which of its clusters (k,) friction may stop."""
     n = system.basis.contact_nodes
@@ -286,8 +290,11 @@ def nonsmooth_problem(
     ground = system.ground
     wave = ground.shortest_wavelength if ground.wavy else None
     problem = kinds.NonsmoothProblem(
-        arrays, _static(static_coefficient, n), cluster, rows, sliding, 1e-4 * longest,
-        -1.0 if restitution is None else float(restitution), 0.0, 0,
+        arrays, node_values("static_coefficient", static_coefficient, system.basis, -1.0), cluster,
+        rows, sliding, 1e-4 * longest, int(restitution is not None),
+        node_values("restitution", restitution, system.basis, 0.0),
+        _of_clusters(node_values("tangential_restitution", tangential, system.basis, 0.0), cluster),
+        0,
         np.array([*ground.height_range, np.inf if wave is None else wave]),
         int(system.prescribed_motion.constant), compiled_derivative.address,
         compiled_change.address)
@@ -305,8 +312,8 @@ def nonsmooth_problem(
 
 
 def by_events(
-    system: ContactSystem, scheme: str, restitution: float | None, impact_law: str,
-    static_coefficient: float | Sequence[float] | None,
+    system: ContactSystem, scheme: str, restitution: Coefficient | None, impact_law: str,
+    static_coefficient: Coefficient | None,
 ) -> bool:
     """Whether a system runs from event to event, with impacts of Newton's law if any."""
     problem, _ = nonsmooth_problem(system, restitution, static_coefficient, 1.0)
@@ -345,12 +352,52 @@ def _clusters(Tx: Array, sliding: Array) -> tuple[Integers, Array]:
     return cluster, np.array(rows)
 
 
-def _static(given: float | Sequence[float] | None, n: int) -> Array:
-    values = np.atleast_1d(np.asarray(-1.0 if given is None else given, dtype=float))
-    if len(values) not in (1, n):
-        raise InputError(f"static_coefficient has {len(values)} values; give one number, or one "
-                         f"for each of the {n} contact nodes.")
-    return np.broadcast_to(values, (n,)).copy()
+def node_values(
+    name: str, given: Coefficient | None, basis: ModalBasis, default: float,
+) -> Array:
+    """Values (n,) of the contact nodes from one number, one for each node, or by interfaces.
+
+    Interfaces that a mapping does not name have the default, as all nodes without a value.
+
+    Raises
+    ------
+    InputError
+        For unknown interfaces, and lists of another length than the nodes.
+    """
+    n = basis.contact_nodes
+    if not isinstance(given, Mapping):
+        return _spread(name, default if given is None else given, n, "contact nodes")
+    names = [group for group, _ in basis.groups]
+    for interface in given:
+        if interface not in names:
+            raise InputError(f"SetValued: {name} names the interface {interface!r}"
+                             f"{nearest(str(interface), names)}, but the interfaces are: "
+                             f"{choices(names)}.")
+    return np.concatenate([
+        _spread(f"{name}.{group}", given.get(group, default), count, f"nodes of '{group}'")
+        for group, count in basis.groups])
+
+
+def _spread(name: str, given: float | Sequence[float], count: int, nodes: str) -> Array:
+    values = np.atleast_1d(np.asarray(given, dtype=float))
+    if len(values) not in (1, count):
+        raise InputError(f"SetValued: {name} has {len(values)} values; give one number, or one for "
+                         f"each of the {count} {nodes}.")
+    return np.broadcast_to(values, (count,)).copy()
+
+
+def _of_clusters(tangential: Array, cluster: Integers) -> Array:
+    """Tangential restitution (k,) of clusters, whose nodes must agree as they slip together."""
+    found = np.zeros(cluster.max(initial=-1) + 1)
+    found[cluster] = tangential
+    apart = np.flatnonzero(found[cluster] != tangential)
+    if len(apart):
+        j = int(apart[0])
+        other = int(np.flatnonzero((cluster == cluster[j]) & (tangential != tangential[j]))[0])
+        raise InputError(f"SetValued: tangential_restitution = {tangential[j]:g} of contact node "
+                         f"{j + 1} and {tangential[other]:g} of node {other + 1} must be equal, "
+                         f"for both move along the ground in the same way; give one value.")
+    return found
 
 
 def _rough_nodes(groups: list[tuple[FrictionLaw, Array]], static: Array) -> NDArray[np.bool_]:
@@ -387,7 +434,7 @@ def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
             raise InputError("SetValued: scheme = 'events' is for plane bodies, but this system "
                              "has contact in space; use scheme = 'stepping', its default.")
         return "stepping"
-    if problem.restitution >= 0.0:
+    if problem.rigid:
         if scheme == "stepping":
             raise InputError("SetValued: scheme = 'stepping' has no rigid stops for plane bodies; "
                              "use 'events', or leave restitution out.")

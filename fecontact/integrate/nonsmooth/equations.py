@@ -121,7 +121,7 @@ def observe_forces(moved, Y, p, nodes):
     for j in range(len(nodes)):
         contact = node_contact(j, node_motion(j, Y, s), moved, s)
         force, grip = 0.0, 0.0
-        if p.restitution < 0.0:
+        if p.rigid == 0:
             force = normal_at(s.normal[j])(contact.penetration, contact.rate,
                                            s.normal_parameters[j])[0]
         else:
@@ -329,7 +329,7 @@ def add_contact_forces(t, Y, moved, p, status, closed, w, acceleration):
     w.total[:] = 0.0
     w.pressing[:] = 0.0
     w.friction[:] = 0.0
-    if p.restitution >= 0.0:
+    if p.rigid != 0:
         hold_contacts(t, p, status, closed, w, acceleration)
         return
     for j in range(n):
@@ -362,7 +362,7 @@ def _derivative(t, held_Y, p, held_status, held_closed, w, held_out):
     set_limits(p, w)
     share_friction(p, status, w)
     body_powers(t, Y, s, out[2 * m :])
-    contact_powers(moved, s, w.nodes, w.friction, p.restitution < 0.0, out[2 * m :])
+    contact_powers(moved, s, w.nodes, w.friction, p.rigid == 0, out[2 * m :])
 
 
 compiled_derivative = compile_law(DERIVATIVE, "derivative(t, Y, p, status, closed, w, out)",

@@ -23,6 +23,7 @@ from fecontact.integrate.nonsmooth.problem import (
     FINISHED,
     FORCE,
     GOING_ON,
+    HELD,
     IMPACTS,
     LAST_ERROR,
     LENGTH,
@@ -90,7 +91,7 @@ def _start(t, p, limits, progress, w, room):
     for c in range(len(p.rows)):
         room.released[c] = room.arrived[c] = False
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
-    if p.restitution >= 0.0:
+    if p.rigid != 0:
         height, clusters = 0.0, len(p.rows)
         for j in range(len(p.cluster)):
             room.touched[j] = w.nodes[j, PENETRATION] >= 0.0
@@ -218,7 +219,7 @@ def _accept(step, t, passing, p, progress, output, w, room):
     for c in range(len(p.rows)):
         room.held[c] = status[c] == STICK
         any_held = any_held or room.held[c]
-    if p.restitution >= 0.0:
+    if p.rigid != 0:
         settle(t, p, status, closed, w, room.rate, Y)
     elif any_held:
         set_slips(t, Y, p, w)
@@ -266,16 +267,20 @@ def _change_stops(t, again, p, limits, progress, w, room):
     Returns the longest flight of a rebound [s], or why there is none.
     """
     clusters, closed, largest = len(p.rows), progress.closed, progress.largest
+    slow = 0.01 * limits.rtol * largest[RATE_SIZE]
     _mark_clusters(again, p, progress, w, room)
     for j in range(len(p.cluster)):
         event = room.past[clusters + j]
+        # A flight that has begun without speed and ends at once is none: the stop stays closed.
+        if (again and event and closed[j] == 0 and room.fresh[clusters + j]
+                and w.nodes[j, RATE] <= slow):
+            closed[j] = HELD
         room.touched[j] = event and closed[j] == 0
         room.parting[j] = event and closed[j] == 1
         if room.touched[j]:
             progress.counts[IMPACTS] += 1
     return change_contacts_at(p.change)(
-        t, p, progress, room, w, 0.01 * limits.rtol * largest[RATE_SIZE], largest[DEPTH_SIZE],
-        1e-9 * limits.longest, room.slopes[0])
+        t, p, progress, room, w, slow, largest[DEPTH_SIZE], 1e-9 * limits.longest, room.slopes[0])
 
 
 @helper
@@ -385,7 +390,7 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
             if part <= 1.0:
                 _stop_within(step, part, p, progress, output, w, room)
                 return STOPPED
-        if p.restitution >= 0.0:
+        if p.rigid != 0:
             advance(high, step, p, progress, room)
         reached = goal if reaching and not found else t + high * length
         _write_within(step, reached, not found, p, progress, output, w, room)
@@ -418,7 +423,7 @@ def run_events(held_p, held_limits, held_progress, held_output, held_w, held_roo
                 room.slopes[0, i] = room.rate[i]
         else:
             counts[EVENTS] += 1
-            if p.restitution >= 0.0:
+            if p.rigid != 0:
                 flight = _change_stops(t, again, p, limits, progress, w, room)
                 if _outcome(flight) != GOING_ON:
                     clock[TIME], clock[LENGTH] = t, length

@@ -79,7 +79,7 @@ def _zone(j, p, progress, w):
     status = progress.status[p.cluster[j]]
     # At the very moment of a touch the force may be zero or not; the status of the cluster tells.
     pressed = status != OPEN and w.nodes[j, FORCE] != 0.0
-    if p.restitution >= 0.0:
+    if p.rigid != 0:
         pressed = progress.closed[j] != 0
     if not pressed:
         return OPEN
@@ -162,7 +162,7 @@ def _note_touch(j, left, right, step, p, progress, w, room, watch):
 def _note_step(upto, step, p, progress, w, room, watch):
     """Note the events of a step up to a part of it."""
     size = watch.states.shape[1]
-    nodes = watch.counts[NODES] != 0 and p.restitution < 0.0
+    nodes = watch.counts[NODES] != 0 and p.rigid == 0
     looks = nodes
     for k in range(len(watch.own)):
         if watch.linear[k]:

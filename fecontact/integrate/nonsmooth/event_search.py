@@ -330,7 +330,7 @@ def first_changes(step, p, limits, progress, w, room):
     stages have not felt, or waves too short for it; 1 if it has not.
     """
     room.place[:] = NOWHERE
-    if p.restitution >= 0.0:
+    if p.rigid != 0:
         first, shorter, forces = _search_stops(step, p, progress, room)
         rest, sticking = _search_clusters(step, p, progress, room)
         first, forces = min(first, rest), forces or sticking

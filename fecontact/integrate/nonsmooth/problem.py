@@ -23,6 +23,9 @@ NODE_COLUMNS, SPACE_NODE_COLUMNS = 9, 11
 # Status of a cluster; a slipping one has the sign of its slip velocity, +1 or -1.
 OPEN, STICK, FIXED = 0, 2, 3
 
+# State of a closed stop, and of one that an event closes though no force presses it yet.
+CLOSED, HELD = 1, 2
+
 # What a run returns: steps used up, end reached, step too short, numbers not finite, no unique
 # accelerations at rigid stops, no impulses of an impact, an event at which it is to end.
 GOING_ON, FINISHED, STUCK, DIVERGED, PARADOX, UNSOLVED, STOPPED = range(7)
@@ -45,11 +48,11 @@ class NonsmoothProblem(NamedTuple):
     ``system`` has unsmoothed friction; ``static`` (n,) is the coefficient that limits stick, below
     zero for the law's own; ``cluster`` (n,) is the cluster of each node, ``rows`` (k, m) are those
     of the clusters and ``sliding`` (k,) their factors of the prescribed motion; ``tick`` is the
-    time over which its speed is differentiated;
-    ``restitution`` is below zero for compliant contact, ``tangential`` is that along the ground,
-    and ``poisson`` is not zero where it is one of impulses; ``relief`` (3,) are the lowest and the
-    highest ground and its shortest wave, infinite where it is level; ``steady`` is zero if the
-    prescribed speed changes; ``derivative`` and ``change`` are the addresses of
+    time over which its speed is differentiated; ``rigid`` is not zero for rigid stops, with
+    coefficients ``restitution`` (n,) of the nodes and ``tangential`` (k,) of the clusters along the
+    ground; ``poisson`` is not zero where the former are ratios of impulses; ``relief`` (3,) are the
+    lowest and the highest ground and its shortest wave, infinite where it is level; ``steady`` is
+    zero if the prescribed speed changes; ``derivative`` and ``change`` are the addresses of
     :data:`fecontact.integrate.nonsmooth.equations.compiled_derivative` and
     :data:`fecontact.integrate.nonsmooth.rigid_stops.compiled_change`.
     """
@@ -60,8 +63,9 @@ class NonsmoothProblem(NamedTuple):
     rows: Array
     sliding: Array
     tick: float
-    restitution: float
-    tangential: float
+    rigid: int
+    restitution: Array
+    tangential: Array
     poisson: int
     relief: Array
     steady: int
@@ -69,8 +73,8 @@ class NonsmoothProblem(NamedTuple):
     change: int
 
 
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, vector, f8, f8, f8, i8, vector, i8,
-                            i8, i8], NonsmoothProblem)
+PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, vector, f8, i8, vector, vector, i8,
+                            vector, i8, i8, i8], NonsmoothProblem)
 
 
 class Limits(NamedTuple):

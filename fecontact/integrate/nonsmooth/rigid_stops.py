@@ -45,11 +45,13 @@ from fecontact.integrate.nonsmooth.equations import (
 )
 from fecontact.integrate.nonsmooth.event_search import ROOM
 from fecontact.integrate.nonsmooth.problem import (
+    CLOSED,
     CREEP,
     CURVED,
     FIXED,
     GAINED,
     GRIP,
+    HELD,
     OPEN,
     PENETRATION,
     PROBLEM,
@@ -183,9 +185,9 @@ def _strike(t, touching, p, progress, w):
     poisson = p.poisson != 0
     for j in range(n):
         rate = w.nodes[j, RATE]
-        given[j] = -rate if poisson else -(rate + p.restitution * max(rate, 0.0))
+        given[j] = -rate if poisson else -(rate + p.restitution[j] * max(rate, 0.0))
     for c in range(k):
-        given[n + c] = -w.slip[c] if poisson else -(1.0 + p.tangential) * w.slip[c]
+        given[n + c] = -w.slip[c] if poisson else -(1.0 + p.tangential[c]) * w.slip[c]
     if not solve_conditions(conditions, case):
         return False
     x[:] = case.x
@@ -271,6 +273,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
     n, m = s.Tx.shape
     k = len(p.rows)
     # Without contact; the status is kept for what depends on it.
+    kept = closed == HELD
     closed[:] = 0
     before = status.copy()
     for c in range(k):
@@ -294,7 +297,8 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
         return NO_ACCELERATION
     flight = math.inf
     for j in range(n):
-        closed[j] = 1 if resting[j] and case.pressed[j] and case.x[j] > 0.0 else 0
+        pressed = case.pressed[j] and case.x[j] > 0.0
+        closed[j] = CLOSED if resting[j] and (pressed or kept[j]) else 0
         room.fresh[k + j] = touching[j] and closed[j] == 0
         if room.fresh[k + j] and fall[j] > 0.0:
             flight = min(flight, -2.0 * w.nodes[j, RATE] / fall[j])
@@ -324,12 +328,12 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
 def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
     """Impact of the ``room.touched`` nodes, then which stops stay closed and what sticks.
 
-    ``room.parting`` nodes were closed and lift off, ``room.released`` clusters begin to slip in
-    the sense of their status, ``room.arrived`` ones have come to rest. After an impact, stops whose
-    penetration rate is below ``slow``, or whose rebound is lower than the rounding of the
-    ``height`` [m] or shorter than the time ``brief`` [s], close if a force presses them. Returns
-    the longest flight that a rebound may take [s], infinite if none, NO_ACCELERATION or
-    NO_IMPULSES, and fills ``out`` with Y'.
+    ``room.parting`` nodes were closed and lift off, ``room.released`` clusters begin to slip in the
+    sense of their status, ``room.arrived`` ones have come to rest; HELD stops that rest close.
+    After an impact, stops whose penetration rate is below ``slow``, or whose rebound is lower than
+    the rounding of the ``height`` [m] or shorter than the time ``brief`` [s], close if a force
+    presses them. Returns the longest flight that a rebound may take [s], infinite if none,
+    NO_ACCELERATION or NO_IMPULSES, and fills ``out`` with Y'.
     """
     out = borrowed(held_out)
     Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest

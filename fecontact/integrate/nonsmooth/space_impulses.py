@@ -193,7 +193,7 @@ def find_impulses(restitution, n, room):
     x, y, c = room.impulses, room.rest, room.coupling
     x[:] = 0.0
     for j in range(n):
-        y[j] = room.given[j] - restitution * max(-room.before[j], 0.0)
+        y[j] = room.given[j] - restitution[j] * max(-room.before[j], 0.0)
         for a in (n + j, 2 * n + j):
             y[a] = room.given[a] + room.weights[j] * room.before[a]
     found = False
@@ -222,7 +222,7 @@ def find_impulses(restitution, n, room):
             found = True
             break
     for j in range(n):
-        room.after[j] = y[j] + restitution * max(-room.before[j], 0.0)
+        room.after[j] = y[j] + restitution[j] * max(-room.before[j], 0.0)
         for a in (n + j, 2 * n + j):
             room.after[a] = y[a] - room.weights[j] * room.before[a]
     return found

@@ -65,6 +65,8 @@ class Room(NamedTuple):
         Y at the end of the step; accelerations and powers at both ends.
     old : (n, columns) array
         What `observe` says of the begin.
+    sides : (n,) array, in space (2 n,)
+        ``hold.side`` at the begin of the step.
     inertia : (n,) array
         Tx Tx^T of each node, or in space T2 T2^T if that is larger.
     cubic, speed, halves : (4,), (4,), (DEPTH, 5) arrays
@@ -84,6 +86,7 @@ class Room(NamedTuple):
     before: Array
     after: Array
     old: Array
+    sides: Array
     inertia: Array
     cubic: Array
     speed: Array
@@ -91,7 +94,7 @@ class Room(NamedTuple):
 
 
 ROOM = types.NamedTuple(
-    [NEWTON_ROOM, HOLD, IN_SPACE] + [matrix] * 4 + [vector] * 5 + [matrix] + [vector] * 3
+    [NEWTON_ROOM, HOLD, IN_SPACE] + [matrix] * 4 + [vector] * 5 + [matrix] + [vector] * 4
     + [matrix], Room)
 
 SLIPS_BACK = f8(i8, STEP, Reference(PROBLEM), Reference(WORKSPACE), f8, Reference(ROOM))
@@ -107,5 +110,5 @@ def room_for(problem: NonsmoothProblem, space: InSpace = IN_PLANE) -> Room:
                 Hold(np.zeros(n), np.zeros(k * n), np.zeros(k * n), space.linearise), space,
                 np.zeros((STAGES, 2 * m)), np.zeros((STAGES, m)), np.zeros((STAGES, k * n)),
                 np.zeros((STAGES, size - m)), start, known, np.zeros(m + size), before, after,
-                np.zeros((n, node_columns(problem))),
+                np.zeros((n, node_columns(problem))), np.zeros(k * n),
                 np.zeros(n), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))

@@ -68,6 +68,8 @@ ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
 NODES = (GAMMA, GAMMA + A21, 1.0)
 # A step is cut so often at most before what is left counts as error.
 CUTS = 3
+# Outputs nearer to an end of a step, in parts of it, are at that end.
+_NEAR = 1e-9
 
 
 @helper
@@ -152,6 +154,23 @@ def _passed_over(step, p, limits, tolerance, w, room):
         shorter = min(shorter, back)
         shorter = min(shorter, _touches(j, step.h, p, w, limits, room))
     return shorter
+
+
+@helper
+def _slip_changes(w, room):
+    """True if a node begins to slip, comes to rest or slips back within the step."""
+    n, side, before = len(room.old), room.hold.side, room.sides
+    for j in range(n):
+        if room.old[j, FORCE] == 0.0 and w.nodes[j, FORCE] == 0.0:
+            continue
+        along, size, was = 0.0, 0.0, 0.0
+        for k in range(j, len(side), n):
+            along += side[k] * before[k]
+            size += side[k] * side[k]
+            was += before[k] * before[k]
+        if along <= 0.0 and size + was > 0.0:
+            return True
+    return False
 
 
 @helper
@@ -332,6 +351,7 @@ def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room
     n, m = p.system.Tx.shape
     slowest = _set_inertia(p, limits, room)
     room.hold.side[:] = 0.0
+    room.sides[:] = 0.0
     t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
     tiny = 1e-14 * max(abs(output.times[0]), abs(end), limits.longest)
     stop, in_a_row, cuts, known_before = 0, 0, 0, False
@@ -387,6 +407,14 @@ def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room
                 cuts += 1
                 h = part * length
                 continue
+        row = counts[OUTPUTS]
+        if row < len(output.times):
+            # Ends of steps are exact; polynomials over a step know no change of slip within it.
+            part = (output.times[row] - t) / length
+            if _NEAR < part < 1.0 - _NEAR and _slip_changes(w, room):
+                counts[REJECTED] += 1
+                h = part * length
+                continue
         for j in range(n):
             slip = abs(w.nodes[j, SLIP])
             if in_space(p.system):
@@ -396,6 +424,7 @@ def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room
         t = goal if reaching else t + length
         _accept(step, t, p, progress, output, w, room)
         known_before = True
+        room.sides[:] = room.hold.side
         if reaching and stop < len(limits.stops) and goal == limits.stops[stop]:
             stop += 1
             known_before = False

@@ -15,7 +15,7 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.bernstein import NOWHERE, first_below, from_nested, value
 from fecontact.integrate.nonsmooth.dop853 import DENSE, PARTS, SLOPES, STAGES, B
-from fecontact.integrate.nonsmooth.problem import PENETRATION, RATE
+from fecontact.integrate.nonsmooth.problem import PENETRATION, RATE, RATE_SIZE
 
 # Columns of ``room.flights``: whether a flight has just begun, its height and the rate of that, and
 # how far places were from the stop where it began.
@@ -83,9 +83,10 @@ def _rise(j, step, p, progress, room):
     heights[0] = room.flights[j, HEIGHT]
     for k in range(PARTS + 1):
         heights[k + 1] = heights[k] + h / (PARTS + 1) * rate[k]
-    # What is given at a time has the rounding of the time.
+    # What is given at a time has the rounding of the time, a speed that of the largest so far.
     return (_ROUNDING * (1.0 + _TICK * abs(step.t) / p.tick)
-            * _acceleration_size(j, p, progress, room) * h * h)
+            * _acceleration_size(j, p, progress, room) * h * h
+            + _ROUNDING * progress.largest[RATE_SIZE] * h)
 
 
 @routine

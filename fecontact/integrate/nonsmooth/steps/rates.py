@@ -118,4 +118,4 @@ def set_powers(Y, p, progress, w, room, out):
     for i in range(m):
         out[LOAD] += room.loads[i] * Y[m + i]
     matrix_powers((0, m, 0, m), Y, s, out)
-    contact_powers(_moved(room.given), s, w.nodes, w.friction, p.restitution < 0.0, out)
+    contact_powers(_moved(room.given), s, w.nodes, w.friction, p.rigid == 0, out)

@@ -47,10 +47,10 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     own, size = np.arange(n), 2 * m + POWER_COUNT + n
     system = small_systems.fixed_values(m, n)[SYSTEM]
     problem: dict[str, Any] = {"static": (n,), "cluster": own, "rows": (n, m), "sliding": (n,),
-                               "relief": (3,)}
+                               "restitution": (n,), "tangential": (n,), "relief": (3,)}
     plain = kinds.NonsmoothProblem(
-        SimpleNamespace(T2=()), np.zeros(n), own, np.zeros((n, m)), np.zeros(n), 0.0, 0.0, 0.0, 0,
-        np.zeros(3), 0, 0, 0)
+        SimpleNamespace(T2=()), np.zeros(n), own, np.zeros((n, m)), np.zeros(n), 0.0, 0,
+        np.zeros(n), np.zeros(n), 0, np.zeros(3), 0, 0, 0)
     progress = kinds.progress_for(plain, own >= 0, np.zeros(2 * m), 0.0, 0.0)
     return {
         SYSTEM: system,
