@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system import kernels as kernels
@@ -36,6 +37,9 @@ def chosen_nodes(system: ContactSystem, nodes: Nodes) -> Integers:
         group = names.index(nodes)
         first = sum(count for _, count in basis.groups[:group])
         return first + np.arange(basis.groups[group][1])
+    if not isinstance(nodes, Integral) or isinstance(nodes, bool):
+        raise InputError(f"nodes = {shown(nodes)} must be the number of a contact node, counted "
+                         f"from 0, the name of an interface, or None for all nodes.")
     return np.array([basis.point_index(int(nodes)) - 2])
 
 
@@ -107,7 +111,8 @@ class ContactMotion:
             system = trajectory.system
             by_law = system.contact_history(trajectory.time, trajectory.states)[
                 :, :, kernels.NORMAL_FORCE]
-            if np.abs(by_law - held).max() > 1e-6 * np.abs(held).max():
+            if trajectory.statistics.get("restitution") is not None or (
+                    np.abs(by_law - held).max() > 1e-6 * np.abs(held).max()):
                 raise InputError("The impacts of a run with rigid stops take no time, so that it "
                                  "has no contact phases; run it without restitution, with the "
                                  "normal law.")
@@ -134,6 +139,17 @@ class ContactMotion:
     def force(self) -> Array:
         """Normal forces (N, k) at the output times [N]."""
         return self.trajectory.normal_force[:, self.nodes]
+
+    def require_openings(self, caller: str) -> None:
+        """Raise InputError for normal laws that pull where they do not press: they never open."""
+        small = 1e-9 * float(np.abs(self.penetration).max(initial=0.0))
+        sides = np.array([[small], [-small]]) * np.ones(len(self.nodes))
+        press, pull = self.law_force(sides, np.zeros_like(sides))
+        bilateral = np.flatnonzero(press * pull < 0.0)
+        if len(bilateral):
+            raise InputError(f"{caller}: the normal law of contact node {self.nodes[bilateral[0]]} "
+                             f"presses and pulls, so that the contact never opens; choose nodes "
+                             f"whose law acts on one side or has a play.")
 
     def law_force(self, penetration: Array, rate: Array) -> Array:
         """Normal forces (..., k) of the laws at penetrations and rates (..., k)."""

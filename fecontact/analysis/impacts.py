@@ -126,13 +126,15 @@ def find_impacts(
     Raises
     ------
     InputError
-        For nodes that do not exist, a negative time, or a run with rigid stops.
+        For nodes that do not exist, a negative time, a run with rigid stops, or normal laws that
+        press and pull and never open.
     AnalysisError
         If a whole contact lies between two output times; more outputs are needed.
     """
     require_kind("find_impacts", Trajectory, trajectory=trajectory)
     require_not_negative("find_impacts", shortest_flight=shortest_flight)
     motion = ContactMotion.of(trajectory, nodes)
+    motion.require_openings("find_impacts")
     touching = (motion.force != 0.0).any(axis=1)
     _require_resolved(motion, touching)
     found = motion.switches

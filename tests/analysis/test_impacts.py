@@ -17,6 +17,7 @@ from fecontact import (
 from fecontact.analysis import find_impacts, find_rests
 from fecontact.integrate import SetValued
 from fecontact.laws import (
+    BilateralCubic,
     ExponentialFriction,
     LinearContact,
     PowerContact,
@@ -195,6 +196,26 @@ def test_nodes_that_do_not_exist():
         find_impacts(bouncing(outputs=301), "sole")
     with pytest.raises(InputError, match="Contact node 1 does not exist"):
         find_impacts(bouncing(outputs=301), 1)
+
+
+def test_contacts_that_never_open_have_no_impacts():
+    run = simulate(ball(BilateralCubic(1e5, 1e9)), 0.05, initial=state(1e-4, 0.0), outputs=101)
+    with pytest.raises(InputError, match="contact node 0 presses and pulls"):
+        find_impacts(run)
+
+
+@pytest.mark.parametrize("nodes", [[0], (0,), 1.5, True])
+def test_nodes_that_are_none(nodes):
+    run = simulate(ball(LinearContact(1e5)), 0.01, initial=state(1e-2, 0.0), outputs=11)
+    with pytest.raises(InputError, match="must be the number of a contact node"):
+        find_impacts(run, nodes)
+
+
+def test_a_run_with_rigid_stops_before_its_first_impact_is_refused():
+    run = simulate(ball(LinearContact(1e5)), 0.01, initial=state(1e-2, 0.0), outputs=11,
+                   solver=SetValued(restitution=0.5))
+    with pytest.raises(InputError, match="rigid stops take no time"):
+        find_impacts(run)
 
 
 def test_set_valued_friction_has_impacts_and_rigid_stops_have_none():

@@ -362,8 +362,8 @@ class Motion:
                 left += [(2 * c, (limit - given) / most), (2 * c + 1, (limit + given) / most)]
             elif mode in (1, -1) and own:
                 # The sense is that of s+ + e_T s-.
-                left.append((2 * c, float(mode * ((1.0 + across) * speeds[n + c] + moved[n + c])
-                                          / fastest)))
+                behind = (1.0 + chosen.tangential[c]) * speeds[n + c] + moved[n + c]
+                left.append((2 * c, float(mode * behind / fastest)))
         return after, left
 
     def touches(self, t: float, state: Array, phase: Phase) -> Iterator[Strike]:
