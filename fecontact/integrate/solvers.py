@@ -11,12 +11,10 @@ import numpy as np
 from fecontact.core.checks import as_count, as_floats, as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
+from fecontact.integrate.coefficients import Coefficient
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
-
-# One number, one for each contact node, or such by the names of interfaces.
-Coefficient = float | Sequence[float] | Mapping[str, float | Sequence[float]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.coefficients import Coefficient
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent, Events
 from fecontact.integrate.nonsmooth import problem as kinds
@@ -20,7 +21,6 @@ from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between_events, stops_of
 from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_kernels import FOUND
-from fecontact.integrate.solvers import Coefficient
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.reduction.modal_basis import ModalBasis
