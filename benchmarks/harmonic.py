@@ -151,7 +151,7 @@ def jenkins_system() -> fc.ContactSystem:
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.02]])
     return fc.ContactSystem(
-        basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0, 1e-6),
+        basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0),
         drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=1.1))
 
 

@@ -58,7 +58,7 @@ def plate() -> fc.ContactSystem:
         "lower": {"points": {"nut1": "washer_1", "nut2": "washer_2"}}})
     return fc.ContactSystem(bodies=bases, links=bolts, interfaces=[fc.Interface(
         "lap", face, LinearContact(STIFFNESS, damping=1e-6 * STIFFNESS),
-        JenkinsFriction(RATIO * STIFFNESS, COEFFICIENT, relaxation_time=1e-6))])
+        JenkinsFriction(RATIO * STIFFNESS, COEFFICIENT))])
 
 
 @dataclass(frozen=True)

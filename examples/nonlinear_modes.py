@@ -49,7 +49,7 @@ def damped_beam(force: float = FORCES[0]) -> fc.ContactSystem:
                                    damping=np.diag(2.0 * RATIO * w))
     return fc.ContactSystem(
         basis, normal=fc.laws.PrescribedForce(LOAD),
-        friction=fc.laws.JenkinsFriction(STIFFNESS, COEFFICIENT, 1e-6),
+        friction=fc.laws.JenkinsFriction(STIFFNESS, COEFFICIENT),
         load=fc.Load(forces=(fc.PointLoad("B", "x", signal=fc.laws.Harmonic(force, w[0])),)))
 
 

@@ -145,8 +145,7 @@ def spheres(rings: int, poisson_ratio: float = RATIO, part: float = PART, angle:
     speed = exact.displacement(part) * w
     return fc.ContactSystem(
         basis, LinearContact(face), JenkinsFriction(
-            stiffness=1e4 * MU * exact.load / exact.displacement(part), friction_coefficient=MU,
-            relaxation_time=1e-4 / w),
+            stiffness=1e4 * MU * exact.load / exact.displacement(part), friction_coefficient=MU),
         ground=fc.Ground(motion=HarmonicSpeed(speed * np.cos(angle), w, phase=0.5 * np.pi),
                          motion_y=HarmonicSpeed(speed * np.sin(angle), w, phase=0.5 * np.pi)),
         # The mean of r^2 over each ring.

@@ -45,10 +45,10 @@ def duffing() -> Any:
                         period=lambda p: TURN / p["W"])
 
 
-def jenkins(relaxation: float = 1e-3) -> ContactSystem:
+def jenkins() -> ContactSystem:
     """A mass with a Jenkins element, driven through its spring."""
     system = example.damped_mass()
-    return system.with_(friction=JenkinsFriction(0.5, 1.0, relaxation_time=relaxation))
+    return system.with_(friction=JenkinsFriction(0.5, 1.0))
 
 
 def unilateral() -> ContactSystem:
@@ -75,7 +75,7 @@ def published() -> list[Comparison]:
     rows.append(Comparison("Duffing, P = 0.01, W = 0.6: third harmonic (to leading order)",
                            float(third), float(abs(low.harmonic(3)[0]))))
     for w, amplitude in ((1.1, 5.70250434), (1.2, 3.88731412)):
-        one = frequency_response(jenkins(1e-6), (w, 1.3), method=HarmonicBalance(1, 4096),
+        one = frequency_response(jenkins(), (w, 1.3), method=HarmonicBalance(1, 4096),
                                  options=FEW)
         rows.append(Comparison(f"Jenkins element, one harmonic, w = {w:g}: amplitude", amplitude,
                                float(abs(one.harmonic(1)[0]))))
@@ -154,11 +154,15 @@ def methods() -> str:
         given, row = start.orbit(field), field.displacement_row("B", component)
         found = [half_range(given.states @ row)]
         for method in (Collocation(200), Shooting(2)):
+            # Collocation does not serve elastic Coulomb elements.
+            if isinstance(method, Collocation) and component == "x":
+                found.append(np.nan)
+                continue
             other = orbit_branch(field, given, method=method, bounds=(w, 1.05 * w), options=FEW)
             found.append(half_range(other.points[0].orbit(field, 4001).states @ row))
         found.append(half_range(settled(field.system(start.parameter_values(field)), TURN / w,
                                         given.states[0], 200) @ row))
-        rows.append((name, *(f"{one:.7f}" for one in found)))
+        rows.append((name, *("" if np.isnan(one) else f"{one:.7f}" for one in found)))
     return table(("", "harmonic balance", "collocation", "shooting", "run in time"), rows)
 
 

@@ -21,6 +21,9 @@ from fecontact.system.space_nodes import SIDES, space_node
 
 LawGroup = tuple[slice, Array, Any]
 
+# Return time of elastic Coulomb elements over the shortest time constant of their body.
+_RETURN_PART = 1e-9
+
 # Numbers of a drive and a load of which the arrays are multilinear functions.
 _MULTILINEAR = frozenset({"load.normal", "drive.angular_frequency", *(
     f"drive.{part}_{axis}" for part in ("stiffness", "damping", "amplitude") for axis in AXES)})
@@ -39,6 +42,7 @@ def system_arrays(
     friction_groups = list(friction_groups)
     normal, normal_parameters = _law_table(normal_groups)
     friction, friction_parameters = _law_table(friction_groups)
+    _set_return_times(basis, friction_groups, friction_parameters)
     memory = [np.full(nodes.stop - nodes.start, (d - 1) * law.memory, dtype=np.int64)
               for nodes, _, law in friction_groups]
     scale, surface = ground.friction_scale_kernel, ground.surface_kernel
@@ -198,6 +202,20 @@ def _bristles(friction_groups: list[LawGroup], n: int, components: int) -> Array
         found[:, nodes, : components * law.memory] = np.repeat(
             law.bristle_stiffness_of(share), components, axis=2)
     return found
+
+
+def _set_return_times(basis: ModalBasis, friction_groups: list[LawGroup], table: Array) -> None:
+    """Make the return times of elastic Coulomb elements short for the body that they hold.
+
+    Harmonic balance and equilibria return elements to their limits within this time.
+    """
+    for nodes, share, law in friction_groups:
+        sliders = law.sliders(share) if law.memory else None
+        if sliders is not None:
+            rows = basis.contact_T[nodes, : basis.dimension]
+            held = sliders[0].sum(axis=1) @ (rows**2).sum(axis=(1, 2))
+            square = np.linalg.norm(basis.stiffness_matrix, 2) + held
+            table[nodes, 0] = _RETURN_PART / np.sqrt(square) if square > 0.0 else _RETURN_PART
 
 
 def _law_table(law_groups: Iterable[LawGroup]) -> tuple[Integers, Array]:

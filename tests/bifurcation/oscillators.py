@@ -33,12 +33,11 @@ def one_mode(mass=1.0):
     return basis_from_matrices([[mass]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
 
 
-def jenkins_system(w=1.1, amplitude=1.0, relaxation=1e-6):
+def jenkins_system(w=1.1, amplitude=1.0):
     """m 1, k 1, c .02, k_d .5, limit 1, force cos w t; the force moves the end of the spring."""
     return ContactSystem(
         one_mode(), normal=PrescribedForce(1.0),
-        friction=JenkinsFriction(stiffness=0.5, friction_coefficient=1.0,
-                                 relaxation_time=relaxation),
+        friction=JenkinsFriction(stiffness=0.5, friction_coefficient=1.0),
         drive=Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=amplitude, angular_frequency=w))
 
 

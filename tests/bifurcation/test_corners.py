@@ -149,7 +149,7 @@ def test_a_branch_that_stalls_in_stiff_contact_tells_why():
 def stiff_jenkins():
     """A spring of 50 N/m that slides at 1 N, on a mass on a spring of 1 N/m."""
     return fc.ContactSystem(
-        one_mode(), normal=PrescribedForce(1.0), friction=JenkinsFriction(50.0, 1.0, 1e-6),
+        one_mode(), normal=PrescribedForce(1.0), friction=JenkinsFriction(50.0, 1.0),
         drive=fc.Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=1.0, angular_frequency=1.0))
 
 

@@ -23,7 +23,7 @@ def beam():
     basis = fc.modal_basis(body, 24, contact="bottom", contact_nodes=2, reduction="vibration",
                            B=(0.0, 0.005), C=(0.1, 0.01), damping=0.02)
     return fc.ContactSystem(
-        basis, normal=RoughSurface(1e6, 1e-4, 30.0), friction=JenkinsFriction(2e5, 0.3, 1e-5),
+        basis, normal=RoughSurface(1e6, 1e-4, 30.0), friction=JenkinsFriction(2e5, 0.3),
         load=fc.Load(100.0), drive=fc.Drive(stiffness_x=1e5, damping_x=30.0, amplitude_x=4e-4,
                                             angular_frequency=500.0))
 

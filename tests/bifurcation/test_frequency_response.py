@@ -52,7 +52,7 @@ def test_one_harmonic_meets_the_cubic_equation_of_its_amplitude():
 
 
 def test_one_harmonic_of_a_jenkins_element_over_frequency_and_force():
-    system = jenkins_system(relaxation=1e-6)
+    system = jenkins_system()
     method, coarse = HarmonicBalance(1, samples=256), ContinuationOptions(largest_step=0.2)
     found = frequency_response(system, (1.1, 1.3), levels={"drive.amplitude_x": [1.0, 1.5]},
                                method=method, options=coarse)

@@ -66,7 +66,7 @@ def fundamental(point, states=2):
 def test_derivatives_are_those_of_the_residual(case):
     field = {"plain": duffing, "plain autonomous": lambda: vector_field(_van_der_pol, {"e": 1.0},
                                                                         2),
-             "memory": lambda: jenkins(relaxation=1e-2), "contact": unilateral,
+             "memory": jenkins, "contact": unilateral,
              "masses": two_mass_field}[case]()
     method = HarmonicBalance(3, 40)
     problem = problem_for(field, field.values, 0, method, np.ones(field.dimension + 2))
@@ -194,7 +194,7 @@ def test_one_harmonic_of_a_jenkins_element(w, published):
 
 
 def test_jenkins_element_agrees_with_a_run_in_time_and_its_multipliers():
-    field = jenkins(1.2, relaxation=1e-3)
+    field = jenkins(1.2)
     problem, u = orbit(field, {}, 25, 2000)
     system, T = field.system(), TURN / 1.2
     settled = simulate(system, 60.0 * T, rtol=1e-10, outputs=np.array([0.0, 60.0 * T]))

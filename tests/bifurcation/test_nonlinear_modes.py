@@ -244,7 +244,7 @@ def test_what_depends_on_time_is_left_out_and_the_rest_kept():
     basis = fc.basis_from_matrices([[2.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    translations=[[1.0], [0.0]])
     given = fc.ContactSystem(
-        basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0, 1e-6),
+        basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0),
         drive=fc.Drive(stiffness_x=3.0, motion_x=fc.laws.Constant(0.1), angular_frequency=2.0),
         load=fc.Load(gravity=(0.4, 0.0), base_acceleration_x=Harmonic(1.0, 3.0), forces=(
             fc.PointLoad("C", "x", signal=fc.laws.Constant(0.5)),
@@ -265,7 +265,7 @@ def test_elements_at_nodes_without_normal_force_slide_in_the_linear_mode():
     basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {
         "contact": rows, "B": rows[0], "C": rows[0]})
     system = fc.ContactSystem(
-        basis, normal=fc.laws.LinearContact(1e4, 0.0), friction=JenkinsFriction(8.0, 1.0, 1e-6),
+        basis, normal=fc.laws.LinearContact(1e4, 0.0), friction=JenkinsFriction(8.0, 1.0),
         drive=fc.Drive(stiffness_x=1.0), load=fc.Load(normal=1.0), gap=(0.0, 1.0))
     mode = nonlinear_mode(system, (1e-6, 1e-4), method=HarmonicBalance(1, 64))
     assert mode.angular_frequency == pytest.approx(np.sqrt(1.0 + 4.0), rel=1e-6)
@@ -291,7 +291,7 @@ def test_one_harmonic_of_a_jenkins_element(samples, within):
 def test_backbone_of_a_bolted_joint():
     """One harmonic of Iwan's law: the sum of its elements, and the loss of its power law."""
     chi, beta = -0.4, 0.2
-    law = FourParameterIwanFriction(stiffness=0.5, friction_coefficient=1.0, relaxation_time=1e-6,
+    law = FourParameterIwanFriction(stiffness=0.5, friction_coefficient=1.0,
                                     chi=chi, beta=beta, elements=20, spacing_ratio=1.3)
     system = fc.ContactSystem(one_mode(), normal=PrescribedForce(1.0), friction=law,
                               drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0,
@@ -328,8 +328,7 @@ def test_beam_with_a_friction_damper_decays_as_its_mode_says():
                                    damping=np.diag(1e-3 * w))
     system = fc.ContactSystem(
         basis, normal=PrescribedForce(1.0),
-        friction=JenkinsFriction(stiffness=400.0, friction_coefficient=0.04,
-                                 relaxation_time=1e-6))
+        friction=JenkinsFriction(stiffness=400.0, friction_coefficient=0.04))
     mode = nonlinear_mode(system, (5e-5, 1e-3), method=HarmonicBalance(5, 256))
     start = mode.orbit(len(mode) - 1).states[0]
     periods = 170

@@ -66,7 +66,7 @@ def test_all_methods_give_the_trajectory_of_a_run(unilateral_points):
 
 def test_loss_of_a_jenkins_element_is_that_of_a_run():
     """Samples around the start of slip do not resolve the rate of its deflection."""
-    system, field = jenkins_system(1.2, relaxation=1e-3), jenkins(1.2, relaxation=1e-3)
+    system, field = jenkins_system(1.2), jenkins(1.2)
     point = frequency_response(system, (1.2, 1.25), method=HarmonicBalance(25, 1000),
                                options=FEW).branches[0].points[0]
     run, T = point.trajectory(field), 2.0 * np.pi / 1.2

@@ -24,8 +24,7 @@ def bouncing(kind, mass=1.0, length=1.0, time=1.0):
         "C": row}, damping=0.1 * mass / time * np.eye(2))
     system = fc.ContactSystem(
         basis, normal=LinearContact(50.0 * stiffness, 0.5 * mass / time),
-        friction=LAWS[kind](stiffness=30.0 * stiffness, friction_coefficient=0.4,
-                            relaxation_time=1e-7 * time),
+        friction=LAWS[kind](stiffness=30.0 * stiffness, friction_coefficient=0.4),
         ground=fc.Ground(speed=0.4 * length / time),
         drive=fc.Drive(stiffness_y=stiffness, amplitude_y=1.5 * length,
                        angular_frequency=0.8 / time),
@@ -56,8 +55,7 @@ def solid(size):
     force = 20.0 * size**2
     system = fc.ContactSystem(
         basis, normal=LinearContact(4e2 * size, 5.0 * size**2),
-        friction=JenkinsFriction(stiffness=3e2 * size, friction_coefficient=0.4,
-                                 relaxation_time=1e-7 * size),
+        friction=JenkinsFriction(stiffness=3e2 * size, friction_coefficient=0.4),
         load=fc.Load(normal=force, forces=[
             fc.PointLoad("C", axis, signal=Constant(part * force))
             for axis, part in (("x", 0.5), ("y", 0.3))]))

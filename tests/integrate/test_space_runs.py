@@ -80,7 +80,7 @@ def test_mass_thrown_across_a_belt():
 @pytest.mark.parametrize("friction", [
     ConstantFriction(MU, smoothing_slope=3e4),
     LuGreFriction(MU, 0.2, stribeck_velocity=0.05, bristle_stiffness=1e4, bristle_damping=3.0),
-    IwanFriction(stiffness=2e5, friction_coefficient=MU, elements=3, relaxation_time=1e-5)])
+    IwanFriction(stiffness=2e5, friction_coefficient=MU, elements=3)])
 def test_turned_belt_turns_the_motion(friction):
     angle = 0.6
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

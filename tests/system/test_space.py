@@ -30,8 +30,8 @@ FRICTION = {
     "lugre": LuGreFriction(0.8, 0.55, stribeck_velocity=0.01, bristle_stiffness=2e4,
                            bristle_damping=5.0, viscous_coefficient=0.4, damping_decay=10.0),
     "bouc-wen": BoucWenFriction(friction_coefficient=0.5, exponent=1.7, beta=0.7),
-    "jenkins": JenkinsFriction(stiffness=4e5, relaxation_time=1e-4),
-    "iwan": IwanFriction(stiffness=4e5, relaxation_time=1e-4, elements=3),
+    "jenkins": JenkinsFriction(stiffness=4e5),
+    "iwan": IwanFriction(stiffness=4e5, elements=3),
 }
 GROUNDS = {
     "flat": fc.Ground(speed=0.1, speed_y=-0.2, rotation_speed=3.0, centre=(0.01, 0.02)),

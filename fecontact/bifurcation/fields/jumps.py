@@ -6,7 +6,9 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.core.errors import InputError
 from fecontact.integrate.field_runs.saltation import jumping_nodes, touch_down_on_jumps
+from fecontact.system.elastic_sliders import slider_counts
 from fecontact.system.fields.vector_field import VectorField
 
 # Samples of an orbit among which a touch-down is looked for.
@@ -29,6 +31,15 @@ def missed_jumps(field: VectorField, points: Sequence[BranchPoint]) -> str:
     return (f"The multipliers of {missed} of {len(points)} orbits miss jumps of the normal force "
             f"at touch-down, as of LinearContact with damping, and so do their stability and "
             f"special points: follow them with method = Shooting().")
+
+
+def require_smooth_friction(field: VectorField) -> None:
+    """Raise InputError for friction by elastic Coulomb elements, which switch along an orbit."""
+    if isinstance(field, ContactField) and slider_counts(field.system()).any():
+        raise InputError("Collocation does not locate where elastic Coulomb elements "
+                         "(JenkinsFriction, IwanFriction, FourParameterIwanFriction) begin and end "
+                         "to slide; follow the orbits with method = Shooting() or "
+                         "HarmonicBalance().")
 
 
 def _jumps(field: ContactField, point: BranchPoint) -> bool:

@@ -19,6 +19,7 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
+from fecontact.bifurcation.fields.jumps import require_smooth_friction
 from fecontact.bifurcation.harmonic import branches as harmonic_branches
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
@@ -221,6 +222,7 @@ def _from_hopf(
             starts.at_hopf(field, point, 50, 4, options, scales, width),
             lambda found: shooting_branches.born(found[0], method.segments, method.rtol,
                                                  method.derivative_rtol, method.solver, options))
+    require_smooth_friction(field)
     return _first_that_goes(
         starts.at_hopf(field, point, method.intervals, method.degree, options, scales, width),
         lambda found: _followed(found[0], method, options, found[1]))
@@ -246,6 +248,7 @@ def _from_motion(
         return shooting_branches.from_motion(
             field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
             method.solver, options, widths, direction, both)
+    require_smooth_friction(field)
     problem, u = starts.corrected_samples(
         lambda intervals: starts.from_samples(
             field, given, free, motion.times, motion.states, motion.period, intervals,

@@ -5,11 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fecontact.core.errors import MissingLibraryError
+from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.core.types import Array
 from fecontact.integrate.reference import scipy
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import slider_counts
 
 
 def integrate(
@@ -29,7 +30,13 @@ def integrate(
     ------
     MissingLibraryError
         If scikit-sundae is not installed.
+    InputError
+        For friction by elastic Coulomb elements, whose switches it does not locate.
     """
+    if slider_counts(system).any():
+        raise InputError("CVODE does not locate where elastic Coulomb elements (JenkinsFriction, "
+                         "IwanFriction, FourParameterIwanFriction) end to slide; take Rodas5P() "
+                         "or Scipy().")
     try:
         from sksundae.cvode import CVODE  # type: ignore[import-untyped]
     except ImportError:

@@ -7,9 +7,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.trajectory import Solution, Status
+from fecontact.system import jacobian as contact_jacobian
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import (
+    book_stored,
+    exact_arrays,
+    excesses,
+    slider_counts,
+    stick_again,
+    stored_in_sliders,
+    within_limits,
+)
 from fecontact.system.kernels import right_hand_side
 from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import NODE_POWERS, POWERS, powers
@@ -41,9 +51,10 @@ def integrate(
     rhs, jacobian, tolerance, counts = with_work(system, state, rtol)
     pieces = smooth_pieces(system, times)
     longest = longest_step(system, times, max_step)
+    sliders = slider_counts(system)
 
-    def started(y: Array) -> Any:
-        begin, end = pieces[0].begin, pieces[0].end
+    def started(y: Array, since: float | None = None) -> Any:
+        begin, end = pieces[0].begin if since is None else since, pieces[0].end
         latest = before_break(begin, end)
         return getattr(scipy.integrate, method)(
             lambda t, y: rhs(min(max(t, pieces[0].after), latest), y), begin, y, end,
@@ -68,6 +79,17 @@ def integrate(
                 counts["message"] = message
                 break
             steps += 1
+            if sliders.any():
+                # A step within which slip of an element ends is left there.
+                left = _end_of_slip(system, sliders, solver)
+                if left is not None:
+                    slipped = float(left[0])
+                    reached = done + int(np.searchsorted(times[done:], slipped, side="right"))
+                    if reached > done:
+                        result[done:reached] = solver.dense_output()(times[done:reached]).T
+                        done = reached
+                    solver = started(left[1], slipped)
+                    continue
             ended = solver.status == "finished"
             reached = done + int(np.searchsorted(times[done:], solver.t,
                                                  side="left" if ended else "right"))
@@ -88,7 +110,55 @@ def integrate(
     times, result = times[:done], result[:done]
     if status is not Status.FINISHED and solver.t > times[-1] and np.isfinite(solver.y).all():
         times, result = np.append(times, solver.t), np.vstack([result, solver.y])
-    return Solution(times, result[:, :size], result[:, size:], status, statistics)
+    states, work = result[:, :size], result[:, size:]
+    if sliders.any():
+        states, work = within_limits(system, times, states, sliders), work.copy()
+        book_stored(work, stored_in_sliders(system, states, sliders))
+    return Solution(times, states, work, status, statistics)
+
+
+# Parts of a step at which excesses of elastic Coulomb elements are looked at, and a part of it
+# within which slip of several elements ends at once.
+_LOOKS, _ONE_PLACE = 4, 1e-6
+
+
+def _end_of_slip(
+    system: ContactSystem, counts: Integers, solver: Any,
+) -> tuple[float, Array] | None:
+    """Time in the last step at which slip of an element ends, and the state after it; or None."""
+    from scipy.optimize import minimize_scalar
+
+    begin, h, dense = solver.t_old, solver.t - solver.t_old, solver.dense_output()
+    arrays, size = exact_arrays(system.arrays, counts), system.size
+
+    def excess(part: float) -> Array:
+        out = np.empty((len(counts), int(counts.max())))
+        t = begin + part * h
+        excesses(t, np.ascontiguousarray(dense(t)[:size]), arrays, counts, out)
+        return out
+
+    parts = np.linspace(0.0, 1.0, _LOOKS + 1)
+    values = np.array([excess(part) for part in parts])
+    places = np.full(values.shape[1:], np.inf)
+    falls = values[:-1] - values[1:] > 1e-12 * np.abs(values[:-1])
+    for at in np.argwhere(falls.any(axis=0) & (values.max(axis=0) > -np.inf)):
+        j, i = (int(one) for one in at)
+        look = int(np.argmax(falls[:, j, i]))
+        low, high = parts[max(look - 1, 0)], parts[look + 1]
+        place = float(minimize_scalar(lambda part, j=j, i=i: -float(excess(part)[j, i]),
+                                      bounds=(low, high), method="bounded",
+                                      options={"xatol": 1e-10}).x)
+        if low == 0.0 and values[0, j, i] >= excess(place)[j, i]:
+            place = 0.0
+        if excess(place)[j, i] > 0.0:
+            places[j, i] = place
+    first = float(places.min())
+    if first == np.inf:
+        return None
+    t = begin + first * h
+    y = dense(t)
+    stick_again(t, y, arrays, counts, np.where(places <= first + _ONE_PLACE, 1.0, 0.0))
+    return t, y
 
 
 def with_work(
@@ -99,7 +169,7 @@ def with_work(
     The error of the work counts a hundredth of that of the energies, so that the balance closes.
     """
     size, extra = len(state), len(POWERS)
-    arrays = system.arrays
+    arrays = exact_arrays(system.arrays, slider_counts(system))
     n = system.basis.contact_nodes
     of_nodes, stick_speed = np.empty(NODE_POWERS * n), np.zeros(n)
     counts: dict[str, Any] = {"right_hand_sides": 0, "jacobians": 0}
@@ -115,7 +185,9 @@ def with_work(
     def jacobian(t: float, y: Array) -> Array:
         counts["jacobians"] += 1
         out = np.zeros((size + extra, size + extra))
-        out[:size, :size] = system.jacobian(t, y[:size])
+        slopes = np.empty((size, size))
+        contact_jacobian.jacobian(t, np.ascontiguousarray(y[:size]), arrays, slopes)
+        out[:size, :size] = slopes
         return out
 
     energy = 0.01 * rtol * energy_scale(system, state)

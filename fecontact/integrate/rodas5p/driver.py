@@ -24,6 +24,7 @@ from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.run import Run
+from fecontact.integrate.rodas5p.sliders import attend
 from fecontact.integrate.rodas5p.small_systems import compile_step_loops, in_parts, propagate_for
 from fecontact.integrate.rodas5p.state import (
     Control,
@@ -40,6 +41,13 @@ from fecontact.integrate.shared_nodes.helpers import workers_for
 from fecontact.integrate.shared_nodes.team import ALONE, Team, parts_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import (
+    book_stored,
+    exact_arrays,
+    slider_counts,
+    stored_in_sliders,
+    within_limits,
+)
 from fecontact.system.friction_memory import velocity_scale
 from fecontact.system.powers import DRIVE, NODE_POWERS, POWER_COUNT
 
@@ -127,7 +135,8 @@ def start(
             above, below, width = vary
             columns += 1
     blocks = blocks_of(basis, system.arrays)
-    problem = Problem(system.arrays, blocks, control)
+    counts = control.slider_counts
+    problem = Problem(exact_arrays(system.arrays, counts), blocks, control)
     expanded = None if vary or collocation == "always" else chosen_series(
         system, state, times, rtol, max_step, events, work, series)
     collocated = None if expanded else chosen_collocation(system, rtol, events, collocation)
@@ -152,7 +161,8 @@ def start(
                  _team(m, n, 0 if expanded else workers - 1)),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
-        Vary(above.arrays, below.arrays, width, _moved_both_ways(system, above, below),
+        Vary(exact_arrays(above.arrays, counts), exact_arrays(below.arrays, counts), width,
+             _moved_both_ways(system, above, below),
              variation_for(columns, m, n, states, basis.dimension, width,
                            float(vary_rtol or looser * rtol), 1.0 if vary_rtol else _FADED),
              np.zeros((len(times) if vary else 0, columns, len(state))),
@@ -241,6 +251,7 @@ def control_for(
     untouched[system.arrays.memory > 0] = -np.inf
     with np.errstate(over="ignore", invalid="ignore"):
         energy = energy_scale(system, state) if work else 0.0
+    counts = slider_counts(system)
     return Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
@@ -249,7 +260,8 @@ def control_for(
         levels=_levels(system), ground=_ground_bounds(system, times),
         rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
-        work=int(work), unfelt=first_unfelt.address)
+        work=int(work), unfelt=first_unfelt.address,
+        sliders=attend.address if counts.any() else 0, slider_counts=counts)
 
 
 def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
@@ -373,6 +385,10 @@ def integrate(
     if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
         times = np.append(times, run.time)
         states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
+    counts = run.problem.control.slider_counts
+    if counts.any():
+        states, work = within_limits(system, times, states, counts), work.copy()
+        book_stored(work, stored_in_sliders(system, states, counts))
     lost, creep = np.split(work[:, POWER_COUNT:], NODE_POWERS, axis=1)
     return Solution(times, states, work[:, :POWER_COUNT], ended, statistics,
                     node_friction_work=lost, node_creep_work=creep, events=run.events)

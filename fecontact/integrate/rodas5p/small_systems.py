@@ -129,7 +129,7 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
             "memory": np.zeros(n, dtype=np.int64), "second_motion": 0},
         BLOCKS: {"shapes": blocks.shapes.shape, **tables},
         state.CONTROL: {"largest": (m,), "memory_scale": (0,), "breaks": (None, 2),
-                        "levels": (None, n)},
+                        "levels": (None, n), "sliders": 0},
         state.PROGRESS: _shapes(progress),
         state.ROOM: _shapes(room),
         TEAM: {**_shapes(room.team), "most": 0},

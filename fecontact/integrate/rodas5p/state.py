@@ -65,6 +65,11 @@ class Control(NamedTuple):
         Whether to integrate the powers.
     unfelt : int
         Address of :data:`fecontact.integrate.rodas5p.unfelt.first_unfelt`.
+    sliders : int
+        Address of :data:`fecontact.integrate.rodas5p.sliders.attend`; zero without elastic Coulomb
+        elements.
+    slider_counts : (n,) array
+        Number of these elements of each node.
     """
 
     displacement_scale: Array
@@ -85,9 +90,12 @@ class Control(NamedTuple):
     energy_scale: float
     work: int
     unfelt: int
+    sliders: int
+    slider_counts: Integers
 
 
-CONTROL = types.NamedTuple([vector] * 8 + [matrix, matrix, vector] + [f8] * 5 + [i8] * 2, Control)
+CONTROL = types.NamedTuple(
+    [vector] * 8 + [matrix, matrix, vector] + [f8] * 5 + [i8] * 3 + [integers], Control)
 
 
 class Problem(NamedTuple):

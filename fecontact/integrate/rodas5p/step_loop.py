@@ -26,6 +26,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
     next_switch,
     note_events_at,
 )
+from fecontact.integrate.rodas5p.sliders import END, OUTPUT, SWITCH, attend_at
 from fecontact.integrate.rodas5p.state import (
     CAUTIOUS,
     OUTPUTS,
@@ -272,6 +273,10 @@ def _write(step, reached, problem, progress, room, output, vary):
     while row < len(output.times) and output.times[row] <= reached:
         part = (output.times[row] - step.t) / step.h
         tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
+        if problem.control.sliders != 0:
+            attend_at(problem.control.sliders)(OUTPUT, step, problem, progress, room, vary,
+                                               min(output.times[row], step.latest),
+                                               output.states[row])
         if problem.control.work:
             work_until(part, step.h, progress.work, room, output.work[row])
         row += 1
@@ -357,6 +362,13 @@ def advance_by(problem, progress, room, output, vary, watch, most):
                 again += 1
             elif control.work:
                 error = max(error, work_error(step, problem, progress, room))
+        if error <= 1.0 and part == 1.0 and control.sliders != 0:
+            part = attend_at(control.sliders)(SWITCH, step, problem, progress, room, vary, t,
+                                              room.right)
+            if part == 0.0:
+                counts[REJECTIONS] += 1
+                h, new, exactly = step.h, True, False
+                continue
         if error <= 1.0 and part == 1.0 and watch.counts[KINKS]:
             part = _switch_part(step, smallest, problem, progress, room, watch)
         exactly = part < 1.0
@@ -381,6 +393,8 @@ def advance_by(problem, progress, room, output, vary, watch, most):
         reached = step.target if ends > 1.0 else t + ends * step.h
         if varies:
             keep(vary.variation)
+            if control.sliders != 0 and output.times[counts[OUTPUTS]] <= reached:
+                attend_at(control.sliders)(END, step, problem, progress, room, vary, t, room.right)
         if control.work:
             set_creeps(step, problem, progress, room)
         _write(step, reached, problem, progress, room, output, vary)

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NotNegative, Positive
@@ -14,11 +14,24 @@ from fecontact.laws.friction.base import LimitedFriction
 from fecontact.laws.friction.planar import clear
 from fecontact.laws.signatures import memory_friction_law, planar_friction_law
 
+# Time [s] within which elements return to their limits in equations that are solved as a whole.
+RETURN_TIME = 1e-7
+# Parts of its limit by which an element may be short of it and slide all the same.
+AT_LIMIT = 1e-12
+# Deflection over limit up to which an element turns as on the edge of its disc.
+MOST_TURNS = 1e8
+
 
 @memory_friction_law
 def _maxwell_slip(v, F, z, p, force, rates):
+    """R = sum of k_i z_i, each within its limit.
+
+    With a return time p[0] above zero, z_i returns from beyond its limit within that time. With
+    zero, z_i' = v: a run returns an element to its limit when sliding ends, and the part of z_i
+    beyond the limit is the distance that the element has slid.
+    """
     count = len(z)
-    relaxation = p[0]
+    return_time = p[0]
     force[0] = 0.0
     force[1] = 0.0
     force[2] = 0.0
@@ -31,13 +44,17 @@ def _maxwell_slip(v, F, z, p, force, rates):
             rates[i, k] = 0.0
         rates[i, 0] = v
         rates[i, 1] = 1.0
-        if excess > 0.0:
+        slides = excess > 0.0
+        if return_time == 0.0:
+            slides = slides or F <= 0.0 or (excess > -AT_LIMIT * limit and sign * v > 0.0)
+        if slides:
             force[0] += sign * mu * F
             force[2] += sign * mu
             force[3 + i] = 0.0
-            rates[i, 0] -= sign * excess / relaxation
-            rates[i, 2] = sign * mu / (spring * relaxation)
-            rates[i, 3 + i] = -1.0 / relaxation
+            if return_time > 0.0:
+                rates[i, 0] -= sign * excess / return_time
+                rates[i, 2] = sign * mu / (spring * return_time)
+                rates[i, 3 + i] = -1.0 / return_time
         else:
             force[0] += spring * z[i]
             force[3 + i] = spring
@@ -45,33 +62,61 @@ def _maxwell_slip(v, F, z, p, force, rates):
 
 @planar_friction_law
 def _planar_maxwell_slip(law, v1, v2, F, z, p, force, rates):
-    """Each element returns to the disc |c z| <= phi F along its own direction."""
+    """As in one direction; each element returns to the disc |c z| <= phi F along its own direction.
+
+    With a return time of zero, an element that slides turns as on the edge of the disc:
+    n' = (v - (n.v) n) / l with n = z / |z| and the limit l, while |z| grows by n.v.
+    """
     clear(force, rates)
     count, second = len(z) // 2, 4 + len(rates)
-    relaxation = p[0]
+    return_time = p[0]
     for i in range(count):
         spring, mu = p[1 + i], p[1 + count + i]
         first = 2 * i
         size = math.hypot(z[first], z[first + 1])
-        excess = size - mu * F / spring
+        limit = mu * F / spring
+        excess = size - limit
         rates[first, 0], rates[first, 1] = v1, 1.0
         rates[first + 1, 0], rates[first + 1, second - 1] = v2, 1.0
-        if excess <= 0.0:
+        slides = excess > 0.0
+        if return_time == 0.0:
+            slides = slides or F <= 0.0 or (
+                excess > -AT_LIMIT * limit and z[first] * v1 + z[first + 1] * v2 > 0.0)
+        if not slides:
             for c in range(2):
                 force[second * c] += spring * z[first + c]
                 force[second * c + 3 + first + c] = spring
             continue
+        if size == 0.0:
+            continue
+        n1, n2 = z[first] / size, z[first + 1] / size
         for c in range(2):
-            a = z[first + c] / size
+            a = n1 if c == 0 else n2
             force[second * c] += mu * F * a
             force[second * c + 2] += mu * a
-            rates[first + c, 0] -= excess * a / relaxation
-            rates[first + c, 2] = mu * a / (spring * relaxation)
             for k in range(2):
-                b = z[first + k] / size
+                b = n1 if k == 0 else n2
                 turn = ((1.0 if c == k else 0.0) - a * b) / size
                 force[second * c + 3 + first + k] = mu * F * turn
-                rates[first + c, 3 + first + k] = -(a * b + excess * turn) / relaxation
+                if return_time > 0.0:
+                    rates[first + c, 3 + first + k] = -(a * b + excess * turn) / return_time
+            if return_time > 0.0:
+                rates[first + c, 0] -= excess * a / return_time
+                rates[first + c, 2] = mu * a / (spring * return_time)
+        if return_time == 0.0 and limit * MOST_TURNS > size:
+            radial, times = n1 * v1 + n2 * v2, size / limit
+            for c in range(2):
+                a, v = (n1, v1) if c == 0 else (n2, v2)
+                across = v - radial * a
+                rates[first + c, 0] = radial * a + times * across
+                rates[first + c, 2] = -times * across / F
+                for k in range(2):
+                    b, u = (n1, v1) if k == 0 else (n2, v2)
+                    same = 1.0 if c == k else 0.0
+                    rates[first + c, 1 if k == 0 else second - 1] = (
+                        a * b + times * (same - a * b))
+                    rates[first + c, 3 + first + k] = across * b / limit + (1.0 - times) / size * (
+                        a * (u - radial * b) + radial * (same - a * b))
 
 
 @dataclass(frozen=True)
@@ -82,8 +127,6 @@ class _MaxwellSlip(LimitedFriction):
     ----------
     stiffness : float or (n,) sequence
         k, positive: presliding stiffness of the whole face, or of each node [N/m].
-    relaxation_time : float or (n,) sequence
-        tau, positive: much shorter than the shortest period of the motion [s].
     """
 
     kernel: ClassVar = _maxwell_slip
@@ -92,7 +135,6 @@ class _MaxwellSlip(LimitedFriction):
 
     stiffness: Annotated[Positive, Unit("N/m")] = 1e7
     friction_coefficient: NotNegative = 0.55
-    relaxation_time: Annotated[Positive, Unit("s")] = 1e-7
 
     scales_with_force: ClassVar[bool] = True
 
@@ -106,10 +148,11 @@ class _MaxwellSlip(LimitedFriction):
         return np.full(count, 1.0 / count), (2.0 * np.arange(count) + 1.0) / count**2
 
     def table(self, share: Array) -> Array:
-        """Parameters (n, 1 + 2 s): tau, stiffness and coefficient of friction of each element."""
-        stiffness, coefficient, relaxation = super().table(share).T[:3, :, None]
+        """Parameters (n, 1 + 2 s): return time, stiffness and coefficient of each element."""
+        stiffness, coefficient = super().table(share).T[:2, :, None]
         springs, limits = self.shares
-        return np.hstack([relaxation, stiffness * springs, coefficient * limits])
+        return np.hstack([np.full_like(stiffness, RETURN_TIME), stiffness * springs,
+                          coefficient * limits])
 
     def bristle_stiffness_of(self, share: Array) -> Array:
         """The springs', whose deflections the internal variables are."""
@@ -141,15 +184,15 @@ class JenkinsFriction(_MaxwellSlip):
 
     .. math::
 
-        R = \min(k |z|,\ \mu F)\, \operatorname{sgn} z, \qquad
-        z' = v - \frac{1}{\tau} \max\left(0,\ |z| - \frac{\mu F}{k}\right) \operatorname{sgn} z
+        R = k z, \qquad |z| \le \frac{\mu F}{k}, \qquad
+        z' = v \ \text{in stick}, \qquad z = \frac{\mu F}{k} \operatorname{sgn} v
+        \ \text{in slip}
 
-    z is the deflection of the spring [m], v the slip velocity [m/s], F the normal force [N].
-    Beyond its limit z relaxes to it within tau, so that it follows a decreasing normal force and
-    vanishes with it; in sliding at v it exceeds the limit by ``v tau``, while R does not. A cycle
-    of amplitude X > mu F / k dissipates ``4 mu F (X - mu F / k)``; tau changes that by about
-    ``(w tau)^2``, relative, at the angular frequency w: 1e-4 at 16 kHz by default. With much
-    shorter ones, stiff solvers may step over the end of sliding.
+    z is the deflection of the spring [m], v the slip velocity [m/s], F the normal force [N]. The
+    law is independent of the rate. In slip z follows the limit as the normal force varies, and
+    vanishes with it. Slip ends when v falls below the rate of the limit; runs locate this time. A
+    cycle of amplitude X > mu F / k dissipates ``4 mu F (X - mu F / k)``. In space z stays in the
+    disc ``|z| <= mu F / k``, and the element slides along the direction of z.
 
     References
     ----------
@@ -167,11 +210,11 @@ class IwanFriction(_MaxwellSlip):
         R = \sum_{i=1}^{N} \min\left(\tfrac{k}{N} |z_i|,\ \phi_i\right) \operatorname{sgn} z_i,
         \qquad \phi_i = \frac{2 i - 1}{N^2}\, \mu F
 
-    with the rate of z_i as in :class:`JenkinsFriction`, but with the limit ``phi_i N / k``. The
-    elements begin to slide one after another: their limits are distributed uniformly from zero to
-    ``2 mu F / N``, their sum is mu F and the sum of the stiffnesses k. One slides from the
-    deflection ``mu F / (N k)`` on, all of them from ``(2 N - 1) mu F / (N k)`` on. For many
-    elements, R on first loading is ``k x - (k x)^2 / (4 mu F)`` up to ``x = 2 mu F / k``.
+    with z_i as in :class:`JenkinsFriction`, but with the limit ``phi_i N / k``. The elements begin
+    to slide one after another: their limits are distributed uniformly from zero to ``2 mu F / N``,
+    their sum is mu F and the sum of the stiffnesses k. One slides from the deflection
+    ``mu F / (N k)`` on, all of them from ``(2 N - 1) mu F / (N k)`` on. For many elements, R on
+    first loading is ``k x - (k x)^2 / (4 mu F)`` up to ``x = 2 mu F / k``.
     At constant normal force Masing's rules hold: unloading follows the curve of first loading,
     scaled by two. In small cycles of amplitude X the loss is ``k^2 X^3 / (3 mu F)``, of the
     exponent 3; :class:`FourParameterIwanFriction` takes others.
@@ -256,6 +299,42 @@ class FourParameterIwanFriction(_MaxwellSlip):
         given = self.elements
         super().__post_init__()
         object.__setattr__(self, "elements", _whole(type(self).__name__, given))
+
+    @classmethod
+    def from_distribution(
+        cls, chi: float, phi_max: float, R: float, S: float, normal_force: float, *,
+        elements: int = 16, spacing_ratio: float = 1.3,
+    ) -> "FourParameterIwanFriction":
+        """Law whose distribution is ``R phi^chi + S delta(phi - phi_max)`` under a normal force.
+
+        phi_max [m], R [N/m^(2 + chi)] and the normal force [N] are positive, S [N/m] is zero or
+        above. InputError for other values.
+        """
+        require_positive(cls.__name__, phi_max=phi_max, R=R, normal_force=normal_force)
+        if not S >= 0.0:
+            raise InputError(f"{cls.__name__}: S = {S!r} must be zero or above [N/m].")
+        if not -1.0 < chi <= 0.0:
+            raise InputError(f"{cls.__name__}: chi = {chi!r} must be above -1 and at most 0.")
+        power = R * phi_max ** (chi + 1.0) / (chi + 1.0)
+        macroslip = phi_max * (power * (chi + 1.0) / (chi + 2.0) + S)
+        return cls(power + S, macroslip / normal_force, chi, S / power, elements, spacing_ratio)
+
+    def distribution(self, normal_force: float) -> tuple[float, float, float, float]:
+        """Segalman's parameters chi, phi_max [m], R [N/m^(2 + chi)] and S [N/m].
+
+        ``normal_force`` is that on the whole face [N]. InputError for a law with parameters per
+        node, or a force that is not positive.
+        """
+        require_positive(type(self).__name__, normal_force=normal_force)
+        if np.ndim(self.stiffness) or np.ndim(self.friction_coefficient):
+            raise InputError(f"{type(self).__name__}: a distribution belongs to one stiffness and "
+                             f"one friction coefficient; give numbers for the whole face.")
+        chi, beta = self.chi, self.beta
+        macroslip = float(np.multiply(self.friction_coefficient, normal_force))
+        arm = beta + (chi + 1.0) / (chi + 2.0)
+        phi_max = macroslip * (1.0 + beta) / (float(np.asarray(self.stiffness)) * arm)
+        return (chi, phi_max, macroslip * (chi + 1.0) / (phi_max ** (chi + 2.0) * arm),
+                macroslip / phi_max * beta / arm)
 
     @property
     def memory(self) -> int:

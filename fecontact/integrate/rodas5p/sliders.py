@@ -1,0 +1,317 @@
+"""Elastic Coulomb elements in a step: where slip ends, and what follows from it.
+
+The deflections of the elements follow the slip velocity all the time; see
+:mod:`fecontact.system.elastic_sliders`. Slip of an element ends where its excess over the limit is
+largest. A step with such a place inside is shortened to end there. The next step finds that the
+excess falls from its start: the deflection is returned to the limit, and the step is taken anew.
+Forces are continuous at both ends of slip, and the derivatives of a deflection that is returned to
+the limit become those of the limit.
+"""
+
+import numpy as np
+
+from fecontact.core.compiled import compile_law, f8, function_at, i8, routine, vector
+from fecontact.core.references import Reference
+from fecontact.integrate.rodas5p import dynamics, state, tableau
+from fecontact.integrate.rodas5p.variational import VARY
+from fecontact.system.elastic_sliders import (
+    SHORT,
+    deflection_of,
+    limit_of,
+    pressing_on,
+    return_deflection,
+    return_to_limits,
+)
+from fecontact.system.kernels import node_forces
+from fecontact.system.nodes import force_room, ground_motion, in_space, memory_of, node_motion
+
+_ATTEND = f8(i8, state.STEP_TYPE, Reference(state.PROBLEM), Reference(state.PROGRESS),
+             Reference(state.ROOM), Reference(VARY), f8, vector)
+attend_at = function_at(_ATTEND)
+
+# What is asked for: the part of the step until slip ends or begins; a state at a time within its
+# limits; the end of a step, with its derivatives, within its limits.
+SWITCH, OUTPUT, END = range(3)
+
+# Parts of a step at which excesses are looked at, and a part by which their slopes are taken.
+_LOOKS, _ASIDE = 8, 1e-5
+# Steps end where slip begins too if there are at most so many elements, or with derivatives.
+_FEW = 32
+# Excesses fall if they do by this part of their scale.
+_FALL = 1e-12
+# Parts of a step within which a switch counts as lying on its end, without and with derivatives.
+_NEAR, _NEAR_VARIED = 1e-3, 1e-6
+_PRECISION, _TRIALS = 1e-7, 50
+# A contact has just closed if it did within this part of a step.
+_TOUCH = 1e-3
+
+
+@routine
+def _look(part, step, problem, progress, room, y):
+    """Put the state at a part of the step into y; returns the motion of the ground."""
+    if part == 0.0:
+        y[:] = progress.state
+    elif part == 1.0:
+        y[:] = room.after
+    else:
+        tableau.interpolated(part, progress.state, room.after, room.dense, y)
+    return ground_motion(min(step.t + part * step.h, step.latest), problem.system)
+
+
+@routine
+def _pressing(j, y, moved, s, force, rates):
+    """Pressing force of node j, and its contact."""
+    F, _, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
+    return pressing_on(j, contact, F, s), contact
+
+
+@routine
+def _excess(part, j, i, step, problem, progress, room, y, force, rates):
+    """Excess of element i of node j at a part of the step."""
+    s = problem.system
+    moved = _look(part, step, problem, progress, room, y)
+    pressing, _ = _pressing(j, y, moved, s, force, rates)
+    count = problem.control.slider_counts[j]
+    return deflection_of(memory_of(j, y, s), i, s) - limit_of(j, i, count, pressing, s)
+
+
+@routine
+def _slope(part, j, i, step, problem, progress, room, y, force, rates):
+    """Rise of the excess over a small part of the step about another part."""
+    low, high = max(part - _ASIDE, 0.0), min(part + _ASIDE, 1.0)
+    return (_excess(high, j, i, step, problem, progress, room, y, force, rates)
+            - _excess(low, j, i, step, problem, progress, room, y, force, rates)) / (high - low)
+
+
+@routine
+def _root(slopes, low, high, at_low, at_high, j, i, step, problem, progress, room, y, force, rates):
+    """Part of the step at which the excess, or with ``slopes`` its slope, vanishes (Illinois)."""
+    part, last = high, 0
+    for _ in range(_TRIALS):
+        part = (low * at_high - high * at_low) / (at_high - at_low)
+        if not low < part < high:
+            part = 0.5 * (low + high)
+        found = (_slope(part, j, i, step, problem, progress, room, y, force, rates) if slopes else
+                 _excess(part, j, i, step, problem, progress, room, y, force, rates))
+        if (found < 0.0) == (at_low < 0.0):
+            low, at_low = part, found
+            if last < 0:
+                at_high *= 0.5
+            last = -1
+        else:
+            high, at_high = part, found
+            if last > 0:
+                at_low *= 0.5
+            last = 1
+        if found == 0.0 or high - low < _PRECISION:
+            break
+    return part
+
+
+@routine
+def _largest(low, high, j, i, step, problem, progress, room, y, force, rates):
+    """Part of the step, between two, at which an excess is largest."""
+    at_low = _slope(low, j, i, step, problem, progress, room, y, force, rates)
+    if not at_low > 0.0:
+        return low
+    at_high = _slope(high, j, i, step, problem, progress, room, y, force, rates)
+    if not at_high < 0.0:
+        return high
+    return _root(True, low, high, at_low, at_high, j, i, step, problem, progress, room, y, force,
+                 rates)
+
+
+@routine
+def _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, rates, reset):
+    """Make the derivatives of a deflection those of its limit.
+
+    ``y`` is the state before it returns, g the derivatives of the node forces there. Where the
+    element comes from an open contact (``reset``) its deflection is zero at the moment of the
+    touch, which varies.
+    """
+    s, v = problem.system, vary.variation
+    m = len(problem.control.largest)
+    tangents = 2 if in_space(s) else 1
+    states = s.memory.max()
+    first = 2 * m + j * states + tangents * i
+    z = memory_of(j, y, s)
+    _, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    p = s.friction_parameters[j]
+    slope = p[1 + count + i] / p[1 + i]
+    for c in range(len(v.columns)):
+        x, height, x_rate, height_rate, across, across_rate = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(m):
+            x += s.Tx[j, k] * v.columns[c, k]
+            height += s.Ty[j, k] * v.columns[c, k]
+            x_rate += s.Tx[j, k] * v.columns[c, m + k]
+            height_rate += s.Ty[j, k] * v.columns[c, m + k]
+            if tangents == 2:
+                across += s.T2[j, k] * v.columns[c, k]
+                across_rate += s.T2[j, k] * v.columns[c, m + k]
+        row = g.partial[j, 2]
+        change = slope * (row[0] * x + row[1] * height + row[2] * x_rate + row[3] * height_rate)
+        deeper = contact.slope * x - height
+        if tangents == 2:
+            change += slope * (row[4] * across + row[5] * across_rate)
+            deeper += contact.slope_across * across
+        if vary.width != 0.0 and c == len(v.columns) - 1:
+            above, one = _pressing(j, y, ground_motion(t, vary.above), vary.above, force, rates)
+            below, other = _pressing(j, y, ground_motion(t, vary.below), vary.below, force, rates)
+            change += (limit_of(j, i, count, above, vary.above)
+                       - limit_of(j, i, count, below, vary.below)) / vary.width
+            deeper += (one.penetration - other.penetration) / vary.width
+        if reset:
+            v.columns[c, first] = contact.slip * deeper / contact.rate
+            if tangents == 2:
+                v.columns[c, first + 1] = contact.slip_across * deeper / contact.rate
+        elif tangents == 1:
+            v.columns[c, first] = change if z[i] > 0.0 else -change
+        else:
+            a, b = z[2 * i] / size, z[2 * i + 1] / size
+            dz1, dz2 = v.columns[c, first], v.columns[c, first + 1]
+            along = a * dz1 + b * dz2
+            v.columns[c, first] = a * change + limit * (dz1 - a * along) / size
+            v.columns[c, first + 1] = b * change + limit * (dz2 - b * along) / size
+
+
+@routine
+def _return_one(j, i, within, t, h, y, g, problem, progress, vary, force, rates):
+    """Return element i of node j to its limit, or a little below it, if it is beyond it."""
+    s, count = problem.system, problem.control.slider_counts[j]
+    pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    limit, size = limit_of(j, i, count, pressing, s), deflection_of(memory_of(j, y, s), i, s)
+    if size <= limit:
+        return
+    if len(vary.variation.columns):
+        touched = False
+        for level in problem.control.levels[:, j]:
+            deep = contact.penetration - level
+            touched = touched or (g.partial[j, 2, 1] != 0.0 and
+                                  0.0 <= deep < _TOUCH * contact.rate * h)
+        _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, rates,
+                 within and touched)
+    return_deflection(memory_of(j, y, s), i, size, limit * (1.0 - SHORT) if within else limit, s)
+
+
+@routine
+def _switch(step, problem, progress, room, vary):
+    s, control = problem.system, problem.control
+    n, varies = len(control.slider_counts), len(vary.variation.columns) > 0
+    states = s.memory.max()
+    length, width = force_room(states, in_space(s))
+    force, rates = np.empty(length), np.empty((states, width))
+    y = np.empty(len(progress.state))
+    found, places = np.empty((3, n, states)), np.full((n, states), 2.0)
+    closed, starts = np.zeros((3, n)), np.full((n, states), -1.0)
+    begins = varies or control.slider_counts.sum() <= _FEW
+    near = _NEAR_VARIED if varies else _NEAR
+    first = 2.0
+    for look in range(_LOOKS + 2):
+        # The last two are close together, so that what begins to fall at the end is seen.
+        part = 1.0 if look == _LOOKS + 1 else (
+            1.0 - near if look == _LOOKS else look / _LOOKS)
+        before = max(0.0, (look - 2) / _LOOKS)
+        moved = _look(part, step, problem, progress, room, y)
+        now, last, older = found[look % 3], found[(look + 2) % 3], found[(look + 1) % 3]
+        for j in range(n):
+            count = control.slider_counts[j]
+            if count == 0:
+                continue
+            pressing, _ = _pressing(j, y, moved, s, force, rates)
+            closed[look % 3, j] = pressing
+            z = memory_of(j, y, s)
+            for i in range(count):
+                now[j, i] = deflection_of(z, i, s) - limit_of(j, i, count, pressing, s)
+        if look == 0:
+            starts[:, :] = now
+            continue
+        for j in range(n):
+            # Elements of a contact that stays open have nothing to hold.
+            if closed[0, j] + closed[1, j] + closed[2, j] == 0.0:
+                continue
+            for i in range(control.slider_counts[j]):
+                low, middle, high = older[j, i], last[j, i], now[j, i]
+                scale = _FALL * max(abs(middle), control.memory_scale[j * states])
+                # The top may be above the looks by the fall on both sides.
+                rise = middle - low if look > 1 else 0.0
+                falls = middle - high > scale and rise > -scale
+                if falls and middle + max(rise, middle - high) > 0.0:
+                    place = _largest(before, part, j, i, step, problem, progress, room, y, force,
+                                     rates)
+                    if (place > near or starts[j, i] > 0.0) and _excess(
+                            place, j, i, step, problem, progress, room, y, force, rates) > 0.0:
+                        places[j, i] = min(places[j, i], place)
+                        first = min(first, place)
+                if begins and middle <= 0.0 < high:
+                    begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
+                    place = _root(False, begun, part, min(middle, -1e-300), high, j, i, step,
+                                  problem, progress, room, y, force, rates)
+                    if place > near:
+                        first = min(first, place)
+        if first <= part:
+            break
+    if first >= 1.0 - near:
+        return 1.0
+    if first > near:
+        return min(first + near * first, 1.0)
+    t, again = step.t, False
+    after_t = np.nextafter(t, np.inf)
+    for j in range(n):
+        for i in range(control.slider_counts[j]):
+            if places[j, i] <= near:
+                _return_one(j, i, True, after_t, step.h, progress.state, progress.gradients,
+                            problem, progress, vary, force, rates)
+                again = True
+    if not again:
+        return 1.0
+    dynamics.set_given(after_t, s, room.given, room.load)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
+                                    room.nodes, progress.gradients, progress.rate)
+    return 0.0
+
+
+@routine
+def _at_end(step, problem, progress, room, vary):
+    """Return the state at the end of the step to its limits, with its derivatives."""
+    s, control = problem.system, problem.control
+    states = s.memory.max()
+    length, width = force_room(states, in_space(s))
+    force, rates = np.empty(length), np.empty((states, width))
+    y = np.empty(len(progress.state))
+    earlier = _look(1.0 - _NEAR_VARIED, step, problem, progress, room, y)
+    now = ground_motion(step.latest, s)
+    for j in range(len(control.slider_counts)):
+        if control.slider_counts[j] == 0:
+            continue
+        before, _ = _pressing(j, y, earlier, s, force, rates)
+        after, _ = _pressing(j, room.after, now, s, force, rates)
+        # Where the force jumps, slip ends at the begin of the next step.
+        if before < 0.5 * after:
+            continue
+        for i in range(control.slider_counts[j]):
+            _return_one(j, i, False, step.latest, step.h, room.after, room.gradients_after,
+                        problem, progress, vary, force, rates)
+    dynamics.set_rate_and_gradients(room.after, s, problem.blocks, room.given, room.load,
+                                    room.nodes, room.gradients_after, room.rate_after)
+
+
+def _attend(kind, step, problem, progress, room, vary, t, y):
+    """Part of the step until slip ends, 0 if it was to end at its start, 1 if it does not.
+
+    Or fill in what ``kind`` asks for: ``y`` at the time t, or the end of the step, within limits.
+    """
+    if kind == SWITCH:
+        return _switch(step, problem, progress, room, vary)
+    if kind == END:
+        _at_end(step, problem, progress, room, vary)
+        return 1.0
+    s = problem.system
+    states = s.memory.max()
+    length, width = force_room(states, in_space(s))
+    return_to_limits(t, y, s, problem.control.slider_counts, np.empty(length),
+                     np.empty((states, width)))
+    return 1.0
+
+
+# By its address: only systems with such elements need it.
+attend = compile_law(_ATTEND, "attend(kind, step, problem, progress, room, vary, t, y)", _attend)

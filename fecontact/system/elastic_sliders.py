@@ -1,0 +1,177 @@
+"""Elastic Coulomb elements: springs in series with sliders, whose deflections have limits.
+
+Elements are integrated exactly in time. The deflection z follows the slip velocity, in slip too,
+and the force is that of the deflection within its limit l = mu F / k. The excess |z| - l is then
+the distance that the element has slid. Slip ends where the excess is largest: z returns to the
+limit.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from fecontact.core.compiled import helper, integers, kernel, matrix, vector
+from fecontact.core.types import Array, Integers
+from fecontact.laws.signatures import ground_at
+from fecontact.system.kernels import node_forces
+from fecontact.system.nodes import (
+    SYSTEM,
+    SystemArrays,
+    force_room,
+    ground_motion,
+    in_space,
+    memory_of,
+    node_motion,
+)
+from fecontact.system.powers import BRISTLES, FRICTION, POWER_COUNT
+from fecontact.system.space_nodes import scale_under
+
+# An element that sticks again is short of its limit by this part.
+SHORT = 1e-10
+
+
+@helper
+def pressing_on(j, contact, F, s):
+    """Force that friction of node j sees under a normal force F."""
+    pressing = abs(F)
+    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
+        if in_space(s):
+            pressing *= scale_under(contact, s.wave_direction[0], s.wave_direction[1],
+                                    s.friction_scale, s.friction_scale_parameters)[0]
+        else:
+            pressing *= ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)[0]
+    return pressing
+
+
+@helper
+def limit_of(j, i, count, pressing, s):
+    """Largest deflection of element i of the ``count`` elements of node j [m]."""
+    p = s.friction_parameters[j]
+    return p[1 + count + i] * pressing / p[1 + i]
+
+
+@helper
+def deflection_of(z, i, s):
+    """Magnitude of the deflection of element i [m]."""
+    return np.hypot(z[2 * i], z[2 * i + 1]) if in_space(s) else abs(z[i])
+
+
+@helper
+def return_deflection(z, i, size, target, s):
+    """Reduce the deflection of element i from the magnitude ``size`` to ``target``."""
+    first, last = (2 * i, 2 * i + 2) if in_space(s) else (i, i + 1)
+    for k in range(first, last):
+        z[k] *= target / size
+
+
+@helper
+def return_to_limits(t, y, s, counts, force, rates):
+    """Return all deflections of the state y at time t to their limits."""
+    moved = ground_motion(t, s)
+    for j in range(len(counts)):
+        if counts[j] == 0:
+            continue
+        z = memory_of(j, y, s)
+        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+        pressing = pressing_on(j, contact, F, s)
+        for i in range(counts[j]):
+            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            if size > limit:
+                return_deflection(z, i, size, limit, s)
+
+
+@kernel(types.void(vector, matrix, SYSTEM, integers))
+def return_states(times, states, s, counts):
+    """Return all deflections of states (N, size) at N times to their limits."""
+    count = s.memory.max()
+    length, width = force_room(count, in_space(s))
+    force, rates = np.empty(length), np.empty((count, width))
+    for k in range(len(times)):
+        return_to_limits(times[k], states[k], s, counts, force, rates)
+
+
+@kernel(types.void(types.float64, vector, SYSTEM, integers, matrix))
+def excesses(t, y, s, counts, out):
+    """Fill out (n, elements) with |z| less the limit of each element [m]; -inf where none is."""
+    count = s.memory.max()
+    length, width = force_room(count, in_space(s))
+    force, rates = np.empty(length), np.empty((count, width))
+    moved = ground_motion(t, s)
+    out[:] = -np.inf
+    for j in range(len(counts)):
+        if counts[j] > 0:
+            z = memory_of(j, y, s)
+            F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+            pressing = pressing_on(j, contact, F, s)
+            for i in range(counts[j]):
+                out[j, i] = deflection_of(z, i, s) - limit_of(j, i, counts[j], pressing, s)
+
+
+@kernel(types.void(types.float64, vector, SYSTEM, integers, matrix))
+def stick_again(t, y, s, counts, ends):
+    """Return the elements to their limits for which ``ends`` (n, elements) is not zero."""
+    count = s.memory.max()
+    length, width = force_room(count, in_space(s))
+    force, rates = np.empty(length), np.empty((count, width))
+    moved = ground_motion(t, s)
+    for j in range(len(counts)):
+        if counts[j] > 0:
+            z = memory_of(j, y, s)
+            F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+            pressing = pressing_on(j, contact, F, s)
+            for i in range(counts[j]):
+                limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+                if ends[j, i] != 0.0 and size > limit:
+                    return_deflection(z, i, size, limit * (1.0 - SHORT), s)
+
+
+def slider_counts(system: Any) -> Integers:
+    """Number (n,) of elastic Coulomb elements of each contact node of a system."""
+    counts = np.zeros(system.basis.contact_nodes, dtype=np.int64)
+    for nodes, share, law in system.law_groups("friction"):
+        if law.memory and law.sliders(share) is not None:
+            counts[nodes] = law.memory
+    return counts
+
+
+def exact_arrays(arrays: SystemArrays, counts: Integers) -> SystemArrays:
+    """Arrays for runs that return elements to their limits at the end of slip.
+
+    What the elements store is left out of the powers: it follows from the states.
+    """
+    if not counts.any():
+        return arrays
+    friction, stored = arrays.friction_parameters.copy(), arrays.bristle_stiffness.copy()
+    friction[counts > 0, 0] = 0.0
+    stored[:, counts > 0] = 0.0
+    return arrays._replace(friction_parameters=friction, bristle_stiffness=stored)
+
+
+def within_limits(system: Any, times: Array, states: Array, counts: Integers) -> Array:
+    """Copy of the states (N, size) at N times with all deflections within their limits."""
+    found = np.array(states, dtype=float)
+    if counts.any():
+        return_states(np.ascontiguousarray(times, dtype=float), found, system.arrays, counts)
+    return found
+
+
+def book_stored(work: Array, energy: Array) -> None:
+    """Count energies (N, n) in the springs of elements as stored, not as lost, in work (N, p).
+
+    The works of nodes may follow those of the system.
+    """
+    stored = energy - energy[0]
+    n = stored.shape[1]
+    work[:, BRISTLES] += stored.sum(axis=1)
+    work[:, FRICTION] -= stored.sum(axis=1)
+    if work.shape[1] > POWER_COUNT:
+        work[:, POWER_COUNT : POWER_COUNT + n] -= stored
+
+
+def stored_in_sliders(system: Any, states: Array, counts: Integers) -> Array:
+    """Energy (N, n) that the springs of the elements store in states (N, size) [J]."""
+    n, m = system.basis.contact_nodes, system.basis.modes
+    stiffness = np.where(counts[:, None] > 0, system.arrays.bristle_stiffness[0], 0.0)
+    squares = states[:, 2 * m :].reshape(len(states), n, -1) ** 2
+    return np.asarray(0.5 * (stiffness * squares).sum(axis=2))
