@@ -77,7 +77,7 @@ def test_below_the_limit_nothing_is_lost(name):
     amplitude = (0.9 if name == "jenkins" else 0.9 / 6.0) * LIMIT
     run, _ = cycles(LAWS[name], amplitude)
     assert run.energies.bristles.max() == pytest.approx(0.5 * K * amplitude**2, rel=1e-4)
-    assert np.abs(run.friction_work).max() < 1e-9 * 0.5 * K * amplitude**2
+    assert np.abs(run.friction_work).max() < 1e-7 * 0.5 * K * amplitude**2
     assert run.creep_work == pytest.approx(np.zeros_like(run.friction_work))
 
 

@@ -250,7 +250,8 @@ def _switch(step, problem, progress, room, vary):
                         first = min(first, place)
         if first <= part:
             break
-    if first >= 1.0 - near:
+    # Steps end a little past a switch, so that it lies well within what counts as the end.
+    if first >= 1.0 - 3.0 * near:
         return 1.0
     if first > near:
         return min(first + near * first, 1.0)
