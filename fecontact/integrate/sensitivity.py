@@ -24,6 +24,7 @@ from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, require_solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import slider_counts
 
 EndsAt = Callable[[Array], Array]
 Sides = tuple[bool, bool]
@@ -39,6 +40,8 @@ _DIFFERENCE = 1e-5
 # so many times the tolerance. Others are formed anew with changes that are smaller by a factor;
 # where the ends of runs are smooth, they come at least so much closer.
 _APART, _COARSE, _FINER, _CLOSER = 1e-3, 1e3, 30.0, 0.5
+# Part of the change of a parameter with elastic Coulomb elements, whose forces have kinks.
+_SLIDERS = 1e-4
 # Steps between two output times at which states are looked at for their largest values.
 _BETWEEN = 16
 
@@ -347,6 +350,9 @@ def _moved(
     """The system with the parameter increased and decreased, and the difference of both."""
     system_at, value = _function_of(system, parameter)
     move = MOVE * (abs(value) or 1.0)
+    if slider_counts(system).any():
+        # Elements that have just begun or ceased to slide must not switch with the parameter.
+        move *= _SLIDERS
     return _systems_beside(system_at, value, move * min(
         _slip_limit(system, system_at, value, move),
         _depth_limit(system, system_at, value, move, times, state)))

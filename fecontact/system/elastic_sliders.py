@@ -27,8 +27,9 @@ from fecontact.system.nodes import (
 from fecontact.system.powers import BRISTLES, FRICTION, POWER_COUNT
 from fecontact.system.space_nodes import scale_under
 
-# An element that sticks again is short of its limit by this part.
-SHORT = 1e-10
+# An element that sticks again is short of its limit by this part, so that a parameter that changes
+# for derivatives does not let it slide.
+SHORT = 2e-8
 
 
 @helper

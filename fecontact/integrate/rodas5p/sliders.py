@@ -190,7 +190,8 @@ def _return_one(j, i, within, t, h, y, g, problem, progress, vary, force, rates)
                                   0.0 <= deep < _TOUCH * contact.rate * h)
         _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, rates,
                  within and touched)
-    return_deflection(memory_of(j, y, s), i, size, limit * (1.0 - SHORT) if within else limit, s)
+    part = 1.0 - SHORT if within else 1.0 + SHORT
+    return_deflection(memory_of(j, y, s), i, size, limit * part, s)
 
 
 @routine
