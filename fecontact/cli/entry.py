@@ -8,6 +8,7 @@ from cyclopts import CycloptsError, UnusedCliTokensError
 
 from fecontact.cli.app import app
 from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code
+from fecontact.cli.environment import prepare
 from fecontact.core.errors import FecontactError, ModelWarning
 from fecontact.core.resources.memory import (
     available_memory,
@@ -18,6 +19,10 @@ from fecontact.core.resources.memory import (
 
 def main() -> None:
     """Run the command line and exit Python with its exit code."""
+    try:
+        prepare()
+    except FecontactError as error:
+        sys.exit(fail(str(error), 1))
     sys.exit(execute(sys.argv[1:]))
 
 
