@@ -143,8 +143,13 @@ def show(renderable: Any) -> None:
 
 
 def echo(text: str) -> None:
-    """Print a line."""
-    print(text)
+    """Print a line; control characters from names are shown escaped."""
+    print("\n".join(map(printable, text.split("\n"))))
+
+
+def note(text: str) -> None:
+    """Print a line on stderr; control characters from names are shown escaped."""
+    print(printable(text), file=sys.stderr)
 
 
 def echo_written(*files: Path) -> None:
@@ -159,8 +164,8 @@ def echo_written(*files: Path) -> None:
 def warn_if_stale(file: Path, current: bool) -> None:
     """Warn if the study was changed after its run."""
     if not current:
-        print(f"note: the run was computed with other values than {file} has now; run it again to "
-              f"see these.", file=sys.stderr)
+        note(f"note: the run was computed with other values than {file} has now; run it again to "
+             f"see these.")
 
 
 def fail(message: str, code: int) -> int:
@@ -176,4 +181,9 @@ def _one_line(message: str) -> str:
     """
     text = " ".join(line.strip() for line in message.splitlines())
     text = re.sub(rf"(\S{{{_LONGEST}}})\S+", r"\1...", text)
+    return printable(text)
+
+
+def printable(text: str) -> str:
+    """Text with control characters shown escaped; they would steer the terminal."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)

@@ -7,7 +7,7 @@ from typing import Any
 from cyclopts import CycloptsError, UnusedCliTokensError
 
 from fecontact.cli.app import app
-from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code
+from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code, note
 from fecontact.cli.environment import prepare
 from fecontact.core.errors import FecontactError, ModelWarning
 from fecontact.core.resources.memory import (
@@ -45,7 +45,7 @@ def _show_warning(otherwise: Any) -> Any:
 
     def show(message: Any, category: Any, *rest: Any, **more: Any) -> None:
         if issubclass(category, ModelWarning):
-            print(f"warning: {message}", file=sys.stderr)
+            note(f"warning: {message}")
         else:
             otherwise(message, category, *rest, **more)
 

@@ -17,10 +17,8 @@ from fecontact.laws.synonyms import laws_called
 
 def laws_table(only: Collection[type] | None = None) -> Any:
     """Table of all laws, or of some: kind, name in study files, short description."""
-    from rich.markup import escape
-
     return table("kind", "law", "", left=3, rows=[
-        (_title(kind), name, escape(summary(cls).rstrip(".")))
+        (_title(kind), name, summary(cls).rstrip("."))
         for kind, names in law_names().items() for name, cls in names.items()
         if only is None or cls in only])
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecontact.cli.console import printable
 from fecontact.core.units import quantity
 
 if TYPE_CHECKING:
@@ -19,15 +20,23 @@ if TYPE_CHECKING:
 
 
 def table(*headings: str, rows: Iterable[Iterable[str]], left: int = 1) -> Any:
-    """Table for the terminal; the first ``left`` columns are left-aligned, the others right."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
+    """Table for the terminal; the first ``left`` columns are left-aligned, the others right.
 
-    result = Table(*headings, box=SIMPLE_HEAD, show_header=any(headings), pad_edge=False)
+    Cells are shown as they are, without markup; control characters are escaped.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Column, Table
+    from rich.text import Text
+
+    def cell(text: str) -> Text:
+        return Text(printable(text))
+
+    result = Table(*(Column(cell(heading)) for heading in headings),
+                   box=SIMPLE_HEAD, show_header=any(headings), pad_edge=False)
     for column in result.columns[left:]:
         column.justify = "right"
     for row in rows:
-        result.add_row(*row)
+        result.add_row(*map(cell, row))
     return result
 
 

@@ -1,14 +1,13 @@
 """The command ``sweep``: many cases of a study."""
 
 import contextlib
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import echo, echo_written, show
+from fecontact.cli.console import echo, echo_written, note, show
 from fecontact.cli.options import Changes, StudyFile
 from fecontact.core.errors import InputError
 
@@ -66,7 +65,7 @@ def sweep(
                               overwrite=overwrite, retry=retry, workers=workers,
                               progress=True)
         except KeyboardInterrupt:
-            print(f"Finished cases are kept in {folder}; go on with --resume.", file=sys.stderr)
+            note(f"Finished cases are kept in {folder}; go on with --resume.")
             raise
     from fecontact.sweeps.report import report_sweep
 
@@ -103,17 +102,17 @@ def _complain(failed: Mapping[int, str]) -> None:
     for reason, numbers in list(cases.items())[:_SHOWN]:
         few = ", ".join(f"{number}" for number in numbers[:_SHOWN])
         more = ", ..." if len(numbers) > _SHOWN else ""
-        print(f"failed: case{'s' * (len(numbers) > 1)} {few}{more}: {reason}", file=sys.stderr)
+        note(f"failed: case{'s' * (len(numbers) > 1)} {few}{more}: {reason}")
     if len(cases) > _SHOWN:
-        print(f"failed: for {len(cases) - _SHOWN} more reasons, see the table", file=sys.stderr)
+        note(f"failed: for {len(cases) - _SHOWN} more reasons, see the table")
 
 
 def _warn(warnings: Mapping[int, str]) -> None:
     """Print one line on cases that exceed the limits of the model, with the first warning."""
     if warnings:
         first = min(warnings)
-        print(f"warning: {len(warnings)} of the cases leave the limits of the model, see the "
-              f"column 'warning' of the table; case {first}: {warnings[first]}", file=sys.stderr)
+        note(f"warning: {len(warnings)} of the cases leave the limits of the model, see the "
+             f"column 'warning' of the table; case {first}: {warnings[first]}")
 
 
 def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
@@ -132,7 +131,6 @@ def _sensitivity_table(table: "SweepTable", name: str, seed: int) -> Any:
 def _summary_table(table: "SweepTable", method: str) -> Any:
     """Statistics of random samples; smallest and largest value for grids and lists."""
     import numpy as np
-    from rich.markup import escape
 
     from fecontact.cli.tables import table as make_table
     from fecontact.sweeps.statistics import statistics
@@ -143,7 +141,7 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
     for name, values in table.values.items():
         known = values[np.isfinite(values)]
         unit = unit_of(name)
-        title = escape(f"{name} [{unit}]" if unit else name)
+        title = f"{name} [{unit}]" if unit else name
         if drawn and len(known) >= 3:
             rows += [(title if key == "mean" else "", key, f"{one.value:.4g}",
                       f"{one.low:.4g} ... {one.high:.4g}")
