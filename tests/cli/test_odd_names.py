@@ -5,6 +5,7 @@ import warnings
 from fecontact.cli.console import echo, note, show
 from fecontact.cli.tables import table
 from fecontact.core.errors import ModelWarning
+from fecontact.output.plots.figure import new_figure
 
 CLEARS = "pad\x1b[2J\x07"  # clears a terminal and rings its bell
 SHOWN = r"pad\x1b[2J\x07"
@@ -33,3 +34,14 @@ def test_cells_of_tables_are_no_markup(capsys):
     for text in ("time [s]", "[red]", SHOWN, "[/b] [i]x"):
         assert text in out
     assert "\x1b" not in out
+
+
+def test_dollars_in_labels_are_no_mathematics(tmp_path):
+    """A fraction without its end is an error as mathematics; powers of ten remain."""
+    with new_figure(3.0, 2.0, tmp_path / "odd.png") as figure:
+        axes = figure.subplots()
+        axes.semilogy([1.0, 2.0], [1e-3, 1e3], label=r"$\frac{1}{$")
+        axes.set(xlabel=r"force at $\frac{1}{$ [N]")
+        axes.legend()
+    assert (tmp_path / "odd.png").is_file()
+    assert all(text.get_parse_math() for text in axes.get_yticklabels())

@@ -12,6 +12,7 @@ from matplotlib import RcParams, rc_context, rc_params_from_file
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, nearest, shown
@@ -91,6 +92,10 @@ class StyledFigure(Figure):
 
     def draw(self, renderer: RendererBase) -> None:
         """See :meth:`matplotlib.figure.Figure.draw`."""
+        # Names may contain dollars; ticks of logarithmic axes alone are mathematical text.
+        for text in self.findobj(Text):
+            if isinstance(text, Text) and r"\mathdefault" not in text.get_text():
+                text.set_parse_math("$" not in text.get_text())
         with rc_context(self._settings):
             super().draw(renderer)
 
