@@ -90,8 +90,8 @@ def key_numbers(
     points : sequence of str or int
         Named points and contact nodes; B by default, or the contact node in the middle.
     t_start : float, optional
-        Start of the interval [s]; by default the middle of the run. Whether motion is steady is
-        told of the last quarter of the run.
+        Start of the interval [s]; by default the middle of the run. Steadiness is judged
+        on the last quarter of the run.
 
     Raises
     ------

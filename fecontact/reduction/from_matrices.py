@@ -71,16 +71,13 @@ def basis_from_matrices(
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
-    The modes are those of the symmetric part of the stiffness, rigid ones of frequency exactly
-    zero; the skew part couples them by :attr:`ModalBasis.stiffness`.
+    Modes of the symmetric part of the stiffness; :attr:`ModalBasis.stiffness` has the skew part.
 
     Parameters
     ----------
     mass, stiffness : dense or sparse (d, d) arrays, or AssembledMatrix
-        The mass symmetric and positive definite [kg]. The symmetric part of the stiffness [N/m] is
-        positive semi-definite; its skew part, as of follower forces, is circulatory and needs
-        ``symmetric=False`` (differences below 1e-10 of the largest entry count as zero). A diagonal
-        of 1e35 or more fixes.
+        Mass, symmetric and positive definite [kg]; stiffness with positive semi-definite symmetric
+        part [N/m]. Diagonal entries of 1e35 or more fix a degree of freedom.
     rows : mapping
         ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
@@ -106,13 +103,12 @@ def basis_from_matrices(
     dimension : 2 or 3
         3 for space.
     symmetric : bool
-        False allows a stiffness with a skew part.
+        False allows a stiffness with a skew (circulatory) part above 1e-10 of its largest entry.
 
     Raises
     ------
     InputError
-        For matrices of other kinds than these, or of different sizes, and rows of wrong width; for
-        a stiffness that is not symmetric, unless ``symmetric`` is False.
+        For matrices of other kinds or sizes than these, and rows of wrong width.
     AnalysisError
         If the modes cannot be computed accurately.
     """

@@ -60,7 +60,7 @@ def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple
 
 @dataclass(frozen=True)
 class Planned:
-    """What is known before a run: the system, its elastic bodies by name, and the duration [s]."""
+    """Model of a run: the system, its elastic bodies by name, and the duration [s]."""
 
     system: ContactSystem
     bodies: Mapping[str, ElasticBody]

@@ -30,8 +30,8 @@ _FIRST_STEPS = (1.0, 0.2, 0.04)
 _MORE = 1.5
 # Size below which orbits are at rest, in that of the largest on the branch, means included.
 _AT_REST = 1e-8
-# Number of points at which the error from few samples is estimated by default, and error that is
-# told of.
+# Number of points at which the error from few samples is estimated by default, and the error above
+# which a branch carries a note.
 _LOOKED_AT, _NOTED = 24, 5e-3
 _FEW = ("The error of the branch from its {} samples is {:.2g} of the orbit: folds may be those of "
         "kinks of the contact laws between samples; take more samples or smoother laws.")
@@ -164,7 +164,7 @@ def follow(
     """
     if problem.stability is None or problem.autonomous or not problem.kinked:
         return _refined(problem, u, tangent, method, options, further, how)[0]
-    # What takes the time is done once, on a branch that is known.
+    # Multipliers and special points take the time: they are computed once, on the final samples.
     branch, plain, u, tangent = _refined(
         replace(problem, stability=None), u, tangent, replace(method, stability=None), options,
         further, how)

@@ -29,7 +29,7 @@ _ATTEND = f8(i8, state.STEP_TYPE, Reference(state.PROBLEM), Reference(state.PROG
              Reference(state.ROOM), Reference(VARY), f8, vector)
 attend_at = function_at(_ATTEND)
 
-# What is asked for: the part of the step until slip ends or begins; a state at a time within its
+# Requests: the part of the step until slip ends or begins; a state at a time within its
 # limits; the end of a step, with its derivatives, within its limits.
 SWITCH, OUTPUT, END = range(3)
 

@@ -62,7 +62,7 @@ def _maxwell_slip(v, F, z, p, force, rates):
 
 @planar_friction_law
 def _planar_maxwell_slip(law, v1, v2, F, z, p, force, rates):
-    """As in one direction; each element returns to the disc |c z| <= phi F along its own direction.
+    """Elements in two directions, each returned to the disc |c z| <= phi F along its own direction.
 
     With a return time of zero, an element that slides turns as on the edge of the disc:
     n' = (v - (n.v) n) / l with n = z / |z| and the limit l, while |z| grows by n.v.

@@ -211,7 +211,7 @@ def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
 
 
 def _places(system: ContactSystem, load: Array) -> str:
-    """Where the resultant of modal loads (m,) meets the ground, and where the contact nodes are.
+    """Sentence on where the resultant of modal loads (m,) meets the ground, beside the contacts.
 
     Empty for several bodies, and where supports or links keep the body from rigid motion.
     """

@@ -228,10 +228,10 @@ def _onsets(field: ContactField, values: Array) -> Array:
 
 
 def _bent(s: SystemArrays, nodes: Integers, b: Array, scale: float) -> NDArray[np.bool_]:
-    """Whether force or stiffness of nodes (k,) jumps at penetrations b (k,)."""
+    """True for nodes (k,) whose force or stiffness jumps at penetrations b (k,)."""
     off = _NEAR * scale + _ROUNDING * np.abs(b)
 
-    def told(u: Array, v: float) -> tuple[Array, Array]:
+    def evaluated(u: Array, v: float) -> tuple[Array, Array]:
         force, slope = np.empty(len(b)), np.empty(len(b))
         normal_values(s.normal[nodes], u, np.full(len(b), v), s.normal_parameters[nodes], force,
                       slope)
@@ -239,8 +239,8 @@ def _bent(s: SystemArrays, nodes: Integers, b: Array, scale: float) -> NDArray[n
 
     found = np.zeros(len(b), dtype=bool)
     for v in (-scale, 0.0, scale):
-        (above, above_u), (below, below_u) = told(b + off, v), told(b - off, v)
-        size = np.maximum(*(np.abs(told(b + side * scale, v)[0]) for side in (-1.0, 1.0)))
+        (above, above_u), (below, below_u) = evaluated(b + off, v), evaluated(b - off, v)
+        size = np.maximum(*(np.abs(evaluated(b + side * scale, v)[0]) for side in (-1.0, 1.0)))
         found |= ((np.abs(above - below) > _JUMP * size)
                   | (np.abs(above_u - below_u) * scale > _JUMP * size))
     return found & (np.abs(b) < _NOWHERE)

@@ -83,7 +83,7 @@ def _rise(j, step, p, progress, room):
     heights[0] = room.flights[j, HEIGHT]
     for k in range(PARTS + 1):
         heights[k + 1] = heights[k] + h / (PARTS + 1) * rate[k]
-    # What is given at a time has the rounding of the time, a speed that of the largest so far.
+    # Prescribed values have the rounding of the time, a speed that of the largest so far.
     return (_ROUNDING * (1.0 + _TICK * abs(step.t) / p.tick)
             * _acceleration_size(j, p, progress, room) * h * h
             + _ROUNDING * progress.largest[RATE_SIZE] * h)
