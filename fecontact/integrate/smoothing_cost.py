@@ -6,6 +6,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
+from fecontact.integrate.coefficients import node_values
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.nonsmooth.problem import CREEP, STEEP
 from fecontact.integrate.simulate import simulate
@@ -115,7 +116,7 @@ def _break_away(system: ContactSystem, solver: SetValued) -> tuple[float, float]
     for nodes, _, law in system.law_groups("friction"):
         smooth[nodes] = largest_coefficient(law)[0]
         sharp[nodes] = coefficient(replace(law, smoothing_slope=STEEP), CREEP)
-    if solver.static_coefficient is not None:
-        sharp[:] = solver.static_coefficient
+    static = node_values("static_coefficient", solver.static_coefficient, system.basis, -1.0)
+    sharp = np.where(static >= 0.0, static, sharp)
     worst = int(np.argmax(np.abs(smooth - sharp)))
     return float(smooth[worst]), float(sharp[worst])

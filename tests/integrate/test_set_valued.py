@@ -276,6 +276,10 @@ def test_cost_of_smoothing():
     finer = smoothing_cost(system.with_(**{"friction.smoothing_slope": 1e8}), 20.0 * period,
                            outputs=4001)
     assert finer.orbit_difference < 0.1 * cost.orbit_difference
+    group = system.basis.groups[0][0]
+    static = smoothing_cost(system, 2.0 * period, outputs=21,
+                            solver=SetValued(static_coefficient={group: 0.9}))
+    assert static.break_away == pytest.approx(0.9, rel=1e-12)
 
 
 @pytest.mark.parametrize(("options", "message"), [

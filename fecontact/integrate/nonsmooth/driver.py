@@ -1,7 +1,7 @@
 """Runs with set-valued friction and rigid stops: the limit of infinite smoothing slope."""
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.coefficients import Coefficient
+from fecontact.integrate.coefficients import Coefficient, node_values
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent, Events
 from fecontact.integrate.nonsmooth import problem as kinds
@@ -23,7 +23,6 @@ from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_kernels import FOUND
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
-from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import POWER_COUNT
 
@@ -350,40 +349,6 @@ def _clusters(Tx: Array, sliding: Array) -> tuple[Integers, Array]:
             rows.append(row)
             factors.append(float(sliding[j]))
     return cluster, np.array(rows)
-
-
-def node_values(
-    name: str, given: Coefficient | None, basis: ModalBasis, default: float,
-) -> Array:
-    """Values (n,) of the contact nodes from one number, one for each node, or by interfaces.
-
-    Interfaces that a mapping does not name have the default, as all nodes without a value.
-
-    Raises
-    ------
-    InputError
-        For unknown interfaces, and lists of another length than the nodes.
-    """
-    n = basis.contact_nodes
-    if not isinstance(given, Mapping):
-        return _spread(name, default if given is None else given, n, "contact nodes")
-    names = [group for group, _ in basis.groups]
-    for interface in given:
-        if interface not in names:
-            raise InputError(f"SetValued: {name} names the interface {interface!r}"
-                             f"{nearest(str(interface), names)}, but the interfaces are: "
-                             f"{choices(names)}.")
-    return np.concatenate([
-        _spread(f"{name}.{group}", given.get(group, default), count, f"nodes of '{group}'")
-        for group, count in basis.groups])
-
-
-def _spread(name: str, given: float | Sequence[float], count: int, nodes: str) -> Array:
-    values = np.atleast_1d(np.asarray(given, dtype=float))
-    if len(values) not in (1, count):
-        raise InputError(f"SetValued: {name} has {len(values)} values; give one number, or one for "
-                         f"each of the {count} {nodes}.")
-    return np.broadcast_to(values, (count,)).copy()
 
 
 def _of_clusters(tangential: Array, cluster: Integers) -> Array:
