@@ -238,6 +238,14 @@ class FrictionLaw(NodeLaw):
         """
         return np.zeros((2, len(share), self.memory))
 
+    def sliders(self, share: Array) -> tuple[Array, Array] | None:
+        """Springs c (n, s) [N/m] of n nodes and the limits phi (n, s) of their sliders; or None.
+
+        For laws whose internal variables z are deflections of springs in series with sliders:
+        their forces are c z, at most phi F. Quasi-static loading needs no velocity for them.
+        """
+        return None
+
     def stick_velocity(self, nodes: int) -> Array:
         """Slip velocity (n,) below which a node in contact counts as sticking [m/s].
 

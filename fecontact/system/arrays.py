@@ -22,7 +22,7 @@ from fecontact.system.space_nodes import SIDES, space_node
 LawGroup = tuple[slice, Array, Any]
 
 # Return time of elastic Coulomb elements over the shortest time constant of their body.
-_RETURN_PART = 1e-9
+_RETURN_PART = 1e-6
 
 # Numbers of a drive and a load of which the arrays are multilinear functions.
 _MULTILINEAR = frozenset({"load.normal", "drive.angular_frequency", *(

@@ -374,7 +374,7 @@ def test_interrupted_and_impossible_plots_leave_nothing(tmp_path, monkeypatch):
         plot_energies(trajectory, path=tmp_path / "nowhere" / "energies.png")
 
     def stop(self, *args, **options):
-        args[0].write_bytes(b"half")
+        args[0].write(b"half")
         raise KeyboardInterrupt
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", stop)

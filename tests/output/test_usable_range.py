@@ -46,7 +46,7 @@ def test_special_points_beyond_the_basis_are_marked():
     assert hertz == pytest.approx(0.5 / np.pi)
 
     def remarks(usable):
-        return " ".join(special_table(branch, usable).columns[-1].cells)
+        return " ".join(map(str, special_table(branch, usable).columns[-1].cells))
 
     assert "beyond 0.1 Hz, where the basis ends" in remarks(0.1)
     assert "beyond" not in remarks(1.0)

@@ -497,7 +497,7 @@ plot run.vtkhdf history --t-start 7 | 7
 plot run.vtkhdf phase --t-end 0 | t_end
 plot run.vtkhdf spectrum --quantity x | quantity
 plot run.vtkhdf spectrum --highest-hz 0 | highest_hz
-plot run.vtkhdf spectrum --t-end 1e-4 | at least 8
+plot run.vtkhdf spectrum --t-end 1e-4 | windows of at least
 plot run.vtkhdf spectrogram --highest-hz -1 | highest_hz
 plot run.vtkhdf poincare | period
 plot run.vtkhdf receptance --point 0,0 | receptance

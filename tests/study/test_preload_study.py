@@ -86,7 +86,8 @@ def test_a_run_starts_at_the_end_of_the_path(file):
     history = study.load_history()
     run = study.with_(**{"drive.motion_x": {"law": "constant", "value": 3e-6}}).run()
     assert run.modal_coordinates[0] == pytest.approx(history.modal_coordinates[-1])
-    assert np.abs(run.modal_coordinates - run.modal_coordinates[0]).max() < 1e-9 * np.abs(
+    # Elements at their limits start a little below them, by 2e-8 of the limit.
+    assert np.abs(run.modal_coordinates - run.modal_coordinates[0]).max() < 2e-8 * np.abs(
         run.modal_coordinates[0]).max()
 
 

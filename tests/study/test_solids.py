@@ -258,7 +258,7 @@ def test_wear_of_a_solid_is_that_of_archard():
 
 def test_summaries_of_solids_see_all_directions():
     from fecontact.analysis.run_facts import run_facts
-    from fecontact.sweeps.summaries import largest_displacement
+    from fecontact.analysis.summaries import largest_displacement
 
     run = fc.Study.from_toml(PAD).with_(**{
         "gap": 1.0, "load.gravity": [0.0, 0.0, -9.81], "simulation.t_end": 0.01,

@@ -305,7 +305,7 @@ MISTAKES = [
     ({"simulation.restitution": 0.5},
      r"\[simulation\]: restitution = 0\.5 is only for solver = 'set-valued', not 'rodas5p'"),
     ({"simulation.solver": "set-valued", "simulation.restitution": 1.5},
-     r"\[simulation\]: restitution = 1\.5 must be a number from 0 to 1\.$"),
+     r"\[simulation\]: restitution = 1\.5 must be a number from 0 to 1, "),
     ({"simulation.solver": "radau", "simulation.stop": ["stick"]},
      r"\[simulation\]: events and stop are for solver = 'rodas5p' or 'set-valued', not 'radau'"),
     ({"geometry.shape": "bem"}, r"\[geometry\]: shape = \"bem\" must be one of .*mean 'beam'"),

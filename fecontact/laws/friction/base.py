@@ -106,14 +106,6 @@ class MemoryFriction(base.FrictionLaw):
         """
         return 10.0 * float(self.state_scale[0])
 
-    def sliders(self, share: Array) -> tuple[Array, Array] | None:
-        """Springs c (n, s) [N/m] of n nodes and the limits phi (n, s) of their sliders; or None.
-
-        For laws whose internal variables z are deflections of springs in series with sliders:
-        their forces are c z, at most phi F. Quasi-static loading needs no velocity for them.
-        """
-        return None
-
     def steady_coefficient(self, velocity: Array | float) -> Array:
         """R/F of steady sliding at slip velocities [m/s], with their sign; at v = 0 that of v > 0.
 

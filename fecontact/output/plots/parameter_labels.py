@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 from matplotlib.ticker import Formatter
@@ -80,7 +80,8 @@ def _units_of(cls: type) -> dict[str, str]:
     """Units from the annotations of a class's fields; empty strings for fields without one."""
     return {name: next((item.symbol for item in getattr(hint, "__metadata__", ())
                         if isinstance(item, Unit)), "")
-            for name, hint in get_type_hints(cls, include_extras=True).items()}
+            for name, hint in get_type_hints(cls, include_extras=True).items()
+            if get_origin(hint) is not ClassVar}
 
 
 def _classes(hint: Any, place: str) -> Iterator[tuple[str, type]]:
