@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from fecontact.cli.printable import printable
 from fecontact.core import progress
 
 INTERRUPTED = 130  # exit code after Ctrl-C
@@ -182,8 +183,3 @@ def _one_line(message: str) -> str:
     text = " ".join(line.strip() for line in message.splitlines())
     text = re.sub(rf"(\S{{{_LONGEST}}})\S+", r"\1...", text)
     return printable(text)
-
-
-def printable(text: str) -> str:
-    """Text with control characters shown escaped; they would steer the terminal."""
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)

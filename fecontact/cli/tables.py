@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.cli.console import printable
+from fecontact.cli.printable import printable
 from fecontact.core.units import quantity
 
 if TYPE_CHECKING:

@@ -89,6 +89,13 @@ class StudyModels:
         self._require_several("elastic_bodies", "elastic_body")
         return dict(self._bodies)
 
+    def made_bodies(self) -> dict[str, ElasticBody]:
+        """Elastic bodies made so far, by name ("" for the only one); none with a stored basis."""
+        if self.bodies:
+            return dict(vars(self).get("_bodies", {}))
+        body = vars(self).get("_body")
+        return {} if body is None else {"": body}
+
     def pairings(self) -> dict[str, Pairing | TwoPassPairing]:
         """Pairings of the faces of several bodies, by the names of the interfaces."""
         self._require_several("pairings", "mesh")

@@ -375,8 +375,8 @@ class Study(Summarised, StudyModels):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
-        bodies = self.elastic_bodies() if self.bodies else {"": self.elastic_body()}
-        warn_of_limits(implausible_values(Planned(system, bodies, t_end - settings.t_start)),
+        warn_of_limits(implausible_values(Planned(system, self.made_bodies(),
+                                                  t_end - settings.t_start)),
                        "In this study")
         initial = self.initial()
         with located(f"{_title(self.path)}: [simulation]:"):

@@ -38,7 +38,8 @@ def test_folds_of_free_orbits(size, tmp_path):
         period = 2.0 * np.pi / (2.0 + 0.7 * place)
         assert fold.values["period"] == pytest.approx(period, rel=1e-7)
         assert fold.coefficient == pytest.approx(3.0 * np.sqrt(0.1) * period * size, rel=1e-6)
-        assert 0.0 <= fold.coefficient_error < 1e-6 * fold.coefficient
+        # The stated error is at least 1e-5 of the terms that make up the coefficient.
+        assert 0.0 <= fold.coefficient_error < 2e-5 * fold.coefficient
         assert fold.criticality is None
 
 

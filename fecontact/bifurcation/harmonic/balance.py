@@ -139,7 +139,8 @@ class Balance:
     ) -> Array:
         """Add to rates (N, d), and derivatives (N, d, d), what kinks between samples change.
 
-        Returns ``widths`` (m, N) of :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`.
+        Returns ``widths`` (m, N), see
+        :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`.
         """
         widths = np.zeros((self.layout.displacements, len(rates)))
         if self.onsets.size and isinstance(self.field, ContactField):
