@@ -183,6 +183,7 @@ def test_exponents_are_those_of_the_plane_and_of_the_mode_across():
     assert found.exponents[0] == pytest.approx(-6.254, abs=1.1)
 
 
+@pytest.mark.filterwarnings("ignore:.*the body turns by")
 def test_ensembles_in_space_are_single_runs():
     """A block on four corners, pressed askew on ground that turns."""
     places = np.array([(x, y, -0.02) for x in (-0.05, 0.05) for y in (-0.04, 0.04)])
