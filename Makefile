@@ -14,10 +14,15 @@ BENCHMARKS := integrator+a+b+b2+c+d integrator+a+b+c+--tight integrator+--inline
   continuation harmonic ensemble nonsmooth bodies solids contact_kernels laws sweep output \
   eigen eigen+--solids+cube eigen+--solids+150000+plate reduction+1 reduction+--solid
 
-# Processor that kernels are compiled for, kernels of OpenBLAS, and tests to run, for test-variant.
-CPU   := haswell
-BLAS  := Haswell
+# For test-variant: processor that kernels are compiled for (none: this one), kernels of OpenBLAS,
+# "plain" for a C library and NumPy without vector instructions, and the tests to run (none: all).
+CPU   :=
+BLAS  := Nehalem
+LIBS  := plain
 TESTS :=
+# Tests of what hangs on rounding most, which test-slow repeats as such a variant.
+ROUNDED := $(addprefix tests/bifurcation/test_,sharpening.py codim2_forms.py \
+  codim2_orbit_forms.py codim2_switching.py fields_without_values.py)
 
 # Tests start many processes, and pytest rewrites their files: what Python keeps of this saves time.
 export PYTHONDONTWRITEBYTECODE :=
@@ -44,10 +49,18 @@ test: $(READY) $(ALL) $(SYSTEM) ## run all tests but the slow ones
 
 test-slow: $(READY) $(ALL) $(SYSTEM) ## run documents and examples, and what takes a minute or more
 	@$(BIN)/python -m pytest -q -n auto -m slow
+	@$(MAKE) --no-print-directory test-variant TESTS="$(ROUNDED)"
 
-test-variant: $(READY) $(SYSTEM) ## all tests as on another processor: CPU=haswell BLAS=Haswell
-	@NUMBA_CPU_NAME=$(CPU) NUMBA_CPU_FEATURES= OPENBLAS_CORETYPE=$(BLAS) \
-	  NUMBA_CACHE_DIR=$(CURDIR)/build/kernels-$(CPU) $(BIN)/python -m pytest -q -n auto $(TESTS)
+test-variant: $(READY) $(ALL) $(SYSTEM) ## all tests as on another processor: CPU=haswell BLAS=Haswell
+	@if [ -n "$(CPU)" ]; then \
+	  export NUMBA_CPU_NAME=$(CPU) NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR=$(CURDIR)/build/kernels-$(CPU); \
+	fi; \
+	if [ "$(LIBS)" = plain ]; then \
+	  export GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable; \
+	  export NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c \
+	    'from numpy._core._multiarray_umath import __cpu_dispatch__ as names; print(*names)')"; \
+	fi; \
+	OPENBLAS_CORETYPE=$(BLAS) $(BIN)/python -m pytest -q -n auto $(TESTS)
 
 check: $(READY) ## ruff and mypy
 	@$(BIN)/ruff check .
