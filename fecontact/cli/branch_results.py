@@ -1,9 +1,7 @@
 """Results of the command ``branch``: files, tables and plots."""
 
-import csv
-import io
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +15,7 @@ from fecontact.bifurcation.continuation.points import (
 )
 from fecontact.cli.console import echo
 from fecontact.core.files.atomic_write import write_text
+from fecontact.core.files.csv_text import csv_text
 from fecontact.output.files.branches import write_branches
 
 if TYPE_CHECKING:
@@ -83,13 +82,11 @@ def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any
 
 def branches_csv(branches: Mapping[str, Branch]) -> str:
     """All points of branches as CSV, special points with their kind."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_COLUMNS)
+    rows: list[Sequence[Any]] = [_COLUMNS]
     for name, branch in branches.items():
         for point in branch.points:
             values, period = point.values, _period(point)
-            writer.writerow([
+            rows.append([
                 name, point.kind or "", repr(point.parameter), int(values["stable"]),
                 int(values["unstable"]), "" if period is None else repr(period),
                 "" if period is None else repr(1.0 / period),
@@ -98,7 +95,7 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
                 point.criticality or "",
                 "" if math.isnan(point.parameter_error) else repr(point.parameter_error),
                 repr(float(values["state_error"])) if "state_error" in values else ""])
-    return text.getvalue()
+    return csv_text(rows)
 
 
 def special_table(branch: Branch, usable_hz: float = math.inf) -> Any:

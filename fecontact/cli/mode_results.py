@@ -1,12 +1,11 @@
 """Nonlinear modes of ``fecontact modes --nonlinear``: files, table and plots."""
 
-import csv
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, show, waiting
 from fecontact.core.errors import InputError
+from fecontact.core.files.csv_text import csv_text
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
@@ -126,19 +125,15 @@ def write_mode_results(
 
 def mode_csv(mode: "NonlinearMode") -> str:
     """All points of a nonlinear mode as CSV, in SI units."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_COLUMNS)
     energy, stable = mode.energy, mode.stable
-    for place, point in enumerate(mode.branch.points):
-        writer.writerow([
-            point.kind or "",
-            *(repr(float(column[place])) for column in (
-                mode.amplitude, mode.frequency, mode.damping_ratio, mode.loss)),
-            "" if energy is None else repr(float(energy[place])),
-            "" if stable is None else int(stable[place]),
-            repr(float(point.values["truncation_error"]))])
-    return text.getvalue()
+    return csv_text([_COLUMNS, *([
+        point.kind or "",
+        *(repr(float(column[place])) for column in (
+            mode.amplitude, mode.frequency, mode.damping_ratio, mode.loss)),
+        "" if energy is None else repr(float(energy[place])),
+        "" if stable is None else int(stable[place]),
+        repr(float(point.values["truncation_error"]))]
+        for place, point in enumerate(mode.branch.points))])
 
 
 def mode_table(mode: "NonlinearMode") -> Any:

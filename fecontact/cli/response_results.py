@@ -1,8 +1,7 @@
 """Results of the command ``response``: files, tables and plots."""
 
-import csv
-import io
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.files.atomic_write import write_text
+from fecontact.core.files.csv_text import csv_text
 from fecontact.output.files.branches import write_response
 
 if TYPE_CHECKING:
@@ -51,15 +51,13 @@ def write_response_results(
 
 def response_csv(response: FrequencyResponse) -> str:
     """All points of a response as CSV, special points with their kind; SI units, phases in rad."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_COLUMNS)
+    rows: list[Sequence[Any]] = [_COLUMNS]
     for level, branch in enumerate(response.branches):
         first, phase = np.abs(response.harmonic(1, level)), response.phase(level)
         third = _third(response, level)
         for place, point in enumerate(branch.points):
             values = point.values
-            writer.writerow([
+            rows.append([
                 "" if response.level_name is None else repr(float(response.levels[level])),
                 point.kind or "", repr(point.parameter), repr(1.0 / float(values["period"])),
                 int(values["stable"]) if "stable" in values else "",
@@ -68,7 +66,7 @@ def response_csv(response: FrequencyResponse) -> str:
                 repr(float(first[place])), repr(float(phase[place])), third[place],
                 repr(float(values["truncation_error"])),
                 "" if math.isnan(point.parameter_error) else repr(point.parameter_error)])
-    return text.getvalue()
+    return csv_text(rows)
 
 
 def _stability(point: "BranchPoint") -> str:

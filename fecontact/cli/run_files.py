@@ -115,11 +115,10 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
 
 def write_preload(study: "Study", history: "LoadHistory", folder: Path) -> list[Path]:
     """Write table and plots of quasi-static loading into a folder; returns the files."""
-    from io import StringIO
-
     import numpy as np
 
     from fecontact.core.files.atomic_write import write_text
+    from fecontact.core.files.csv_text import csv_text
     from fecontact.output.plots.preload import plot_loop, plot_shear
 
     # Of solids along both tangents.
@@ -131,12 +130,11 @@ def write_preload(study: "Study", history: "LoadHistory", folder: Path) -> list[
              "state": history.contact_state}
     columns = ["point", *("travel_m", "travel_y_m")[: len(tangents)], "work_J", "loss_J",
                *(f"{kind}_{j}" for kind in kinds for j in range(history.slip.shape[1]))]
-    text = StringIO()
-    np.savetxt(text, np.column_stack([np.arange(len(history)), history.travels, history.work,
-                                      history.loss, *kinds.values()]),
-               delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+    values = np.column_stack([np.arange(len(history)), history.travels, history.work, history.loss,
+                              *kinds.values()])
+    text = csv_text([columns, *([f"{value:.12g}" for value in row] for row in values.tolist())])
     files = [folder / f"{study.name}-preload.csv", folder / f"{study.name}-shear.png"]
-    write_text(files[0], text.getvalue())
+    write_text(files[0], text)
     plot_shear(history, path=files[1])
     if history.status == "finished":
         files.append(folder / f"{study.name}-loop.png")

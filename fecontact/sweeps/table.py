@@ -1,7 +1,6 @@
 """Table of a sweep: parameters and summaries of all cases, in memory and as CSV."""
 
 import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 
 from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, MissingLibraryError, choices, nearest
+from fecontact.core.files.csv_text import csv_text, read_cell
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, html_table, listed, span
 from fecontact.sweeps.store import write_whole
@@ -198,14 +198,12 @@ class SweepTable(Summarised):
         Numbers are written with all digits and read back exactly. Strobed displacements go to
         ``NAME-strobed.csv``, one line per case.
         """
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([*_BEFORE, *self.parameters, *self.values, *_AFTER])
         columns = [*self.parameters.values(), *(column.tolist() for column in self.values.values())]
-        for k, (key, reason) in enumerate(zip(self.keys, self.reasons, strict=True)):
-            writer.writerow([k, key, *(_text(column[k]) for column in columns), _status(reason),
-                             reason or "", self.warnings[k] if self.warnings else ""])
-        write_whole(Path(path), text.getvalue())
+        rows = ([k, key, *(_text(column[k]) for column in columns), _status(reason), reason or "",
+                 self.warnings[k] if self.warnings else ""]
+                for k, (key, reason) in enumerate(zip(self.keys, self.reasons, strict=True)))
+        head = [*_BEFORE, *self.parameters, *self.values, *_AFTER]
+        write_whole(Path(path), csv_text([head, *rows]))
         if self.strobed is not None:
             lines = "".join(f"{k},{','.join(map(_text, row))}\n"
                             for k, row in enumerate(self.strobed.tolist()))
@@ -244,7 +242,7 @@ def read_table(path: str | Path) -> SweepTable:
     require_regular_file(path, "a table")
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            head, *rows = csv.reader(file)
+            head, *rows = ([read_cell(cell) for cell in row] for row in csv.reader(file))
         first = head.index("status")
         # Parameter names contain dots, except 'gap'; summaries have none before an '@'.
         parameters = [name for name in head[2:first] if _is_parameter(name)]

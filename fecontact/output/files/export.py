@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.files.atomic_write import replaced
+from fecontact.core.files.csv_text import csv_text
 from fecontact.fem.fields import BodyFields
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.dataset import columns, coordinates, to_xarray, variables
@@ -36,7 +37,7 @@ def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
 
     def write(part: Path) -> None:
         with part.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(",".join(f'"{name}"' if "," in name else name for name in table) + "\n")
+            file.write(csv_text([list(table)]))
             for first in range(0, len(trajectory.time), 1000):
                 rows = np.column_stack([values[first : first + 1000] for values in table.values()])
                 # Shortest decimals that read back exactly.
