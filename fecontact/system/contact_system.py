@@ -24,6 +24,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
 from fecontact.system.arrays import excited, system_arrays
+from fecontact.system.elastic_sliders import exact_arrays, slider_counts
 from fecontact.system.friction_memory import bristle_history, memory_scales, velocity_scale
 from fecontact.system.gap import Gap, gap_values
 from fecontact.system.interfaces import (
@@ -338,15 +339,23 @@ class ContactSystem(Summarised):
             self.drive, self.load, np.asarray(self.gap, dtype=float), self.prescribed_motion)
 
     def rhs(self, t: float, y: Array) -> Array:
-        """Rate y' (2 m + n s,) of the state y = [q, q', z]."""
+        """Rate y' (2 m + n s,) of the state y = [q, q', z].
+
+        Deflections z of elastic Coulomb elements (Jenkins, Iwan) follow the slip velocity, also
+        beyond their limits; their forces are k z, at most mu F. What z exceeds its limit by is the
+        distance that the element has slid. :func:`fecontact.simulate` returns z to the limit where
+        slip ends; an integrator of your own has to do so after each step.
+        """
         out = np.empty(self.size)
-        kernels.right_hand_side(float(t), self._checked(y), self.arrays, out)
+        arrays = exact_arrays(self.arrays, slider_counts(self))
+        kernels.right_hand_side(float(t), self._checked(y), arrays, out)
         return out
 
     def jacobian(self, t: float, y: Array) -> Array:
-        """Jacobian dy'/dy (2 m + n s, 2 m + n s)."""
+        """Jacobian dy'/dy (2 m + n s, 2 m + n s) of :meth:`rhs`."""
         out = np.empty((self.size, self.size))
-        contact_jacobian.jacobian(float(t), self._checked(y), self.arrays, out)
+        arrays = exact_arrays(self.arrays, slider_counts(self))
+        contact_jacobian.jacobian(float(t), self._checked(y), arrays, out)
         return out
 
     def contact_history(self, times: Array, states: Array) -> Array:

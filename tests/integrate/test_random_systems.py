@@ -45,3 +45,15 @@ def test_errors_at_the_default_tolerance(systems):
         wanted = systems.reference(case, times)
         run = systems.fc.simulate(case.system, times[-1], initial=case.state, outputs=times)
         assert systems.distance(case, run.states, wanted) < 1e-4, number
+
+
+@pytest.mark.parametrize("number", [8, 9, 10, 23, 24])
+def test_elastic_elements(systems, number):
+    """Jenkins' and Iwan's elements, in the plane and in space: reference, and runs against it."""
+    case = systems.random_case(number)
+    assert case.names[1] in ("jenkins", "iwan", "four-parameter-iwan")
+    times = np.linspace(0.0, 0.25 * case.end, 51)
+    wanted = systems.reference(case, times)
+    assert systems.distance(case, systems.reference(case, times, tolerance=1e-9), wanted) < 1e-6
+    run = systems.fc.simulate(case.system, times[-1], initial=case.state, outputs=times, rtol=1e-8)
+    assert systems.distance(case, run.states, wanted) < 1e-5
