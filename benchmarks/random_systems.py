@@ -3,8 +3,8 @@
 One to three modes, one or two contact nodes, in the plane and in space; each normal law with each
 friction law in turn; ground that rests, creeps, slides or is wavy; start at a random place. The
 equations of the reference are written here in plain Python from the formulas of the documentation,
-and integrated by DOP853 at a tolerance of 1e-12, with steps that end where slip of an elastic Coulomb
-element ends. Seeds are fixed: system NUMBER is always the same.
+and integrated by DOP853 at a tolerance of 1e-12, with steps that end where slip of an elastic
+Coulomb element ends. Seeds are fixed: system NUMBER is always the same.
 
 An error is the largest difference of a modal displacement from the reference, over the range of
 that mode, at 201 output times. Listed besides: the difference between runs of two lengths, between
@@ -46,7 +46,8 @@ FRICTION = list(law_names()[laws.FrictionLaw])
 # Time constant of memory that fades without force [s].
 FADING = 1e-7
 # Parts of a step at which excesses over limits are compared, parts of the largest deflection that
-# an excess may fall unnoticed; shortest step that is divided, and longest, over the time of the run.
+# an excess may fall unnoticed; shortest step that is divided, and longest step, over the time of
+# the run.
 LOOKS, FALL, SHORTEST, LONGEST = 8, 1e-13, 1e-13, 5e-5
 
 (UNIFORM, PARABOLIC, COSINE, GAUSSIAN, MEASURED, LINEAR, POWER, EXPONENTIAL, GREENWOOD, STOP,
@@ -207,8 +208,8 @@ def memory_friction(kind, v, F, z, p, R, rate):
 @numba.njit(cache=True)
 def pressed(t, y, model, j, slip):
     """Fill the slip velocities (d,) of node j; returns its normal force and the ground's slope."""
-    (w, _, _, _, _, _, _, _, along, away, speed, height, number, normal, normal_p, knots, curve, _, _,
-     _) = model
+    (w, _, _, _, _, _, _, _, along, away, speed, height, number, normal, normal_p, knots, curve,
+     _, _, _) = model
     m, d = len(w), along.shape[1]
     q, rate = y[:m], y[m : 2 * m]
     place, u, v = -speed[0] * t, 0.0, 0.0
@@ -229,8 +230,8 @@ def pressed(t, y, model, j, slip):
 @numba.njit(cache=True)
 def equations(t, y, model, out):
     """Rates of the state y = [q, q', z]."""
-    (w, damping, B, stiffness, dashpot, amplitude, omega, load, along, away, speed, height, number,
-     normal, normal_p, knots, curve, friction, friction_p, states) = model
+    (w, damping, B, stiffness, dashpot, amplitude, omega, load, along, away, _, _, _, _, _, _, _,
+     friction, friction_p, states) = model
     m, (n, d, _) = len(w), along.shape
     q, rate = y[:m], y[m : 2 * m]
     for i in range(m):
