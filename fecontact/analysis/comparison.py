@@ -1,13 +1,14 @@
 """Comparison of runs: parameters that differ, and key numbers side by side."""
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from fecontact.analysis.key_numbers import KeyNumbers, key_numbers
 from fecontact.analysis.summaries import Point
 from fecontact.core.checks import require_kind
+from fecontact.core.dotted_parameters import flattened
 from fecontact.core.errors import InputError
 from fecontact.core.units import quantity
 from fecontact.integrate.trajectory import Trajectory
@@ -106,7 +107,7 @@ def require_runs(what: str, runs: Mapping[str, Trajectory]) -> None:
 
 def differing_parameters(studies: Sequence[str | None]) -> dict[str, tuple[str, ...]]:
     """Dotted keys of studies (TOML text) that differ, with their values as text."""
-    tables = [dict(_flat(tomllib.loads(study or ""))) for study in studies]
+    tables = [_texts(tomllib.loads(study or "")) for study in studies]
     keys = dict.fromkeys(key for table in tables for key in table)
     found = {key: tuple(table.get(key, "") for table in tables) for key in keys}
     return {key: tuple(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
@@ -114,11 +115,8 @@ def differing_parameters(studies: Sequence[str | None]) -> dict[str, tuple[str, 
             for key, values in found.items() if len(set(values)) > 1}
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    for key, value in table.items():
-        if not prefix and key in _NOT_COMPARED:
-            continue
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", f"{value:.10g}" if isinstance(value, float) else str(value)
+def _texts(study: Mapping[str, Any]) -> dict[str, str]:
+    """Values of the sections that are compared, as text by dotted keys."""
+    compared = {name: table for name, table in study.items() if name not in _NOT_COMPARED}
+    return {key: f"{value:.10g}" if isinstance(value, float) else str(value)
+            for key, value in flattened(compared).items()}

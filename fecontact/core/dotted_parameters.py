@@ -22,6 +22,17 @@ def parameters_of(whole: Any, prefix: str = "") -> dict[str, Any]:
     return result
 
 
+def flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values of nested tables by dotted names."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            found |= flattened(value, f"{prefix}{key}.")
+        else:
+            found[f"{prefix}{key}"] = value
+    return found
+
+
 def with_parameters(whole: Any, changes: Mapping[str, Any]) -> Any:
     """Copy with some values or parts replaced, by their dotted names.
 

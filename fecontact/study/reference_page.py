@@ -25,7 +25,7 @@ to be given.
 """
 
 
-def study_keys(section: str | None = None) -> str:
+def study_keys(section: str | None = None, more: Mapping[str, str] | None = None) -> str:
     """List the sections of study files and their keys as Markdown.
 
     Parameters
@@ -33,6 +33,8 @@ def study_keys(section: str | None = None) -> str:
     section : str, optional
         A single section, such as ``ground`` or ``ground.profile``, or a word: of all sections the
         keys whose names, meanings or laws have it, like ``roughness``. All keys by default.
+    more : mapping of section to str, optional
+        Paragraphs in Markdown that end a section.
 
     Raises
     ------
@@ -40,6 +42,8 @@ def study_keys(section: str | None = None) -> str:
         If there is neither such a section nor such a key; the message lists the sections.
     """
     parts = dict(_parts())
+    for name, text in (more or {}).items():
+        parts[name] += f"\n{text}\n"
     if section is None:
         return "\n".join([_HEAD, *parts.values()]).rstrip() + "\n"
     name = section.strip("[]")

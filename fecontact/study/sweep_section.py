@@ -8,6 +8,7 @@ from types import NoneType
 from typing import Annotated, Any, Literal
 
 from fecontact.core.checks import require_kind
+from fecontact.core.dotted_parameters import flattened
 from fecontact.core.errors import InputError, choices, require_positive
 from fecontact.core.units import Unit
 
@@ -173,6 +174,9 @@ class SweepSettings:
     axes : mapping of dotted name to Span, Distribution or list of values
         ``[sweep.axes]``: the varied parameters, by their dotted keys in the study file, such as
         ``ground.speed = [0.1, 0.2]``.
+    cases : list of tables, optional
+        ``[[sweep.cases]]``: the cases themselves, each with the same dotted keys and one value for
+        each; in place of axes.
     method : str
         'grid': all combinations; 'list': the first values of all axes, then the second ones, ...;
         sampling: 'random', 'latin-hypercube', 'sobol' (a low-discrepancy sequence);
@@ -183,8 +187,7 @@ class SweepSettings:
     seed : int
         Seed of the random samples; equal seeds give equal samples.
     summaries : list
-        Names of the numbers stored for each case, see :mod:`fecontact.sweeps.summaries`;
-        'FILE.py:FUNCTION' for a function of your own.
+        Names of the numbers stored for each case; 'FILE.py:FUNCTION' for a function of your own.
     t_start : float, optional
         Start of the interval that summaries evaluate [s]; the whole run by default.
     keep : 'none', 'histories' or 'fields'
@@ -198,6 +201,7 @@ class SweepSettings:
     """
 
     axes: Mapping[str, Axis] = field(default_factory=dict)
+    cases: tuple[Mapping[str, Value], ...] = ()
     method: Literal["grid", "list", "random", "latin-hypercube", "sobol", "sensitivity"] = "grid"
     samples: int | None = None
     seed: int = 0
@@ -209,6 +213,7 @@ class SweepSettings:
 
     def __post_init__(self) -> None:
         require_kind("SweepSettings", Mapping, axes=self.axes)
+        self._require_alike()
         for name, count in (("samples", self.samples), ("batch", self.batch)):
             if count is not None and count < 1:
                 raise InputError(f"SweepSettings: {name} = {count} must be at least 1.")
@@ -223,12 +228,38 @@ class SweepSettings:
         if self.t_start is not None and not math.isfinite(self.t_start):
             raise InputError(f"SweepSettings: t_start = {self.t_start!r} must be finite.")
 
+    def _require_alike(self) -> None:
+        """Raise InputError unless all cases have the same keys, and there are no axes besides."""
+        if not self.cases:
+            return
+        if self.axes:
+            raise InputError("SweepSettings: cases are listed and axes span them; give one of "
+                             "both.")
+        if self.method not in ("grid", "list"):
+            raise InputError(f"SweepSettings: method = '{self.method}' draws cases from axes; "
+                             f"leave it out where cases are listed.")
+        for number, case in enumerate(self.cases):
+            require_kind("SweepSettings", Mapping, cases=case)
+            if not case:
+                raise InputError(f"SweepSettings: case {number} has no key; give all cases the "
+                                 f"same keys, at least one.")
+            if different := set(case) ^ set(self.cases[0]):
+                raise InputError(f"SweepSettings: cases 0 and {number} differ in the keys "
+                                 f"{choices(sorted(different))}; give all cases the same "
+                                 f"keys.")
+
 
 def flat_axes(table: Any) -> Any:
-    """``[sweep]`` with axes by dotted names, which TOML may have read as nested tables."""
-    if not isinstance(table, Mapping) or not isinstance(table.get("axes"), Mapping):
+    """``[sweep]`` with dotted names in axes and cases, which TOML may read as nested tables."""
+    if not isinstance(table, Mapping):
         return table
-    return {**table, "axes": dict(_leaves(table["axes"], ""))}
+    found = dict(table)
+    if isinstance(table.get("axes"), Mapping):
+        found["axes"] = dict(_leaves(table["axes"], ""))
+    if isinstance(table.get("cases"), list | tuple):
+        found["cases"] = [flattened(case) if isinstance(case, Mapping) else case
+                          for case in table["cases"]]
+    return found
 
 
 def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fecontact import __version__
+from fecontact.core.dotted_parameters import flattened
 from fecontact.core.errors import InputError
 from fecontact.core.tables import shown
 from fecontact.study.study import Study
@@ -59,18 +60,8 @@ def case_keys(
 
 def flat(study: Study) -> dict[str, Any]:
     """Resolved study by dotted names, without keys that do not affect the run."""
-    return dict(_leaves({section: table for section, table in study.tables().items()
-                         if section not in _NOT_OF_THE_RUN}, ""))
-
-
-def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            found += _leaves(value, f"{prefix}{key}.")
-        else:
-            found.append((f"{prefix}{key}", value))
-    return found
+    return flattened({section: table for section, table in study.tables().items()
+                      if section not in _NOT_OF_THE_RUN})
 
 
 def _converter(

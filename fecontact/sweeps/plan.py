@@ -43,10 +43,14 @@ def plan(settings: SweepSettings) -> Plan:
     InputError
         If there are no axes, an axis is empty, or the axes do not suit the method.
     """
-    axes = settings.axes
+    axes, method = settings.axes, settings.method
+    if settings.cases:
+        # A list of cases is the list of the values on each axis.
+        method = "list"
+        axes = {name: tuple(case[name] for case in settings.cases) for name in settings.cases[0]}
     if not axes:
-        raise InputError("[sweep] has no axes; name the parameters that change and their values, "
-                         "like ground.speed = [0.1, 0.2] in [sweep.axes].")
+        raise InputError("[sweep] has no axes and no cases; name the parameters that change and "
+                         "their values, like ground.speed = [0.1, 0.2] in [sweep.axes].")
     for name, axis in axes.items():
         if isinstance(axis, tuple) and not axis:
             raise InputError(f"[sweep.axes]: {name} has no values; give at least one.")
@@ -54,10 +58,10 @@ def plan(settings: SweepSettings) -> Plan:
             raise InputError(f"[sweep.axes]: {name} has count = {shown_count(axis.count)} values; "
                              f"at most {_MOST:,} are possible.")
     names = tuple(axes)
-    if settings.method in ("grid", "list"):
-        given = [_values(name, axis, settings.method) for name, axis in axes.items()]
+    if method in ("grid", "list"):
+        given = [_values(name, axis, method) for name, axis in axes.items()]
         counts = tuple(len(values) for values in given)
-        if settings.method == "list":
+        if method == "list":
             if len(set(counts)) > 1:
                 lengths = ", ".join(f"{name} has {count}" for name, count in
                                     zip(names, counts, strict=True))

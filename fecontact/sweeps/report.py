@@ -1,7 +1,7 @@
 """The report of a sweep: a page with a map whose cells show their case."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,8 @@ from fecontact.sweeps.table import SweepTable, is_numeric
 
 
 def report_sweep(
-    table: SweepTable, path: str | Path, *, title: str | None = None, study: str | None = None
+    table: SweepTable, path: str | Path, *, title: str | None = None, study: str | None = None,
+    command: Callable[[int], str] | None = None,
 ) -> Path:
     """Write a sweep as one HTML file with a map of its cases; a click on a cell shows its case.
 
@@ -37,6 +38,8 @@ def report_sweep(
         Heading; the name of the file by default.
     study : str, optional
         The study, as TOML text.
+    command : callable, optional
+        Command line that runs the case of a number alone; see :meth:`SweepTable.command`.
 
     Returns
     -------
@@ -70,8 +73,10 @@ def report_sweep(
         "told": "; ".join(f"{column['title']}: {', '.join(f'{k} {one}' for k, one in marked)}"
                           for column, labels in zip(columns, names, strict=True)
                           if labels and (marked := list(enumerate(labels)))),
-        "headings": ["case", *table.parameters, *table.values, "failed because", "warning"],
-        "rows": [_row(table, case) for case in range(len(table))],
+        "headings": ["case", *table.parameters, *table.values, "failed because", "warning",
+                     "run it alone"],
+        "rows": [[*_row(table, case), "" if command is None else command(case)]
+                 for case in range(len(table))],
         "shades": colour_maps()["displacement"],
         "study": study_tables(study),
         "versions": list(map(list, library_versions().items())),

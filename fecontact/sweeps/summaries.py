@@ -69,6 +69,20 @@ def functions_for(
     return {name: _function(name, folder or Path(), known) for name in names}
 
 
+def summaries_table() -> str:
+    """Names, units and meanings of all summaries, as a table in Markdown."""
+    rows = []
+    for name, one in SUMMARIES.items():
+        known = inspect.signature(one.function).parameters
+        also = " or ".join(f"`{name}@{what.upper()}`" for what, key in (
+            ("point", "point"), ("interface", "face")) if key in known)
+        meaning = one.text.replace("``", "`") + (f" Also {also}." if also else "")
+        rows.append(f"| `{name}` | {one.unit} | {meaning} |")
+    return "\n".join(["Numbers that `summaries` may name; POINT is a named point or the number of "
+                      "a contact node, B by default:", "", "| summary | unit | meaning |",
+                      "|---|---|---|", *rows])
+
+
 def unit_of(name: str) -> str:
     """Unit of a summary; empty for dimensionless summaries and user functions."""
     found = SUMMARIES.get(name.partition("@")[0])

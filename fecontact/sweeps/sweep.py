@@ -60,7 +60,8 @@ def sweep(
         The study that all cases share.
     axes : mapping, optional
         Parameters by dotted names, each with a list of values, a :class:`fecontact.study.Span` or a
-        :class:`fecontact.study.Distribution`; by default those of ``[sweep.axes]``.
+        :class:`fecontact.study.Distribution`; by default those of ``[sweep.axes]``. ``cases``
+        lists the cases themselves instead: ``sweep(study, cases=[{"ground.speed": 0.1}])``.
     executor : concurrent.futures.Executor, optional
         Runs the batches: threads, the executor of a Dask client, of mpi4py.futures or executorlib;
         by default processes on this machine.
@@ -213,7 +214,11 @@ def _settings(
     table: dict[str, Any] = {entry.name: getattr(given, entry.name)
                              for entry in fields(given) if getattr(given, entry.name) is not None}
     table |= {name: plain(value) for name, value in changes.items() if value is not None}
+    # Cases given here replace the axes of the study, and axes its cases.
+    if "cases" in changes:
+        table["axes"] = {}
     if axes is not None:
+        table |= {} if "cases" in changes else {"cases": ()}
         table["axes"] = {name: list(axis) if isinstance(axis, range) else axis
                          for name, axis in axes.items()}
     if table.get("strobe") is not None and "summaries" not in changes:

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -98,6 +99,15 @@ class SweepTable(Summarised):
     def changes(self, case: int) -> dict[str, Any]:
         """Changes of a case to the study, for ``study.with_(**table.changes(3)).run()``."""
         return {name: values[case] for name, values in self.parameters.items()}
+
+    def command(self, case: int, study: str | Path, *changes: str) -> str:
+        """Command line that runs a case alone, ``fecontact run study.toml --set ground.speed=0.1``.
+
+        ``changes`` are further assignments, such as those that the sweep was started with.
+        """
+        own = [f"{name}={_text(value)}" for name, value in self.changes(case).items()]
+        return shlex.join(["fecontact", "run", str(study), *(
+            word for one in (*changes, *own) for word in ("--set", one))])
 
     def file(self, case: int) -> Path:
         """Path of the file of a case, for a sweep that keeps files."""

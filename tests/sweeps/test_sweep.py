@@ -372,7 +372,7 @@ def test_progress_is_told(study, tmp_path):
     ({"ground.spede": [1.0]}, {}, r"\[ground\] has no key 'spede' \(did you mean 'speed'\?\)"),
     ({"grund.speed": [1.0]}, {}, r"'grund' \(did you mean 'ground'\?\)"),
     ({"ground.speed": []}, {}, "ground.speed has no values; give at least one"),
-    ({}, {}, "has no axes; name the parameters that change"),
+    ({}, {}, "has no axes and no cases; name the parameters"),
     ({"ground.speed": 1.0}, {}, "ground.speed = 1.0 must be a table of start, end"),
     ({"ground.speed": Span(0.1, 1.0)}, {}, "lacks the key 'count'"),
     ({"ground.speed": [1.0, 2.0], "friction.decay": [1.0]}, {"method": "list"},

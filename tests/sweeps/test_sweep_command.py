@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ from sweep_study import Serial, write_study
 
 from fecontact import InputError, sweep
 from fecontact.cli.commands import sweep as command
+from fecontact.cli.run_files import read_study
 from fecontact.core.progress import clock
 from fecontact.io import read_table
 from fecontact.plot import plot_sobol, plot_sweep
@@ -56,9 +58,10 @@ def test_a_sweep_of_a_study_file(cli, tmp_path):
     code, out, err = cli("sweep", study, "--set", "simulation.t_end=0.05")
     assert code == 0
     assert "24 cases, 8 failed" in out
-    assert re.search(r"amplitude_x \[m\] +\d\.\d+e-05", out)
+    assert re.search(r"amplitude_x \[µm\] +\d\d", out)
     assert err == ("failed: cases 2, 5, 8, 11, 14, 17, 20, 23: ZeroDivisionError: a case that "
-                   "fails\n")
+                   f"fails\n  case 2 alone: fecontact run {study} --set simulation.t_end=0.05 "
+                   f"--set ground.speed=0.001 --set friction.static_coefficient=0.8\n")
     assert f"wrote {folder}/index.csv" in out
     assert {path.name for path in folder.glob("*.png")} == {
         "amplitude_x.png", "stick_fraction.png", "own-py-failing.png"}
@@ -68,6 +71,35 @@ def test_a_sweep_of_a_study_file(cli, tmp_path):
                    f"with --overwrite (overwrite=True), or choose another folder.\n")
     assert cli("sweep", study, "--set", "simulation.t_end=0.05", "--resume")[0] == 0
     assert len(read_table(folder / "index.csv")) == 24
+
+
+def test_cases_are_printed_with_the_command_that_runs_each(cli, tmp_path):
+    """The printed command runs the very case: its study has the values of the case."""
+    study = write_study(tmp_path, """
+[sweep]
+summaries = ["amplitude_x", "own.py:failing"]
+[[sweep.cases]]
+ground.speed = 1e-3
+friction.static_coefficient = 0.5
+[[sweep.cases]]
+ground.speed = 2e-3
+friction.static_coefficient = 0.9
+""")
+    assert cli("sweep", study, "--set", "simulation.t_end=0.05")[0] == 0
+    code, out, _ = cli("sweep", study, "--cases", "failed")
+    assert code == 0
+    case, command = out.splitlines()
+    assert case == "case 1: ZeroDivisionError: a case that fails"
+    words = shlex.split(command)
+    assert words[:3] == ["fecontact", "run", str(study)]
+    found = read_study(Path(words[2]), words[4::2])
+    assert (found.ground.speed, found.friction.static_coefficient) == (2e-3, 0.9)
+    first = cli("sweep", study, "--cases", "0")[1]
+    assert re.match(r"case 0: amplitude_x = \d[\d.]* .?m, own.py:failing = 1\n  fecontact run",
+                    first)
+    code, _, err = cli("sweep", study, "--cases", "0,2")
+    assert code == 1
+    assert "numbers of cases from 0 to 1, like 3,17" in err
 
 
 def test_drawn_samples_show_statistics_and_sensitivities(cli, tmp_path):
@@ -83,7 +115,7 @@ samples = 16
     study = write_study(tmp_path, axes)
     code, out, _ = cli("sweep", study, "-o", tmp_path / "a")
     assert code == 0
-    assert re.search(r"friction_power \[W\] +mean +-?\d\S* +-?\d\S* \.\.\. -?\d\S* *\n +std", out)
+    assert re.search(r"friction_power \[\S?W\] +mean +-?\d\S* +-?\d\S* \.\.\. -?\d\S* *\n +std", out)
     code, out, _ = cli("sweep", study, "-o", tmp_path / "b", "--set", "sweep.method=sensitivity")
     assert code == 0
     assert "64 cases, 0 failed" in out
@@ -111,7 +143,7 @@ friction.static_coefficient = [0.8, 0.9]
     code, out, err = cli("sweep", all_fail)
     assert code == 1
     assert "2 cases, 2 failed" in out
-    assert err == "failed: cases 0, 1: ZeroDivisionError: a case that fails\n"
+    assert err.startswith("failed: cases 0, 1: ZeroDivisionError: a case that fails\n")
 
 
 def test_ctrl_c_says_how_to_go_on(cli, tmp_path, monkeypatch):

@@ -40,7 +40,7 @@ def test_cases_are_those_of_the_table(tmp_path):
     assert cases[1]["warning"] == "far"
     assert cases[2] == {"case": "2", "ground.speed": "0.01", "friction.law": "exponential",
                         "amplitude_x": "30 µm", "stick_fraction": "0.4", "failed because": "",
-                        "warning": ""}
+                        "warning": "", "run it alone": ""}
     assert cases[3]["failed because"] == EVIL
     assert cases[5]["failed because"] == "not computed"
 

@@ -9,6 +9,11 @@ from fecontact.study import Distribution, Span, SweepSettings
 from fecontact.sweeps.plan import frozen, plan
 
 D = Distribution
+STUDY = """
+geometry = { shape = "block" }
+body = { thickness = 0.1 }
+normal = { stiffness = 1e6, roughness_height = 1e-6 }
+"""
 
 
 def drawn(method, samples, seed=0, **axes):
@@ -28,6 +33,34 @@ def test_grids_and_lists():
     with pytest.raises(InputError, match="8,000,000,000 cases"):
         plan(SweepSettings(axes={name: Span(0.0, 1.0, 2000) for name in ("a", "b")} | {
             "c": Span(0.0, 1.0, 2000)}))
+
+
+def test_listed_cases():
+    """Each as it is written, in their order; dotted keys are nested tables in TOML."""
+    study = Study.from_toml(STUDY + """
+[[sweep.cases]]
+ground.speed = 0.1
+friction.law = "constant"
+[[sweep.cases]]
+friction.law = "exponential"
+ground.speed = 0.3
+""")
+    found = plan(study.sweep)
+    assert found.names == ("ground.speed", "friction.law")
+    assert found.rows == ((0.1, "constant"), (0.3, "exponential"))
+    assert found.shape is None
+    assert Study.from_toml(study.to_toml()).sweep == study.sweep
+
+
+@pytest.mark.parametrize(("settings", "message"), [
+    ({"cases": ({"a": 1.0}, {"b": 1.0})}, "cases 0 and 1 differ in the keys"),
+    ({"cases": ({"a": 1.0},), "axes": {"a": (1.0,)}}, "give one of both"),
+    ({"cases": ({"a": 1.0},), "method": "sobol"}, "'sobol' draws cases from axes"),
+    ({"cases": ({},)}, "give all cases the same keys, at least one"),
+])
+def test_listed_cases_that_cannot_be(settings, message):
+    with pytest.raises(InputError, match=message):
+        SweepSettings(**settings)
 
 
 @pytest.mark.parametrize(("axis", "mean", "std"), [

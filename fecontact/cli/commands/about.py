@@ -59,7 +59,8 @@ def keys(
 
     with loading():
         from fecontact.study.reference_page import study_keys
-    print(study_keys(section), end="")
+        from fecontact.sweeps.summaries import summaries_table
+    print(study_keys(section, {"sweep": summaries_table()}), end="")
 
 
 def demo(

@@ -1,7 +1,8 @@
 """The command ``sweep``: many cases of a study."""
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,6 +10,7 @@ from cyclopts import Parameter
 
 from fecontact.cli.console import echo, echo_written, note, show
 from fecontact.cli.options import Changes, StudyFile
+from fecontact.core.checks import whole_number
 from fecontact.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,6 +39,9 @@ def sweep(
     dask: Annotated[str | None, Parameter(
         help="Address of a running Dask scheduler, such as `tcp://node1:8786`.")]
     = None,
+    cases: Annotated[str | None, Parameter(
+        help="Run nothing, but print cases of a stored sweep with the command that runs each "
+        "alone: `failed`, `missing`, or numbers like `3,17`.")] = None,
 ) -> int:
     """Run many cases of a study on all cores or a cluster; write a table (index.csv), a page
     (index.html) and plots.
@@ -55,9 +60,20 @@ def sweep(
     from fecontact.sweeps.executors import dask_executor
     from fecontact.sweeps.sweep import sweep as run_sweep
 
+    folder = output or described.results / f"{described.name}-sweep"
+
+    def command(table: "SweepTable", case: int) -> str:
+        return table.command(case, study, *(set_ or ()))
+
+    if cases is not None:
+        from fecontact.sweeps.table import read_table
+
+        stored = read_table(folder / "index.csv")
+        for case in _chosen(stored, cases):
+            echo(_told(stored, case) + f"\n  {command(stored, case)}")
+        return 0
     with waiting("Compiling, once after an installation"):
         pass
-    folder = output or described.results / f"{described.name}-sweep"
     with contextlib.ExitStack() as stack:
         executor = None if dask is None else stack.enter_context(dask_executor(dask))
         try:
@@ -71,11 +87,41 @@ def sweep(
 
     with waiting("Writing"):
         page = report_sweep(table, folder / "index.html", title=described.name,
-                            study=described.to_toml())
-    return _report(table, described.sweep, folder, page)
+                            study=described.to_toml(), command=partial(command, table))
+    return _report(table, described.sweep, folder, page, partial(command, table))
 
 
-def _report(table: "SweepTable", settings: "SweepSettings", folder: Path, page: Path) -> int:
+def _chosen(table: "SweepTable", cases: str) -> list[int]:
+    """Numbers of the cases that ``failed``, are ``missing``, or are listed like ``3,17``."""
+    if cases in ("failed", "missing"):
+        return list(getattr(table, cases))
+    numbers = [whole_number(part) for part in cases.split(",")]
+    if any(number is None or not 0 <= number < len(table) for number in numbers):
+        raise InputError(f"--cases {cases} must be 'failed', 'missing', or numbers of cases from 0 "
+                         f"to {len(table) - 1}, like 3,17.")
+    return [number for number in numbers if number is not None]
+
+
+def _told(table: "SweepTable", case: int) -> str:
+    """Number of a case with its summaries, or the reason of its failure."""
+    reason = table.reasons[case]
+    if reason is None:
+        return f"case {case}: not computed"
+    if reason:
+        return f"case {case}: {reason}"
+    from fecontact.core.units import UNITS, quantity
+    from fecontact.sweeps.summaries import unit_of
+
+    values = [(name, float(values[case]), unit_of(name)) for name, values in table.values.items()]
+    return f"case {case}: " + ", ".join(
+        f"{name} = {quantity(value, unit, 4) if unit in UNITS else f'{value:.4g} {unit}'.strip()}"
+        for name, value, unit in values)
+
+
+def _report(
+    table: "SweepTable", settings: "SweepSettings", folder: Path, page: Path,
+    command: Callable[[int], str],
+) -> int:
     from fecontact.cli.console import waiting
 
     failed = table.failed
@@ -86,7 +132,7 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path, page: 
             for name in table.values:
                 with contextlib.suppress(InputError):  # too few base samples went well
                     show(_sensitivity_table(table, name, settings.seed))
-    _complain(failed)
+    _complain(failed, command)
     _warn({case: one for case, one in enumerate(table.warnings) if one})
     with waiting("Drawing"):
         pictures = _draw(table, settings, folder)
@@ -94,8 +140,8 @@ def _report(table: "SweepTable", settings: "SweepSettings", folder: Path, page: 
     return 1 if len(failed) == len(table) else 0
 
 
-def _complain(failed: Mapping[int, str]) -> None:
-    """Print one line for each reason of failure, with its first cases."""
+def _complain(failed: Mapping[int, str], command: Callable[[int], str]) -> None:
+    """Print each reason of failure with its first cases and the command that repeats one."""
     cases: dict[str, list[int]] = {}
     for case, reason in failed.items():
         cases.setdefault(reason, []).append(case)
@@ -103,6 +149,7 @@ def _complain(failed: Mapping[int, str]) -> None:
         few = ", ".join(f"{number}" for number in numbers[:_SHOWN])
         more = ", ..." if len(numbers) > _SHOWN else ""
         note(f"failed: case{'s' * (len(numbers) > 1)} {few}{more}: {reason}")
+        note(f"  case {numbers[0]} alone: {command(numbers[0])}")
     if len(cases) > _SHOWN:
         note(f"failed: for {len(cases) - _SHOWN} more reasons, see the table")
 
@@ -133,14 +180,17 @@ def _summary_table(table: "SweepTable", method: str) -> Any:
     import numpy as np
 
     from fecontact.cli.tables import table as make_table
+    from fecontact.core.units import UNITS, suitable_unit
     from fecontact.sweeps.statistics import statistics
     from fecontact.sweeps.summaries import unit_of
 
     rows: list[tuple[str, ...]] = []
     drawn = method not in ("grid", "list", "sensitivity")
     for name, values in table.values.items():
-        known = values[np.isfinite(values)]
-        unit = unit_of(name)
+        known, unit = values[np.isfinite(values)], unit_of(name)
+        if unit in UNITS and len(known):
+            factor, unit = suitable_unit(float(np.abs(known).max()), unit)
+            known = known / factor
         title = f"{name} [{unit}]" if unit else name
         if drawn and len(known) >= 3:
             rows += [(title if key == "mean" else "", key, f"{one.value:.4g}",
