@@ -17,6 +17,7 @@ from fecontact.cli.console import echo
 from fecontact.core.files.atomic_write import write_text
 from fecontact.core.files.csv_text import csv_text
 from fecontact.output.files.branches import write_branches
+from fecontact.reduction.report import beyond_basis
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
@@ -28,17 +29,18 @@ _BORN = {"supercritical": "stable orbits", "subcritical": "unstable orbits",
          "undecided": "orbits, stability undecided"}
 _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "period",
             "frequency_hz", "minimum", "maximum", "amplitude", "criticality", "parameter_error",
-            "state_error")
+            "state_error", "beyond_basis")
 
 
 def write_branch_results(
     result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
     beneath: "PoincareScan | None" = None, study: str | None = None, root: Path | None = None,
-    highest_hz: float = math.inf,
+    highest_hz: float = math.inf, usable_hz: float = math.inf,
 ) -> list[Path]:
     """Write branches as HDF5, CSV and a page, and plot them; returns the files.
 
-    The plot of the stability shows modes up to ``highest_hz``.
+    The plot of the stability shows modes up to ``highest_hz``. Points above ``usable_hz``, the
+    frequency up to which the basis is usable, are marked in the table and on the page.
     """
     from fecontact.output.plots.bifurcation_diagram import plot_branches
     from fecontact.output.plots.stability import plot_eigenvalues
@@ -47,7 +49,7 @@ def write_branch_results(
     files = [write_branches(folder / f"{name}-branch.h5", result.found, study=study, root=root,
                             system=result.contact_field.system())]
     table = folder / f"{name}-branch.csv"
-    write_text(table, branches_csv(result.found))
+    write_text(table, branches_csv(result.found, usable_hz))
     files.append(table)
     several = list(result.found.values())
     show = wanted.show if beneath is None else "section"
@@ -57,7 +59,7 @@ def write_branch_results(
         names=list(result.found), beneath=beneath, observe=result.observe, path=files[-1])
     files.append(report_branches(
         result.found, result.contact_field, folder / f"{name}-branch.html", observe=result.observe,
-        y=f"observed_{show}", title=name, study=study))
+        y=f"observed_{show}", title=name, study=study, usable_hz=usable_hz))
     if wanted.kind != "orbits":
         files.append(folder / f"{name}-stability.png")
         plot_eigenvalues(several[0], range_hz=(0.0, highest_hz), path=files[-1])
@@ -80,8 +82,11 @@ def runs_beneath(system: "ContactSystem", wanted: "BranchSettings", initial: Any
     return poincare_scan(system, wanted.checked_parameter, values, initial=initial, progress=True)
 
 
-def branches_csv(branches: Mapping[str, Branch]) -> str:
-    """All points of branches as CSV, special points with their kind."""
+def branches_csv(branches: Mapping[str, Branch], usable_hz: float = math.inf) -> str:
+    """All points of branches as CSV, special points with their kind.
+
+    ``beyond_basis`` is 1 for frequencies above ``usable_hz``.
+    """
     rows: list[Sequence[Any]] = [_COLUMNS]
     for name, branch in branches.items():
         for point in branch.points:
@@ -94,7 +99,8 @@ def branches_csv(branches: Mapping[str, Branch]) -> str:
                   for what in ("minimum", "maximum", "amplitude")),
                 point.criticality or "",
                 "" if math.isnan(point.parameter_error) else repr(point.parameter_error),
-                repr(float(values["state_error"])) if "state_error" in values else ""])
+                repr(float(values["state_error"])) if "state_error" in values else "",
+                "" if period is None else int(1.0 / period > usable_hz)])
     return csv_text(rows)
 
 
@@ -104,19 +110,16 @@ def special_table(branch: Branch, usable_hz: float = math.inf) -> Any:
     Points above ``usable_hz``, the frequency up to which the basis is usable, are marked.
     """
     from fecontact.cli.tables import table
-    from fecontact.core.units import quantity
 
     rows = []
     for index, point in enumerate(branch.points):
         if point.kind is None and 0 < index < len(branch) - 1:
             continue
         period = _period(point)
-        remark = _remark(point)
-        if period is not None and 1.0 / period > usable_hz:
-            beyond = f"beyond {quantity(usable_hz, 'Hz')}, where the basis ends"
-            remark = f"{remark}; {beyond}" if remark else beyond
+        beyond = beyond_basis(None if period is None else 1.0 / period, usable_hz)
         rows.append((point.kind or ("start" if index == 0 else "end"), point.parameter_text(),
-                     "" if period is None else f"{1.0 / period:.5g}", remark))
+                     "" if period is None else f"{1.0 / period:.5g}",
+                     "; ".join(filter(None, (_remark(point), beyond)))))
     return table("point", branch.parameter_name, "frequency [Hz]", "", rows=rows)
 
 

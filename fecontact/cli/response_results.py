@@ -11,6 +11,7 @@ from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.files.atomic_write import write_text
 from fecontact.core.files.csv_text import csv_text
 from fecontact.output.files.branches import write_response
+from fecontact.reduction.report import beyond_basis
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.point import BranchPoint
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("level", "kind", "parameter", "frequency_hz", "stable", "amplitude", "minimum",
             "maximum", "first_harmonic", "phase", "third_harmonic", "truncation_error",
-            "parameter_error")
+            "parameter_error", "beyond_basis")
 
 
 def response_file(study: "Study", folder: Path) -> Path:
@@ -35,22 +36,29 @@ def keep_response(study: "Study", response: FrequencyResponse, folder: Path) -> 
 def write_response_results(
     study: "Study", response: FrequencyResponse, observe: tuple[str | int, str], folder: Path,
 ) -> list[Path]:
-    """Write a response as HDF5, CSV, picture and page; returns the files."""
+    """Write a response as HDF5, CSV, picture and page; returns the files.
+
+    Points above the frequency up to which the basis is usable are marked.
+    """
     from fecontact.output.plots.responses.response import plot_response
     from fecontact.output.report.response_report import report_response
 
     name = f"{study.name}-response"
     files = [keep_response(study, response, folder),
              *(folder / f"{name}.{ending}" for ending in ("csv", "png", "html"))]
-    write_text(files[1], response_csv(response))
-    plot_response(response, path=files[2])
+    usable = study.usable_hz
+    write_text(files[1], response_csv(response, usable))
+    plot_response(response, usable_hz=usable, path=files[2])
     report_response(response, study.system(), files[3], observe=observe, title=study.name,
-                    study=study.to_toml())
+                    study=study.to_toml(), usable_hz=usable)
     return files
 
 
-def response_csv(response: FrequencyResponse) -> str:
-    """All points of a response as CSV, special points with their kind; SI units, phases in rad."""
+def response_csv(response: FrequencyResponse, usable_hz: float = math.inf) -> str:
+    """All points of a response as CSV, special points with their kind; SI units, phases in rad.
+
+    ``beyond_basis`` is 1 for frequencies above ``usable_hz``.
+    """
     rows: list[Sequence[Any]] = [_COLUMNS]
     for level, branch in enumerate(response.branches):
         first, phase = np.abs(response.harmonic(1, level)), response.phase(level)
@@ -65,7 +73,8 @@ def response_csv(response: FrequencyResponse) -> str:
                 repr(float(values["observed_minimum"])), repr(float(values["observed_maximum"])),
                 repr(float(first[place])), repr(float(phase[place])), third[place],
                 repr(float(values["truncation_error"])),
-                "" if math.isnan(point.parameter_error) else repr(point.parameter_error)])
+                "" if math.isnan(point.parameter_error) else repr(point.parameter_error),
+                int(1.0 / float(values["period"]) > usable_hz)])
     return csv_text(rows)
 
 
@@ -82,14 +91,17 @@ def _third(response: FrequencyResponse, level: int) -> list[str]:
     return [repr(float(one)) for one in np.abs(response.harmonic(3, level))]
 
 
-def response_table(response: FrequencyResponse) -> Any:
-    """Table of peaks and special points of all levels."""
+def response_table(response: FrequencyResponse, usable_hz: float = math.inf) -> Any:
+    """Table of peaks and special points of all levels; those above ``usable_hz`` are marked."""
     from fecontact.cli.tables import table
     from fecontact.core.units import quantity
+    from fecontact.output.plots.responses.response import level_texts
 
     unit = "rad" if response.observed.rpartition(" ")[2].startswith("phi") else "m"
     # An angular frequency is told in Hz; the frequency of the response is then the same.
     over_frequency = response.parameter_name.endswith("angular_frequency")
+    name, texts = ("", [""]) if response.level_name is None else level_texts(
+        response.level_name, response.levels)
     rows = []
     for level, branch in enumerate(response.branches):
         amplitude, peak = response.amplitude(level), response.peak(level)
@@ -97,11 +109,11 @@ def response_table(response: FrequencyResponse) -> Any:
             if point is not peak and point.kind is None:
                 continue
             words = ", ".join(filter(None, ("peak" if point is peak else "", point.kind)))
-            rows.append((*([f"{response.levels[level]:.6g}"] if response.level_name else []), words,
+            hertz = 1.0 / float(point.values["period"])
+            remarks = ", ".join(filter(None, (_stability(point), beyond_basis(hertz, usable_hz))))
+            rows.append((*([texts[level]] if name else []), words,
                          *([] if over_frequency else [f"{point.parameter:.7g}"]),
-                         f"{1.0 / float(point.values['period']):.7g}",
-                         quantity(float(amplitude[place]), unit, 5),
-                         _stability(point)))
-    return table(*([response.level_name] if response.level_name else []), "point",
+                         f"{hertz:.7g}", quantity(float(amplitude[place]), unit, 5), remarks))
+    return table(*([name] if name else []), "point",
                  *([] if over_frequency else [response.parameter_name]), "frequency [Hz]",
                  f"amplitude of {response.observed}", "", rows=rows, left=2)

@@ -29,6 +29,13 @@ def usable_hz(basis: ModalBasis) -> float:
     return float(above[len(above) // 2]) / 1.5 if above.size else np.inf
 
 
+def beyond_basis(frequency_hz: float | None, usable_hz: float) -> str:
+    """Remark on a frequency above that up to which the basis is usable; else empty."""
+    if frequency_hz is None or frequency_hz <= usable_hz:
+        return ""
+    return f"beyond {quantity(usable_hz, 'Hz')}, where the basis ends"
+
+
 @dataclass(frozen=True, eq=False)
 class BasisReport:
     """Figures of merit of a basis; ``str(report)`` is a table with a recommendation.

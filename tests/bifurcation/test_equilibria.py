@@ -115,6 +115,26 @@ def test_flutter_over_both_dashpots():
     assert (found.unstable == [[0], [2]]).all()
 
 
+def test_maps_leave_out_modes_beyond_a_frequency():
+    """Two oscillators of 1 and 10 rad/s, the fast one growing by r / 2, the slow one decaying."""
+    def oscillators(t, x, p, out):
+        out[0], out[2] = x[1], x[3]
+        out[1] = -x[0] - 0.1 * x[1]
+        out[3] = -100.0 * x[2] + p[0] * x[3] + 0.0 * p[1]
+
+    field = vector_field(oscillators, {"r": 0.2, "s": 0.0}, 4)
+    grid = {"r": [0.2, 0.4], "s": [0.0]}
+    whole = stability_map(field, grid)
+    assert whole.growth_rate[:, 0] == pytest.approx([0.1, 0.2])
+    assert (whole.unstable == 2).all()
+    usable = stability_map(field, grid, highest_hz=1.0)
+    assert usable.growth_rate[:, 0] == pytest.approx([-0.05, -0.05])
+    assert usable.frequency_hz[:, 0] == pytest.approx(0.5 / np.pi * np.sqrt(1.0 - 0.05**2))
+    assert (usable.unstable == 0).all()
+    with pytest.raises(InputError, match="leaves out all modes"):
+        stability_map(field, grid, highest_hz=1e-3)
+
+
 def test_maps_over_numbers_of_the_basis():
     """The entries of the modal damping matrix and the ratios are parameters as others are."""
     system = damped_coupling(0.8)

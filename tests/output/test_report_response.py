@@ -1,5 +1,7 @@
 """Pages of frequency responses and nonlinear modes: their numbers, and a click shows a motion."""
 
+import csv
+
 import numpy as np
 import pytest
 from report_reading import Shown
@@ -8,7 +10,9 @@ from response_study import STUDY, study
 from fecontact import InputError
 from fecontact.bifurcation import HarmonicBalance, contact_field, nonlinear_mode
 from fecontact.bifurcation.responses import follow_responses
+from fecontact.cli.response_results import response_csv, response_table
 from fecontact.io import report_modes, report_response
+from fecontact.plot import plot_response
 
 MICRO = 1e-6
 
@@ -55,6 +59,27 @@ def test_diagrams_are_amplitude_and_phase_of_all_levels(response, path):
             assert np.abs(y[:, 0] - curve).max() < 2e-5 * np.abs(curve).max()
 
 
+def test_points_beyond_the_basis_are_marked(response, system, tmp_path):
+    """In the table, the CSV file, the page and the picture, above 10 Hz of 8 to 13 Hz."""
+    rows = list(csv.DictReader(response_csv(response, 10.0).splitlines()))
+    assert {row["beyond_basis"] for row in rows} == {"0", "1"}
+    assert all((float(row["frequency_hz"]) > 10.0) == (row["beyond_basis"] == "1") for row in rows)
+    first, *_, remarks = (list(column.cells)
+                                      for column in response_table(response, 10.0).columns)
+    assert str(first[0]) == "20 µm"
+    assert "beyond 10 Hz, where the basis ends" in " ".join(map(str, remarks))
+    assert "beyond" not in " ".join(
+        map(str, response_table(response, 14.0).columns[-1].cells))
+    shown = Shown(report_response(response, system, tmp_path / "p.html", usable_hz=10.0)).header
+    note, hertz = shown["columns"].index("note"), shown["columns"].index("frequency")
+    for branch in shown["branches"]:
+        for row in branch["rows"]:
+            assert (float(row[hertz].split()[0]) > 10.0) == row[note].startswith("beyond 10 Hz")
+    for usable, expected in ((10.0, True), (14.0, False)):
+        legend = plot_response(response, usable_hz=usable).axes[0].get_legend()
+        assert ("beyond the basis" in [one.get_text() for one in legend.get_texts()]) is expected
+
+
 def test_orbits_are_those_of_the_response(response, system, path):
     shown = Shown(path)
     k, m = shown.header["samples"], system.basis.modes
@@ -69,7 +94,7 @@ def test_orbits_are_those_of_the_response(response, system, path):
             assert np.abs(moved[at] - true @ row).max() < 1e-4 * np.abs(moved).max()
             assert np.abs(q[at] - true[:, :m]).max() < 1e-4 * np.abs(q).max()
             assert table["rows"][number][3] == f"{1.0 / point.values['period']:.6g} Hz"
-            size = float(table["rows"][number][5].split()[0])
+            size = float(table["rows"][number][6].split()[0])
             assert size == pytest.approx(point.values["observed_amplitude"] / MICRO, rel=1e-4)
 
 

@@ -115,7 +115,7 @@ samples = 16
     study = write_study(tmp_path, axes)
     code, out, _ = cli("sweep", study, "-o", tmp_path / "a")
     assert code == 0
-    assert re.search(r"friction_power \[\S?W\] +mean +-?\d\S* +-?\d\S* \.\.\. -?\d\S* *\n +std", out)
+    assert re.search(r"power \[\S?W\] +mean +-?\d\S* +-?\d\S* \.\.\. -?\d\S* *\n +std", out)
     code, out, _ = cli("sweep", study, "-o", tmp_path / "b", "--set", "sweep.method=sensitivity")
     assert code == 0
     assert "64 cases, 0 failed" in out

@@ -71,7 +71,7 @@ class StabilityMap(Summarised):
 @one_blas_thread
 def stability_map(
     field: VectorField, grid: Mapping[str, ArrayLike], *,
-    start: Equilibrium | ArrayLike | None = None,
+    start: Equilibrium | ArrayLike | None = None, highest_hz: float = np.inf,
     progress: bool | Callable[[float], None] | None = None,
 ) -> StabilityMap:
     """Stability of an equilibrium over a grid of two parameters, such as speed and friction.
@@ -88,6 +88,9 @@ def stability_map(
     start : Equilibrium or (d,) sequence, optional
         An equilibrium near that of the first values; see
         :func:`fecontact.bifurcation.find_equilibrium`.
+    highest_hz : float
+        Modes of higher frequencies [Hz] are left out; of a reduced body beyond the frequency up to
+        which its basis is usable, ``Study.usable_hz``, they mean nothing.
     progress : bool or callable, optional
         True for a progress bar on a terminal or in a notebook; a function is told the part of the
         map that is done, 0 to 1.
@@ -132,9 +135,14 @@ def stability_map(
             if tell is not None:
                 tell((i + 1) / shape[0])
     eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
+    beyond = np.abs(eigenvalues.imag) > 2.0 * np.pi * highest_hz
+    if beyond.all(axis=-1).any():
+        raise InputError(f"highest_hz = {highest_hz:g} leaves out all modes; give a frequency "
+                         f"above the lowest one.")
+    eigenvalues[beyond] = -np.inf
     order = np.lexsort((-eigenvalues.imag, -eigenvalues.real), axis=-1)
     critical = np.take_along_axis(eigenvalues, order[..., :1], axis=-1)[..., 0]
-    unstable = unstable_count(eigenvalues)
+    unstable = unstable_count(np.where(beyond, 0.0, eigenvalues))
     lost = np.isnan(states[..., 0])
     critical[lost], unstable[lost] = np.nan, -1
     return StabilityMap((names[0], names[1]), axes[0], axes[1], states, critical, unstable)

@@ -67,7 +67,7 @@ def branch(
         with waiting("Writing"):
             files = write_branch_results(result, wanted, folder, described.name, beneath,
                                          described.to_toml(), described.folder,
-                                         np.inf if all_ else usable)
+                                         np.inf if all_ else usable, usable)
         for name, found in result.found.items():
             echo(f"\n{name}: {found.end}")
             if found.message:

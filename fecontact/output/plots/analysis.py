@@ -26,7 +26,13 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import direction_row, thinned
-from fecontact.output.plots.style import COLOURS, DASHES, add_note, distinct_colours
+from fecontact.output.plots.style import (
+    COLOURS,
+    DASHES,
+    add_note,
+    distinct_colours,
+    shaded_beyond,
+)
 from fecontact.reduction.assembly.contact_faces import shown_faces
 
 if TYPE_CHECKING:
@@ -344,11 +350,7 @@ def plot_receptance(
             figure.supxlabel(f"not drawn, as zero but for round-off: {listed(still)}", x=0.99,
                              ha="right", fontsize=8.0, color="#6a6a6a")
         first = responses[0]
-        if usable_hz < (highest := float(first.frequency_hz.max())):
-            for number, axis in enumerate((upper, lower)):
-                axis.axvspan(usable_hz, highest, color="#e4e0d8", zorder=0.5,
-                             label="" if number else "beyond the basis")
-            many = True
+        many |= shaded_beyond((upper, lower), usable_hz)
         upper.set_ylabel(f"{first.kind} [{units[0]}]" if len(units) == 1 else first.kind)
         if many or not first.stable:
             upper.legend(loc="best")

@@ -12,6 +12,9 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Colour-blind safe palette of Okabe and Ito.
@@ -33,6 +36,9 @@ STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
 # Colours of a stress reach to this percentile if its peak is so much above it that they would show
 # little: at clamped corners and below forces stresses grow with each refinement of the mesh.
 _PERCENTILE, _SHARP = 99.0, 0.7
+
+# Frequencies beyond those up to which a basis is usable.
+BEYOND, BEYOND_COLOUR = "beyond the basis", "#e4e0d8"
 
 STYLE: Any = {
     "font.size": 10.0, "axes.titlesize": 11.0, "axes.labelsize": 10.0, "legend.fontsize": 9.0,
@@ -59,6 +65,17 @@ def distinct_colours(count: int) -> list[str]:
     mixed = [""] * count
     mixed[::2], mixed[1::2] = shades[:half], shades[half:]
     return mixed
+
+
+def shaded_beyond(axes: "Sequence[Axes]", usable_hz: float) -> bool:
+    """Shade what of axes over frequency [Hz] lies beyond a usable basis; True if there is some."""
+    highest = max(axis.dataLim.x1 for axis in axes)
+    if not usable_hz < highest:
+        return False
+    for number, axis in enumerate(axes):
+        axis.axvspan(max(usable_hz, axis.dataLim.x0), highest, color=BEYOND_COLOUR, zorder=0.5,
+                     label="" if number else BEYOND)
+    return True
 
 
 def stress_limit(sizes: Array) -> float:

@@ -24,13 +24,13 @@ from fecontact.output.report.diagram_page import (
 )
 from fecontact.output.report.run_report import require_page
 
-COLUMNS = ("point", "parameter", "period", "frequency", "stability")
+COLUMNS = ("point", "parameter", "period", "frequency", "stability", "note")
 
 
 def report_branches(
     branches: Branch | Mapping[str, Branch], field: ContactField, path: str | Path, *,
     y: str = "observed_maximum", observe: tuple[str | int, Literal["x", "y", "z"]] = ("B", "x"),
-    title: str | None = None, study: str | None = None,
+    title: str | None = None, study: str | None = None, usable_hz: float = np.inf,
 ) -> Path:
     """Write branches as one HTML file with a diagram; a click on a point shows its orbit.
 
@@ -55,6 +55,8 @@ def report_branches(
         Heading; the name of the file by default.
     study : str, optional
         The study that described the system, as TOML text.
+    usable_hz : float
+        Frequency up to which the basis is usable [Hz]; a note marks points beyond.
 
     Returns
     -------
@@ -86,15 +88,19 @@ def report_branches(
         y.replace("_", " ").replace("observed", f"displacement {component} of {point},")
         + f" [{symbol}]" * bool(symbol),
         [branch.parameter for branch in named.values()], [one / factor for one in heights])
-    return write_diagrams(path, title, named, [diagram], shown_of(field, observe), study)
+    return write_diagrams(path, title, named, [diagram], shown_of(field, observe, usable_hz),
+                          study)
 
 
-def shown_of(field: ContactField, observe: tuple[str | int, str]) -> Shown:
+def shown_of(
+    field: ContactField, observe: tuple[str | int, str], usable_hz: float = np.inf
+) -> Shown:
     """What is shown of the points of branches of a field."""
     basis, (point, component) = field.system().basis, observe
     row = field.displacement_row(point, component)[: basis.modes]
     return Shown(basis, row, f"displacement {component} of {point}",
-                 lambda one: _orbit(one, field), COLUMNS, point_texts)
+                 lambda one: _orbit(one, field), COLUMNS,
+                 lambda one: point_texts(one, usable_hz))
 
 
 def _orbit(point: BranchPoint, field: ContactField) -> Motion:

@@ -22,6 +22,7 @@ from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import SMALLEST, Payload
 from fecontact.output.report.run_report import colour_maps, study_tables
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.report import beyond_basis
 
 SAMPLES = 129  # of a motion, both ends included
 _ORBITS = 240  # of all branches together
@@ -206,13 +207,18 @@ def _curve(x: Array, y: Array, payload: Payload) -> tuple[Any, Any]:
             payload.add(heights, max(1e-5 * float(np.abs(heights).max()), SMALLEST)))
 
 
-def point_texts(point: BranchPoint) -> list[str]:
-    """What is told of a point of a branch: kind, parameter, period, frequency, stability."""
+def point_texts(point: BranchPoint, usable_hz: float = np.inf) -> list[str]:
+    """Texts of a point of a branch: kind, parameter, period, frequency, stability, note.
+
+    The note marks frequencies above ``usable_hz``.
+    """
     period = point.period if isinstance(point, HopfPoint) else point.values.get("period")
+    hertz = None if period is None else 1.0 / float(period)
     unstable = point.values.get("unstable")
     kind = point.kind or ("orbit" if point.is_orbit else "steady sliding")
     return [kind + (f", {point.criticality}" if point.criticality else ""),
-            point.parameter_text(), "" if period is None else f"{float(period):.6g} s",
-            "" if period is None else f"{1.0 / float(period):.6g} Hz",
+            point.parameter_text(), "" if hertz is None else f"{1.0 / hertz:.6g} s",
+            "" if hertz is None else f"{hertz:.6g} Hz",
             "" if unstable is None
-            else count(int(unstable), "unstable direction") if unstable else "stable"]
+            else count(int(unstable), "unstable direction") if unstable else "stable",
+            beyond_basis(hertz, usable_hz)]

@@ -20,7 +20,7 @@ from fecontact.system.contact_system import ContactSystem
 def report_response(
     response: FrequencyResponse, system: ContactSystem, path: str | Path, *,
     observe: tuple[str | int, str] = ("B", "x"), title: str | None = None,
-    study: str | None = None,
+    study: str | None = None, usable_hz: float = np.inf,
 ) -> Path:
     """Write a frequency response as one HTML file; a click on a point plays its orbit.
 
@@ -42,6 +42,8 @@ def report_response(
         Heading; the name of the file by default.
     study : str, optional
         The study that described the system, as TOML text.
+    usable_hz : float
+        Frequency up to which the basis is usable [Hz]; a note marks points beyond.
 
     Returns
     -------
@@ -73,7 +75,8 @@ def report_response(
 
     def texts(point: BranchPoint) -> list[str]:
         size = quantity(float(point.values["observed_amplitude"]), unit, 5)
-        return [*point_texts(point), size, f"{float(point.values['truncation_error']):.1e}"]
+        error = float(point.values["truncation_error"])
+        return [*point_texts(point, usable_hz), size, f"{error:.1e}"]
 
     shown = replace(shown, columns=(*COLUMNS, "amplitude", "truncation error"), texts=texts)
     return write_diagrams(path, path.stem if title is None else title, named, diagrams, shown,

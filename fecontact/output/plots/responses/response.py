@@ -12,7 +12,13 @@ from fecontact.core.units import suitable_unit
 from fecontact.output.plots.bifurcation_diagram import SPECIAL, runs_of, stable_pieces
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis, parameter_label
-from fecontact.output.plots.style import DASHES, distinct_colours
+from fecontact.output.plots.style import (
+    BEYOND,
+    BEYOND_COLOUR,
+    DASHES,
+    distinct_colours,
+    shaded_beyond,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +26,7 @@ if TYPE_CHECKING:
 
 def plot_response(
     response: FrequencyResponse, *, logarithmic: bool = False, y_label: str | None = None,
-    path: str | Path | None = None,
+    usable_hz: float = np.inf, path: str | Path | None = None,
 ) -> "Figure":
     """Plot a frequency response: amplitude and phase, a colour for each level.
 
@@ -37,6 +43,8 @@ def plot_response(
     y_label : str, optional
         Label of the amplitude with its unit, such as ``amplitude [m]``; ticks are in a unit that
         suits the values.
+    usable_hz : float
+        Frequency up to which the basis is usable [Hz]; over frequency, what lies beyond is shaded.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -75,7 +83,8 @@ def plot_response(
         lower.set_yticks(_degrees(lower.get_ylim()))
         name_axis(lower, "x", label, np.array(lower.dataLim.intervalx))
         upper.margins(x=0.02)
-        _legend(upper, response, colours, list(marked), dashed)
+        beyond = label.endswith("[Hz]") and shaded_beyond((upper, lower), usable_hz)
+        _legend(upper, response, colours, list(marked), dashed, beyond)
     return figure
 
 
@@ -116,9 +125,11 @@ def _degrees(limits: tuple[float, float]) -> Array:
 
 
 def _legend(
-    axis: Any, response: FrequencyResponse, colours: list[str], kinds: list[str], dashed: bool
+    axis: Any, response: FrequencyResponse, colours: list[str], kinds: list[str], dashed: bool,
+    beyond: bool,
 ) -> None:
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     handles: list[Any] = []
     if response.level_name:
@@ -133,5 +144,7 @@ def _legend(
     handles += [Line2D([], [], color="#303030", marker=SPECIAL.get(kind, ("", "."))[1],
                        markerfacecolor="white", linestyle="none", markersize=6.0, label=kind)
                 for kind in kinds]
+    if beyond:
+        handles.append(Patch(color=BEYOND_COLOUR, label=BEYOND))
     if handles:
         axis.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0))
