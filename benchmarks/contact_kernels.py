@@ -18,7 +18,8 @@ def system(nodes: int, modes: int) -> ContactSystem:
     basis = ModalBasis(np.linspace(0.0, 1e5, modes), np.eye(modes),
                        rng.normal(size=(nodes + 2, 3, modes)), np.zeros((nodes + 2, 2)),
                        np.ones(nodes))
-    return ContactSystem(basis, RoughSurface(0.3e6, 5.2e-6, 6.0), ExponentialFriction(),
+    return ContactSystem(basis, RoughSurface(0.3e6, 5.2e-6, 6.0),
+                         ExponentialFriction(0.8, 0.55, 1e3),
                          load=Load(10.0),
                          ground=Ground(0.1, 1e-6, 1e-2),
                          drive=Drive(stiffness_x=1e3, amplitude_x=1e-3, angular_frequency=10.0))

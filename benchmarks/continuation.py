@@ -46,7 +46,8 @@ def two_masses() -> VectorField:
     basis = basis_from_matrices(
         np.diag([2.5, 1.0]), [[3.0, -1.0], [-1.0, 1.0]], {"contact": rows},
         damping=0.2 * np.array([[2.0, -1.0], [-1.0, 1.0]]))
-    system = ContactSystem(basis, normal=PrescribedForce((1.0, 1.0)), friction=ProductFriction(),
+    system = ContactSystem(basis, normal=PrescribedForce((1.0, 1.0)),
+                           friction=ProductFriction(0.14, 1.14, 2.0, 100.0),
                            ground=Ground(speed=1.0))
     return contact_field(system, {"B": (1.0, lambda system, B: system.with_(
         **{"normal.force": (B, B)})), "ground.speed": None})
@@ -60,7 +61,8 @@ def chain(masses: int) -> VectorField:
     K[-1, -1] = 1.0
     basis = basis_from_matrices(np.eye(masses), K, {"contact": rows}, damping=0.2 * K)
     system = ContactSystem(basis, normal=PrescribedForce(np.ones(masses)),
-                           friction=ProductFriction(), ground=Ground(speed=1.0))
+                           friction=ProductFriction(0.14, 1.14, 2.0, 100.0),
+                           ground=Ground(speed=1.0))
     return contact_field(system, {"B": (0.5, lambda system, B: system.with_(
         **{"normal.force": np.full(masses, B)}))})
 

@@ -62,7 +62,7 @@ def main(quick: bool = False) -> None:
     """Print the tables."""
     repetitions = 2 if quick else 30
     own = f"{Path(__file__).parents[1] / 'examples' / 'own_law.py'}:LogarithmicFriction"
-    for kind, other in ((NormalLaw, ConstantFriction()), (FrictionLaw, LinearContact(1e7))):
+    for kind, other in ((NormalLaw, ConstantFriction(0.55)), (FrictionLaw, LinearContact(1e7))):
         names = [*law_names()[kind], *([own] if kind is FrictionLaw else [])]
         costs = {}
         for name in names:

@@ -33,7 +33,7 @@ def bouncing_beam(element_size: float = 0.00145) -> Trajectory:
     body = ElasticBody(generate(Beam(element_size=element_size)), Material(), thickness=0.01)
     basis = modal_basis(body, 20, contact_nodes=40)
     system = ContactSystem(basis, RoughSurface(0.3e6, 5.2e-6, 6.0),
-                           ExponentialFriction(), Ground(speed=0.5))
+                           ExponentialFriction(0.8, 0.55, 1e3), Ground(speed=0.5))
     t = np.linspace(0.0, 0.02, 2001)
     w = 2.0 * np.pi * 100.0 * np.arange(1, basis.modes + 1)
     size = 1e-5 / np.arange(1, basis.modes + 1)

@@ -24,7 +24,7 @@ geometry = { shape = "block", element_size = 0.01 }
 body = { thickness = 0.1 }
 basis = { modes = 6, contact_nodes = 4, damping = 0.01 }
 normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
-friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55 }
+friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
 ground = { speed = 2e-3 }
 load = { normal = 14.0 }
 drive = { stiffness_x = 5610.0, damping_x = 0.768, amplitude_x = 0.5e-3, angular_frequency = 13.8 }

@@ -58,7 +58,8 @@ def main(end: float = 1.0) -> None:
     """Steady sliding with the law above, and with the falling law of the package."""
     body = fc.ElasticBody(fc.generate(fc.Beam(length=0.2, height=0.02)), thickness=0.01)
     basis = fc.modal_basis(body, 12, contact_nodes=20, damping=0.01)
-    for friction in (LogarithmicFriction(), ExponentialFriction(0.2, 0.12, smoothing_slope=1e4)):
+    for friction in (LogarithmicFriction(),
+                     ExponentialFriction(0.2, 0.12, 1000.0, smoothing_slope=1e4)):
         system = fc.ContactSystem(
             basis, RoughSurface(stiffness=0.3e6, roughness_height=5.2e-6, damping=6.0),
             friction=friction, ground=fc.Ground(speed=0.01), load=fc.Load(normal=14.0),

@@ -55,7 +55,8 @@ def basis(D: float = 0.1) -> ModalBasis:
 
 def oscillator(B: float = 1.0, v0: float = 1.0, D: float = 0.1) -> ContactField:
     """The oscillator as a function of B, v_0 and D."""
-    system = ContactSystem(basis(D), normal=PrescribedForce((B, B)), friction=ProductFriction(),
+    system = ContactSystem(basis(D), normal=PrescribedForce((B, B)),
+                           friction=ProductFriction(0.14, 1.14, 2.0, 100.0),
                            ground=Ground(speed=v0))
     return contact_field(system, {
         "B": (B, lambda given, value: given.with_(**{"normal.force": (value, value)})),

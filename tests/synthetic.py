@@ -81,7 +81,7 @@ def run(body=None, times=101, size=2e-5, waviness=0.0, speed=0.02):
     """Sliding with stick-slip in x, bouncing and rocking in y, bending and stretching."""
     body = basis() if body is None else body
     system = ContactSystem(
-        body, normal=RoughSurface(3e5, 5.2e-6, 6.0), friction=ExponentialFriction(),
+        body, normal=RoughSurface(3e5, 5.2e-6, 6.0), friction=ExponentialFriction(0.8, 0.55, 1e3),
         ground=Ground(speed=speed, amplitude=waviness, wavelength=0.03))
     t = np.linspace(0.0, 0.02, times)
     w = 2.0 * np.pi * np.array([100.0, 50.0, 150.0, 200.0, 500.0])

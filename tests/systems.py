@@ -32,7 +32,8 @@ def mass_in_y(mass=1.0, spring=0.0, **parts):
     """A mass that moves up and down only."""
     rows = np.array([[0.0], [1.0], [0.0]])
     modes = basis_from_matrices([[mass]], [[spring]], {"contact": rows[None], "C": rows})
-    return ContactSystem(modes, **{"normal": SURFACE, "friction": ExponentialFriction(), **parts})
+    return ContactSystem(modes, **{"normal": SURFACE,
+                                   "friction": ExponentialFriction(0.8, 0.55, 1e3), **parts})
 
 
 def mass_in_plane(mass=1.0, spring=0.0, **parts):
@@ -41,7 +42,8 @@ def mass_in_plane(mass=1.0, spring=0.0, **parts):
     rows[0, 0] = rows[1, 1] = 1.0
     modes = basis_from_matrices(mass * np.eye(2), np.diag([spring, 0.0]),
                                 {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(modes, **{"normal": SURFACE, "friction": ExponentialFriction(), **parts})
+    return ContactSystem(modes, **{"normal": SURFACE,
+                                   "friction": ExponentialFriction(0.8, 0.55, 1e3), **parts})
 
 
 def basis(frequencies_hz, damping, B, contact):
@@ -70,7 +72,7 @@ def friction_oscillator(modes=2, **changes):
     system = ContactSystem(
         basis([0.0, 0.0, 30.0][:modes], [0.0, 0.0, 0.01][:modes], B, contact),
         normal=RoughSurface(10e6, 10e-6, 40.0),
-        friction=ExponentialFriction(0.8, 0.55, 1000.0, 1e6), ground=Ground(speed=1e-3),
+        friction=ExponentialFriction(0.8, 0.55, 1e3, 1e6), ground=Ground(speed=1e-3),
         drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
                     angular_frequency=13.8),
         load=Load(14.0))
@@ -106,7 +108,8 @@ def with_damping(system, D):
 
 def two_mass_system(B=1.0, speed=1.0):
     return ContactSystem(two_masses(), normal=PrescribedForce((B, B)),
-                         friction=ProductFriction(), ground=Ground(speed=speed))
+                         friction=ProductFriction(0.14, 1.14, 2.0, 100.0),
+                         ground=Ground(speed=speed))
 
 
 def two_mass_field(B=1.0, speed=1.0):
@@ -135,7 +138,7 @@ def belt(slope=1e6, speed=12e-3):
     r = 1.0 / np.sqrt(5.632)
     return ContactSystem(basis([0.0], [0.0], [[r], [0.0]], [[r], [0.0]]),
                          normal=PrescribedForce(14.0),
-                         friction=ExponentialFriction(0.8, 0.55, 1000.0, slope),
+                         friction=ExponentialFriction(0.8, 0.55, 1e3, slope),
                          ground=Ground(speed=speed),
                          drive=Drive(stiffness_x=5610.0, damping_x=0.768))
 

@@ -35,14 +35,18 @@ class Kinds:
         place in the file, for messages.
     name_of : function
         The name of an instance of a subclass; None for a default and for all other instances.
+    default : function
+        The name of the subclass that such a class stands for without a name, or None.
     """
 
     is_kind: Callable[[Any], bool]
     law_class: Callable[[type, Any, str], type]
     name_of: Callable[[Any], str | None]
+    default: Callable[[type], str | None]
 
 
-_kinds = Kinds(lambda hint: False, lambda kind, name, where: kind, lambda instance: None)
+_kinds = Kinds(lambda hint: False, lambda kind, name, where: kind, lambda instance: None,
+               lambda kind: None)
 
 
 def register_kinds(kinds: Kinds) -> None:
@@ -135,9 +139,15 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
     if not isinstance(table, Mapping):
         raise InputError(f"{where} must be a table of keys and values, not {shown(table)}.")
     if _kinds.is_kind(cls):
-        chosen = _kinds.law_class(cls, table.get("law"), where)
+        name = table.get("law")
+        chosen = _kinds.law_class(cls, name, where)
         parameters = {key: value for key, value in table.items() if key != "law"}
-        return cast(T, from_table(chosen, parameters, where))
+        return cast(T, _from_table(chosen, parameters, where, name or _kinds.default(cls) or ""))
+    return _from_table(cls, table, where)
+
+
+def _from_table(cls: type[T], table: Mapping[str, Any], where: str, law: str = "") -> T:
+    """Body of :func:`from_table` for a class that is no kind of law; ``law`` is its name."""
     hints = _hints(cast(Any, cls))
     entries = {entry.name: entry for entry in fields(cls)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
@@ -147,8 +157,9 @@ def from_table(cls: type[T], table: Any, where: str) -> T:
     missing = [name for name, entry in entries.items() if name not in values
                and entry.default is MISSING and entry.default_factory is MISSING]
     if missing:
+        explained = f" of law = '{law}'; `fecontact laws {law}` explains this law" if law else ""
         raise InputError(f"{where} lacks {'the key' if len(missing) == 1 else 'the keys'} "
-                         f"{choices(missing)}.")
+                         f"{choices(missing)}{explained}.")
     with located(f"{where}:", cls.__name__):
         return cls(**values)
 

@@ -24,7 +24,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.kernels import PENETRATION
-from fecontact.system.model_limits import warn_of_limits
+from fecontact.system.model_limits import Planned, implausible_values, warn_of_limits
 from fecontact.system.powers import POWERS
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
@@ -97,6 +97,7 @@ def simulate(
     -------
     Trajectory or FieldRun
         Also if the run ended early, by Ctrl-C or because the solver failed; see its ``status``.
+        A ModelWarning before the run names values that are more likely an error.
         Each of its ``limits_exceeded`` is a ModelWarning, and so is friction that gave energy to
         the motion, as LuGre friction with large bristle damping can.
 
@@ -138,6 +139,8 @@ def simulate(
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory | LoadHistory | RestState):
         _warn_of_depth(system, state, t_start)
+    warn_of_limits(implausible_values(Planned(system, float(times[-1] - times[0]), state)),
+                   "In this run")
     m = system.basis.modes
     with (shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell,
           one_blas_thread):

@@ -279,4 +279,4 @@ def _located(key: str, value: Any, folder: Path) -> Any:
     return str(folder.resolve() / value) if named else value
 
 
-register_kinds(Kinds(is_kind, law_class, name_of))
+register_kinds(Kinds(is_kind, law_class, name_of, _DEFAULTS.get))

@@ -96,6 +96,20 @@ class StudyModels:
         body = vars(self).get("_body")
         return {} if body is None else {"": body}
 
+    @property
+    def contact_faces(self) -> dict[str, tuple[str, ...]]:
+        """Boundaries in contact by the name of their body, "" for the only one."""
+        if not self.bodies:
+            given = self.basis.contact
+            return {"": (given,) if isinstance(given, str) else tuple(given)}
+        found: dict[str, tuple[str, ...]] = {}
+        for one in self.interfaces.values():
+            for face in (one.face, one.other):
+                body, dot, boundary = str(face).partition(".")
+                if dot:
+                    found[body] = (*found.get(body, ()), boundary)
+        return found
+
     def pairings(self) -> dict[str, Pairing | TwoPassPairing]:
         """Pairings of the faces of several bodies, by the names of the interfaces."""
         self._require_several("pairings", "mesh")

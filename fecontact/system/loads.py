@@ -17,7 +17,9 @@ from fecontact.laws.excitation import (
 )
 from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.laws.signals.base import Signal
+from fecontact.laws.signals.harmonic import Constant
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.nodes import SystemArrays
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,21 @@ def load_rows(basis: ModalBasis, load: Load) -> tuple[Array, Array]:
         else:
             constant = constant + part.value * part.row
     return constant, np.array(in_time, dtype=float).reshape(-1, basis.modes)
+
+
+def mean_load(arrays: SystemArrays, drive: Drive, load: Load) -> Array:
+    """Modal forces (m,) of constant loads and of springs with constant driven ends.
+
+    Other signals are taken to have zero mean.
+    """
+    found = arrays.constant_load.copy()
+    springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
+    given = [*zip(springs, drive.motions[: len(springs)], strict=True),
+             *zip(arrays.load_shapes, load.signals.values(), strict=True)]
+    for shape, source in given:
+        if isinstance(source, Constant):
+            found += source.value * shape
+    return found
 
 
 def work_of_loads(basis: ModalBasis, load: Load, depth: float) -> float:

@@ -1,23 +1,28 @@
 """Limits of the model: small displacements and rotations, shallow penetration, plausible values.
 
-They reveal wrong units and unsupported loads. ``CHECKS_BEFORE`` and ``CHECKS_AFTER`` list one
-function for each check: before a run, of its bodies and system; after it, of its states.
+They reveal wrong units and unsupported loads. ``CHECKS_OF_BODIES``, ``CHECKS_BEFORE`` and
+``CHECKS_AFTER`` list one function for each check: of elastic bodies; of a system before a run; of
+its states after it.
 """
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fecontact.core.errors import ModelWarning, choices
 from fecontact.core.types import Array
+from fecontact.fem.chords import chords
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.laws.base import NormalLaw
+from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import AXES
+from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
+from fecontact.system.loads import mean_load
 
 # Penetration of a rough surface, in roughness heights, beyond which a wrong unit or stiffness is
 # likely, since all asperities would be crushed.
@@ -31,6 +36,10 @@ SMALL_ANGLE = 0.1
 # body, and duration in periods of the fastest mode.
 SIZES, MODULI, DENSITIES = (1e-4, 5.0), (1e6, 2e12), (1.0, 25000.0)
 FRICTION, ROUGHNESS, SPEED, GAP, PERIODS = 2.0, 0.01, 100.0, 100.0, 1e6
+
+# Distance of chords from their arc, in penetration scales, and part of a load, below which neither
+# counts.
+CHORD, HELD = 0.1, 1e-6
 
 # Output times per batch.
 _BLOCK = 4096
@@ -60,16 +69,41 @@ def limits_exceeded(system: ContactSystem, times: Array, states: Array) -> tuple
 
 @dataclass(frozen=True)
 class Planned:
-    """Model of a run: the system, its elastic bodies by name, and the duration [s]."""
+    """Model of a run: the system, the duration [s] and the initial state (2 m + n s,)."""
 
     system: ContactSystem
-    bodies: Mapping[str, ElasticBody]
     duration: float
+    state: Array
+
+    @cached_property
+    def extents(self) -> tuple[float, ...]:
+        """Extents of the elastic bodies [m]; none for systems without shapes over a body."""
+        shapes, parts = self.system.basis.mode_shapes, self.system.basis.parts
+        if shapes is None:
+            return ()
+        spans = [part.nodes for part in parts if part.nodes[1]] or [(0, len(shapes.nodes))]
+        return tuple(float(np.ptp(shapes.nodes[first : first + count], axis=0).max())
+                     for first, count in spans)
+
+
+@dataclass(frozen=True)
+class PlannedBodies:
+    """Elastic bodies of a study by name, their boundaries in contact, and the contact system."""
+
+    bodies: Mapping[str, ElasticBody]
+    faces: Mapping[str, tuple[str, ...]]
+    system: ContactSystem
 
 
 def implausible_values(planned: Planned) -> tuple[str, ...]:
-    """Messages about values that are possible, but more likely a wrong unit; usually none."""
-    return tuple(sentence for check in CHECKS_BEFORE for sentence in check(planned))
+    """Messages about values that are possible, but more likely an error; usually none."""
+    with np.errstate(all="ignore"):
+        return tuple(sentence for check in CHECKS_BEFORE for sentence in check(planned))
+
+
+def implausible_bodies(planned: PlannedBodies) -> tuple[str, ...]:
+    """Messages about dimensions, materials and meshes that are more likely an error."""
+    return tuple(sentence for check in CHECKS_OF_BODIES for sentence in check(planned))
 
 
 def warn_of_limits(sentences: Iterable[str], what: str) -> None:
@@ -147,7 +181,7 @@ def _turned(system: ContactSystem, times: Array, states: Array) -> str | None:
             f"small, as the equations assume, so check the supports and the loads.")
 
 
-def _bodies(planned: Planned) -> Iterator[str]:
+def _bodies(planned: PlannedBodies) -> Iterator[str]:
     """Size, material and thickness of the bodies."""
     low, high = SIZES
     for name, body in planned.bodies.items():
@@ -167,6 +201,28 @@ def _bodies(planned: Planned) -> Iterator[str]:
                    f"{size:.3g} m; check its unit, or take plane = \"strain\".")
 
 
+def _chords(planned: PlannedBodies) -> Iterator[str]:
+    """Straight elements along curved contact faces."""
+    scale = planned.system.penetration_scale
+    for name, faces in planned.faces.items():
+        body = planned.bodies.get(name)
+        for face in faces if body is not None else ():
+            assert body is not None
+            # Plane faces that are paired are smoothed where edges meet at up to 30 degrees.
+            smoothed = np.radians(30.0) if name and body.dimension == 2 else 0.0
+            found = chords(body.mesh, face, smoothed)
+            if found is None or found.error <= CHORD * scale:
+                continue
+            where = f"'{face}' of body '{name}'" if name else f"'{face}'"
+            quadratic = ("although they are quadratic: their middle nodes lie on the chords"
+                         if body.degree == 2 else "and successive ones meet at up to "
+                         f"{np.degrees(found.angle):.2g} degrees")
+            yield (f"{found.straight} elements along the curved boundary {where} are straight, "
+                   f"{quadratic}; chords are up to {1e6 * found.error:.3g} um from the curve, an "
+                   f"error of gaps that are measured from the mesh: refine it there, or give a "
+                   f"mesh of second order whose middle nodes lie on the curve.")
+
+
 def _friction(planned: Planned) -> Iterator[str]:
     """Coefficients of friction."""
     for *_, law in planned.system.law_groups("friction"):
@@ -179,7 +235,7 @@ def _friction(planned: Planned) -> Iterator[str]:
 
 def _roughness(planned: Planned) -> Iterator[str]:
     """Roughness compared with the smallest body."""
-    extents = [float(np.ptp(body.mesh.nodes, axis=0).max()) for body in planned.bodies.values()]
+    extents = planned.extents
     for *_, law in planned.system.law_groups("normal"):
         height = getattr(law, "roughness_height", None)
         if extents and height is not None and float(np.max(height)) > ROUGHNESS * min(extents):
@@ -188,14 +244,11 @@ def _roughness(planned: Planned) -> Iterator[str]:
 
 
 def _ground(planned: Planned) -> Iterator[str]:
-    """Speed and distance of the ground."""
-    ground, gap = planned.system.ground, float(np.min(planned.system.arrays.gap))
-    if abs(ground.speed) > SPEED:
-        yield f"ground.speed = {ground.speed:.3g} m/s is above {SPEED:g} m/s; check its unit."
-    extents = [float(np.ptp(body.mesh.nodes, axis=0).max()) for body in planned.bodies.values()]
-    if extents and gap > GAP * max(extents):
-        yield (f"the smallest gap of {gap:.3g} m is more than {GAP:g} times the body's extent of "
-               f"{max(extents):.3g} m, which will hardly touch; check its unit.")
+    """Speed of the ground."""
+    # Systems without shapes may have no dimensions.
+    speed = planned.system.ground.speed
+    if planned.extents and abs(speed) > SPEED:
+        yield f"ground.speed = {speed:.3g} m/s is above {SPEED:g} m/s; check its unit."
 
 
 def _duration(planned: Planned) -> Iterator[str]:
@@ -204,6 +257,133 @@ def _duration(planned: Planned) -> Iterator[str]:
     if planned.duration * highest > PERIODS:
         yield (f"it lasts {planned.duration * highest:.2g} periods of the fastest mode, "
                f"{highest:.4g} Hz, and will take long; end it earlier, or keep fewer modes.")
+
+
+def _unheld(planned: Planned) -> Iterator[str]:
+    """Constant loads along a motion that neither stiffness, damping nor contacts resist."""
+    system = planned.system
+    arrays, basis = system.arrays, system.basis
+    if not planned.extents or not basis.rigid_modes:
+        return
+    constant = mean_load(arrays, system.drive, system.load)
+    if not constant.any() or not np.isfinite(constant).all():
+        return
+    free = _null_space(arrays.stiffness, arrays.damping)
+    load = free.T @ constant
+    if not free.shape[1] or np.linalg.norm(load) <= HELD * np.linalg.norm(constant):
+        return
+    open_below = _untouched(system) > -np.inf
+    # Friction, springs and laws that may pull resist both ways along their rows.
+    both = [arrays.Ty[~open_below]]
+    for nodes, _, law in system.law_groups("friction"):
+        if not _frictionless(law):
+            both += [arrays.Tx[nodes], arrays.T2[nodes] if len(arrays.T2) else arrays.Tx[:0]]
+    held = np.concatenate(both) @ free
+    slack = np.eye(free.shape[1]) - np.linalg.pinv(held, rcond=1e-9) @ held
+    normals = _unit_rows(arrays.Ty[open_below] @ free) @ slack
+    remaining = slack @ load
+    from scipy.optimize import nnls
+
+    if len(normals):
+        # Contacts support the load if it is a sum of forces that press on them.
+        pressed = -normals.T
+        remaining = remaining - pressed @ nnls(pressed, remaining)[0]
+    if np.linalg.norm(remaining) <= HELD * np.linalg.norm(load):
+        return
+    who, motion = named_motion(basis, free @ remaining)
+    yield (f"nothing holds {who} against {motion}: no stiffness, contact or stop resists the "
+           f"constant load there, under which it will fly off; check supports, and sign and place "
+           f"of the loads.")
+
+
+def _gap(planned: Planned) -> Iterator[str]:
+    """Gaps that the body cannot close within the run, or that are far larger than it."""
+    system, extents = planned.system, planned.extents
+    gap = float(np.min(system.arrays.gap + _untouched(system)))
+    if not extents or not np.isfinite(gap) or gap <= system.penetration_scale:
+        return
+    reach = _reach(planned)
+    if reach < gap:
+        yield (f"no contact can close: the smallest gap is {gap:.3g} m, but under its loads from "
+               f"this start the body moves by less than {_rounded_up(reach)} m; check gap, loads "
+               f"and units.")
+    elif gap > GAP * max(extents):
+        yield (f"the smallest gap of {gap:.3g} m is more than {GAP:g} times the body's extent of "
+               f"{max(extents):.3g} m, which will hardly touch; check its unit.")
+
+
+def _reach(planned: Planned) -> float:
+    """Bound on how far contact nodes approach the other side without contact forces [m]."""
+    system, T = planned.system, planned.duration
+    arrays, basis = system.arrays, system.basis
+    stiffness = arrays.stiffness
+    if not np.isfinite(stiffness).all() or np.abs(stiffness - stiffness.T).max() > (
+            1e-9 * np.abs(stiffness).max()):
+        return np.inf
+    squares, shapes = np.linalg.eigh(stiffness)
+    w = np.sqrt(np.maximum(squares, 0.0))
+    w[w < 1e-6 * w.max(initial=0.0)] = 0.0
+    damping = np.diag(shapes.T @ arrays.damping @ shapes)
+    if (damping < 0.0).any() or np.abs(arrays.damping - arrays.damping.T).max() > (
+            1e-9 * np.abs(arrays.damping).max()):
+        return np.inf
+    m = basis.modes
+    q, v = shapes.T @ planned.state[:m], shapes.T @ planned.state[m : 2 * m]
+    load = np.abs(shapes.T @ arrays.constant_load)
+    springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
+    dashpots = arrays.drive_damping[:, None] * arrays.drive_shapes
+    varying = np.zeros(m)
+    for row, dashpot, motion in zip(springs, dashpots, system.drive.motions, strict=False):
+        if dashpot.any() and motion.largest:
+            return np.inf
+        varying += motion.largest * np.abs(row @ shapes)
+    for row, signal in zip(arrays.load_shapes, system.load.signals.values(), strict=True):
+        varying += signal.largest * np.abs(row @ shapes)
+    elastic = w > 0.0
+    safe = np.where(elastic, w, 1.0)
+    # Largest displacement of a damped oscillator under a constant and a bounded force.
+    lasting = np.minimum(T, np.divide(2.0, damping, out=np.full(m, np.inf), where=damping > 0.0))
+    largest = np.where(
+        elastic, np.abs(q) + (np.abs(v) + varying * lasting) / safe + 2.0 * load / safe**2,
+        np.abs(q) + np.abs(v) * T + 0.5 * (varying + load) * T**2)
+    low, high = system.ground.height_range
+    reach = float((np.abs(arrays.Ty @ shapes) @ largest).max() + max(abs(low), abs(high)))
+    return reach if np.isfinite(reach) else np.inf
+
+
+def _rounded_up(value: float) -> str:
+    """Two digits of a number, rounded up."""
+    if value <= 0.0:
+        return "1e-15"
+    unit = 10.0 ** (np.floor(np.log10(value)) - 1.0)
+    return f"{np.ceil(value / unit) * unit:.2g}"
+
+
+def _untouched(system: ContactSystem) -> Array:
+    """Penetration (n,) below which normal laws have no force; -inf where they may pull."""
+    return np.concatenate([law.untouched(nodes.stop - nodes.start)
+                           for nodes, _, law in system.law_groups("normal")])
+
+
+def _frictionless(law: FrictionLaw) -> bool:
+    return isinstance(law, ConstantFriction) and not np.any(
+        np.add(law.friction_coefficient, law.viscous_coefficient))
+
+
+def _null_space(stiffness: Array, damping: Array) -> Array:
+    """Orthonormal motions (m, k) that neither stiffness nor damping resists."""
+    scale = np.abs(np.diag(stiffness)).max(initial=0.0), np.abs(np.diag(damping)).max(initial=0.0)
+    resisted = [matrix / largest for matrix, largest in zip((stiffness, damping), scale,
+                                                            strict=True) if largest > 0.0]
+    if not resisted:
+        return np.eye(len(stiffness))
+    _, sizes, rows = np.linalg.svd(np.concatenate(resisted))
+    return np.asarray(rows[sizes <= 1e-12].T)
+
+
+def _unit_rows(rows: Array) -> Array:
+    length = np.linalg.norm(rows, axis=1)
+    return np.asarray(rows[length > 0.0] / length[length > 0.0, None])
 
 
 def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
@@ -249,7 +429,8 @@ def _named(along: Array, turn: float) -> str:
     return AXES[first] if along[first] > 10.0 * along[second] else "a translation"
 
 
+CHECKS_OF_BODIES: tuple[Callable[[PlannedBodies], Iterator[str]], ...] = (_bodies, _chords)
 CHECKS_BEFORE: tuple[Callable[[Planned], Iterator[str]], ...] = (
-    _bodies, _friction, _roughness, _ground, _duration)
+    _friction, _roughness, _ground, _duration, _unheld, _gap)
 CHECKS_AFTER: tuple[Callable[[ContactSystem, Array, Array], str | None], ...] = (
     _too_far, _turned, _too_deep)

@@ -67,4 +67,4 @@ def system_parts(
 ) -> dict[str, Any]:
     """The named parts of :func:`system_tables`."""
     return {part: from_table(PART_CLASSES[part], tables.get(part, {}), f"{where}: [{part}]")
-            for part in names if part in tables or part != "normal"}
+            for part in names if part in tables or part not in ("normal", "friction")}

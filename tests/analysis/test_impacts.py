@@ -225,7 +225,7 @@ def test_set_valued_friction_has_impacts_and_rigid_stops_have_none():
                                 {"contact": rows[None], "B": rows})
     law = LinearContact(C, 2.0 * 0.2 * np.sqrt(C * MASS))
     q = np.linalg.solve(basis.T[2, :2], [0.0, 1e-4])
-    system = ContactSystem(basis, normal=law, friction=ExponentialFriction(0.3, 0.3))
+    system = ContactSystem(basis, normal=law, friction=ExponentialFriction(0.3, 0.3, 1000.0))
     run = simulate(system, 0.006, initial=np.concatenate([q, -V0 / 1e-4 * q]), outputs=601,
                    solver=SetValued())
     assert find_impacts(run).restitution == pytest.approx([RESTITUTION], rel=1e-3)

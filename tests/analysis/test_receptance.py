@@ -33,7 +33,8 @@ def mass(**parts):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(MASS * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "B": rows, "C": rows})
-    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": SURFACE, **parts})
+    return ContactSystem(basis, **{"friction": ExponentialFriction(0.8, 0.55, 1e3),
+                                   "normal": SURFACE, **parts})
 
 
 F = np.array([0.3, 1.0, 4.0, 4.5, 5.0, 20.0, 300.0])
@@ -164,7 +165,7 @@ def test_inverse_of_the_dynamic_stiffness_of_all_degrees_of_freedom():
     basis = basis_from_matrices(M, K, rows, damping=C)
     system = ContactSystem(basis, SURFACE,
                            drive=Drive(stiffness_x=1e7, stiffness_y=3e6, damping_x=400.0),
-                           friction=ExponentialFriction())
+                           friction=ExponentialFriction(0.8, 0.55, 1e3))
     K[d - 2, d - 2] += 1e7
     K[d - 1, d - 1] += 3e6
     C[d - 2, d - 2] += 400.0
@@ -186,7 +187,8 @@ def test_beam_on_its_contact_against_jacobian_of_the_statics():
 
     def system(force=0.0):
         return ContactSystem(basis, normal=RoughSurface(1e8, 1e-5, 1e3),
-                             friction=ExponentialFriction(0.0, 0.0), load=Load(500.0 + force),
+                             friction=ExponentialFriction(0.0, 0.0, 1000.0),
+                             load=Load(500.0 + force),
                              drive=Drive(stiffness_x=1e5))
 
     step = 1.0

@@ -149,7 +149,8 @@ def test_contact_system_and_its_parameters():
     assert (P[:, :2] == 0.0).all()
 
 
-@pytest.mark.parametrize("friction", [ExponentialFriction(0.8, 0.5, 3.0, 50.0), LuGreFriction()])
+@pytest.mark.parametrize("friction", [ExponentialFriction(0.8, 0.5, 3.0, 50.0),
+                                      LuGreFriction(0.8, 0.55, 1e-3, 2.0, 1e5)])
 def test_many_nodes_waves_memory_and_drive(friction):
     """Rates and Jacobian are those of the system, some nodes open and some closed."""
     rng = np.random.default_rng(3)
@@ -197,7 +198,8 @@ def with_normals(system, stiffness):
 
 @pytest.mark.parametrize(("law", "own"), [
     (ExponentialFriction(0.8, 0.5, 3.0, 50.0), ["friction.decay", "friction.static_coefficient"]),
-    (LuGreFriction(), ["friction.bristle_stiffness", "friction.kinetic_coefficient"]),
+    (LuGreFriction(0.8, 0.55, 1e-3, 2.0, 1e5),
+     ["friction.bristle_stiffness", "friction.kinetic_coefficient"]),
 ])
 def test_derivatives_to_parameters_of_everything(law, own):
     """Against extrapolated differences of the rates, in one parameter at a time and in pairs."""

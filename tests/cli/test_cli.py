@@ -58,9 +58,13 @@ def test_keys_of_the_law_before_are_left_out_with_a_note(cli, study):
     text = study.read_text()
     study.write_text(text.replace("static_coefficient = 0.8", "static_coefficient = 0.7"))
     code, out, err = cli("mesh", study, "--set", "friction.law=constant")
+    assert code == 1
+    assert "[friction] lacks the key 'friction_coefficient' of law = 'constant'" in err
+    code, out, err = cli("mesh", study, "--set", "friction.law=constant",
+                         "--set", "friction.friction_coefficient=0.3")
     assert (code, err) == (0, "")
-    assert ("note: [friction]: the law constant has no static_coefficient; this key is left "
-            "out.") in out
+    assert ("note: [friction]: the law constant has no static_coefficient, kinetic_coefficient, "
+            "decay; these keys are left out.") in out
 
 
 def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):

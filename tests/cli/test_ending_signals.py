@@ -25,7 +25,7 @@ basis = { modes = 5, contact_nodes = 4, damping = 0.01 }
 ground = { speed = 0.1, amplitude = 1e-5 }
 load = { normal = 10.0 }
 normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
-friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55 }
+friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
 simulation = { t_end = 1e5, outputs = 100001 }
 output = { frames = 0 }
 """

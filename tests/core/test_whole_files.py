@@ -288,7 +288,7 @@ def test_a_full_disk_keeps_the_earlier_run_and_its_checkpoint(small_disk, tmp_pa
         basis = { modes = 5, contact_nodes = 4 }
         load = { normal = 10.0 }
         normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
-        friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55 }
+        friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
         ground = { speed = 0.1, amplitude = 1e-5 }
         simulation = { t_end = 2e-3, outputs = 2001 }
         output = { frames = 0 }

@@ -31,7 +31,7 @@ LAWS = {
     "jenkins": JenkinsFriction(K, MU),
     "iwan": IwanFriction(K, MU, elements=6),
     "dahl": DahlFriction(MU, K / FORCE),
-    "lugre": LuGreFriction(0.5, MU, 1e-3, bristle_stiffness=K / FORCE),
+    "lugre": LuGreFriction(0.5, MU, 1e-3, 2.0, bristle_stiffness=K / FORCE),
     "bouc-wen": BoucWenFriction(MU, LIMIT),
 }
 

@@ -30,7 +30,7 @@ def point(**parts):
                             "C": [[1.0], [0.0], [0.0]]})
     options = {"normal": PrescribedForce(1e-12), "drive": fc.Drive(
         stiffness_x=STIFFNESS, damping_x=DASHPOT)} | parts
-    return fc.ContactSystem(basis, **{"friction": ExponentialFriction(), **options})
+    return fc.ContactSystem(basis, **{"friction": ExponentialFriction(0.8, 0.55, 1e3), **options})
 
 
 def oscillator(force, times, dashpot=DASHPOT):
@@ -129,7 +129,8 @@ def test_moment_and_constant_loads_at_points():
     system = fc.ContactSystem(basis, normal=RoughSurface(1e6, 1e-5, 500.0), load=fc.Load(
         normal=20.0, forces=(
             fc.PointLoad("tip", "phi", signal=Constant(0.5)),
-            fc.PointLoad("tip", "y", signal=Constant(-3.0)))), friction=ExponentialFriction())
+            fc.PointLoad("tip", "y", signal=Constant(-3.0)))),
+            friction=ExponentialFriction(0.8, 0.55, 1e3))
     start = fc.simulate(system, 1e-3, outputs=2)
     turn = (0.5 - 3.0 * 0.1) / 50.0
     assert start.displacement("C")[0, 2] == pytest.approx(turn, rel=1e-8)

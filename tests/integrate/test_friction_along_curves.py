@@ -165,7 +165,7 @@ def slider(path, stiffness, limit):
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("law", [
     JenkinsFriction(2e6, 0.4), IwanFriction(2e6, 0.4, elements=3),
-    FourParameterIwanFriction(2e6, 0.4, elements=4, spacing_ratio=1.5)],
+    FourParameterIwanFriction(2e6, 0.4, -0.5, 0.1, elements=4, spacing_ratio=1.5)],
     ids=lambda law: type(law).__name__)
 def test_springs_with_sliders(law, curve):
     table = law.table(np.ones(1))[0]

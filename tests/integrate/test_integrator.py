@@ -54,7 +54,8 @@ def body(nodes=3, modes=4, **parts):
         "friction": ExponentialFriction(0.6, 0.4, 20.0, 50.0),
         "drive": Drive(2e3, 3e3, 1.0, 2.0, 1e-4, 2e-4, 70.0),
         "load": Load(40.0, (PointLoad("B", "x", signal=Harmonic(2.0, 110.0, 0.3)),))}
-    return ContactSystem(basis, **{"friction": ExponentialFriction(), **given, **parts})
+    return ContactSystem(basis,
+                         **{"friction": ExponentialFriction(0.8, 0.55, 1e3), **given, **parts})
 
 
 def reference(system, state, times, rtol=1e-12):
@@ -91,7 +92,7 @@ def test_order_on_a_smooth_problem():
 @pytest.mark.long
 @pytest.mark.parametrize("friction", [
     ExponentialFriction(0.6, 0.4, 20.0, 1e4), LuGreFriction(0.6, 0.4, 0.01, 2.0, 1e5, 100.0),
-    JenkinsFriction()])
+    JenkinsFriction(1e7, 0.55)])
 def test_agrees_with_scipy(friction):
     """Contact that opens and closes; friction with and without memory."""
     system = body(friction=friction, normal=RoughSurface(1e5, 2e-5, 30.0))

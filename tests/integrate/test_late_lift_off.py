@@ -10,7 +10,7 @@ from fecontact.laws import BoucWenFriction, LinearContact, LuGreFriction, RoughS
 @pytest.mark.parametrize("normal", [LinearContact(50.0, 0.5), RoughSurface(50.0, 0.01)],
                          ids=["linear", "rough"])
 @pytest.mark.parametrize("friction", [
-    LuGreFriction(0.5, 0.4, bristle_stiffness=100.0, stribeck_velocity=0.3),
+    LuGreFriction(0.5, 0.4, bristle_stiffness=100.0, stribeck_velocity=0.3, stribeck_exponent=2.0),
     BoucWenFriction(0.4, yield_displacement=0.01)], ids=["lugre", "bouc-wen"])
 def test_bouncing_on_a_belt(normal, friction):
     rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])

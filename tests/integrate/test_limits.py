@@ -151,7 +151,8 @@ def test_energies_beyond_all_numbers_have_a_status(change):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(5.632 * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": rows})
-    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0), ExponentialFriction(),
+    system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0),
+                           ExponentialFriction(0.8, 0.55, 1e3),
                            load=Load(14.0))
     start = "rest"
     if change == "velocity":
@@ -169,7 +170,8 @@ def test_runs_warn_where_they_leave_the_limits_of_the_model():
     rows[:, 1, 0] = 1.0
     basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows, "C": rows[0]},
                                 contact_x=[0.0, 0.02])
-    system = ContactSystem(basis, RoughSurface(1e6, 1e-5), friction=ExponentialFriction())
+    system = ContactSystem(basis, RoughSurface(1e6, 1e-5),
+                           friction=ExponentialFriction(0.8, 0.55, 1e3))
     with pytest.warns(ModelWarning, match=r"In this run points of the body move by 0\.021 m, more "
                                           r"than its own size of 0\.02 m"):
         run = simulate(system, 0.21, initial=np.array([0.0, 0.1]))

@@ -50,7 +50,8 @@ def test_free_flight_is_a_matrix_exponential():
     (friction_oscillator(2, **SMOOTH, ground=Ground(speed=2e-3, profile=Sine(2e-5, 2.5e-3))),
      0.005),
     (friction_oscillator(2, friction=LuGreFriction(
-        0.8, 0.55, stribeck_velocity=1e-3, bristle_stiffness=1e5, bristle_damping=100.0)), 0.05),
+        0.8, 0.55, stribeck_velocity=1e-3, bristle_stiffness=1e5, bristle_damping=100.0,
+        stribeck_exponent=2.0)), 0.05),
     (friction_oscillator(2, friction=IwanFriction(2e4, 0.6, elements=3)), 0.01),
 ], ids=["three modes", "waves", "LuGre", "Iwan"])
 def test_differences_of_runs(system, t_end):

@@ -44,7 +44,7 @@ def block(mass=1.0, spring=1.0, nodes=1, **parts):
         mass * np.eye(2), np.diag([spring, 0.0]),
         {"contact": np.repeat(row[None], nodes, axis=0), "B": row, "C": row})
     return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-4, 0.0),
-                                   "friction": ExponentialFriction(), **parts})
+                                   "friction": ExponentialFriction(0.8, 0.55, 1e3), **parts})
 
 
 def start(system, x, x_rate=0.0):
@@ -218,7 +218,8 @@ def ball(**parts):
     row = np.array([[0.0], [1.0], [0.0]])
     return ContactSystem(basis_from_matrices([[1.0]], [[0.0]],
                                              {"contact": row[None], "C": row}),
-                         RoughSurface(1e5, 1e-4), **{"friction": ExponentialFriction(), **parts})
+                         RoughSurface(1e5, 1e-4),
+                         **{"friction": ExponentialFriction(0.8, 0.55, 1e3), **parts})
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.6, 0.9])
@@ -249,7 +250,8 @@ def test_mass_lifted_off_a_rigid_stop():
     row = np.array([[0.0], [1.0], [0.0]])
     basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
     system = ContactSystem(basis, RoughSurface(1e5, 1e-4), load=Load(1.0), drive=Drive(
-        stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5), friction=ExponentialFriction())
+        stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5),
+        friction=ExponentialFriction(0.8, 0.55, 1e3))
     times = np.linspace(0.0, 2.0, 201)
     run = integrate_set_valued(system, np.zeros(2), times, rtol=1e-10, restitution=0.5)
     leaving = np.pi / 3.0
@@ -295,7 +297,7 @@ def test_options_are_checked(options, message):
 
 
 def test_friction_with_memory_has_no_set_valued_limit():
-    system = block(friction=LuGreFriction())
+    system = block(friction=LuGreFriction(0.8, 0.55, 1e-3, 2.0, 1e5))
     with pytest.raises(InputError, match="LuGreFriction has no smoothing_slope"):
         integrate_set_valued(system, np.zeros(4), np.linspace(0.0, 1.0, 3))
 

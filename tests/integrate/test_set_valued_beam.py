@@ -36,7 +36,8 @@ def beam(basis, slope=1e6):
     """Free steel beam with 40 nodes on a belt, pulled back by a spring at its left end."""
     return ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0), load=Load(14.0),
-        friction=ExponentialFriction(smoothing_slope=slope), ground=Ground(speed=0.01),
+        friction=ExponentialFriction(0.8, 0.55, 1e3, smoothing_slope=slope),
+        ground=Ground(speed=0.01),
         drive=Drive(stiffness_x=5610.0, damping_x=0.768))
 
 

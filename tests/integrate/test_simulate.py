@@ -427,7 +427,7 @@ def test_start_at_rest_on_wavy_ground():
 def test_rigid_start_about_a_hinge():
     body = ElasticBody(rectangle(0.2, 0.02, 12, 2), Material(), 0.01, fixed={"left": "hinge"})
     basis = modal_basis(body, 4, contact="bottom", contact_nodes=2, C=(0.2, 0.02))
-    system = ContactSystem(basis, SURFACE, friction=ExponentialFriction())
+    system = ContactSystem(basis, SURFACE, friction=ExponentialFriction(0.8, 0.55, 1e3))
     # The hinge at (0, 0.01) stays: the origin moves by (0.01 phi, 0).
     y = initial_state(system, RigidStart((1e-5, 0.0, 1e-3)), 0.0)
     assert basis.T[1] @ y[:4] == pytest.approx([-1e-5, 2e-4, 1e-3], rel=1e-9)
@@ -562,7 +562,7 @@ def test_other_errors_in_progress_are_passed_on():
 def test_a_motion_that_grows_beyond_all_numbers(method, tolerance):
     rows = np.array([[[0.0], [1.0], [0.0]]])
     basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": rows}, damping=[[-1e4]])
-    run = simulate(ContactSystem(basis, SURFACE, friction=ExponentialFriction()), 1.0,
+    run = simulate(ContactSystem(basis, SURFACE, friction=ExponentialFriction(0.8, 0.55, 1e3)), 1.0,
                    initial=np.array([1.0, 0.0]), outputs=10001, solver=Scipy(method))
     assert run.status is Status.FAILED
     assert "message" in run.statistics

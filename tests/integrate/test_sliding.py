@@ -31,7 +31,7 @@ from fecontact.reduction import PointPairing
 
 NORMAL = LinearContact(2e6, 150.0)
 FRICTION = ExponentialFriction(0.5, 0.3, 4.0, smoothing_slope=1e5)
-LUGRE = LuGreFriction(0.5, 0.3, 0.05, bristle_stiffness=1e5)
+LUGRE = LuGreFriction(0.5, 0.3, 0.05, 2.0, 1e5)
 WAVES = Sine(1e-5, 3e-3)
 MASS, K_X, K_Y, DAMPING = 0.8, 4e4, 9e4, 0.03
 

@@ -79,7 +79,8 @@ def test_mass_thrown_across_a_belt():
 
 @pytest.mark.parametrize("friction", [
     ConstantFriction(MU, smoothing_slope=3e4),
-    LuGreFriction(MU, 0.2, stribeck_velocity=0.05, bristle_stiffness=1e4, bristle_damping=3.0),
+    LuGreFriction(MU, 0.2, stribeck_velocity=0.05, bristle_stiffness=1e4, bristle_damping=3.0,
+                  stribeck_exponent=2.0),
     IwanFriction(stiffness=2e5, friction_coefficient=MU, elements=3)])
 def test_turned_belt_turns_the_motion(friction):
     angle = 0.6
@@ -141,7 +142,8 @@ def test_lateral_dither_reduces_friction():
     fc.Ground(speed=0.15, speed_y=0.1, profile=Sine(2e-5, 0.08), wave_direction=(1.0, 1.0))])
 @pytest.mark.parametrize("friction", [
     ConstantFriction(MU, smoothing_slope=300.0),
-    LuGreFriction(MU, 0.25, stribeck_velocity=0.05, bristle_stiffness=5e3, bristle_damping=3.0)])
+    LuGreFriction(MU, 0.25, stribeck_velocity=0.05, bristle_stiffness=5e3, bristle_damping=3.0,
+                  stribeck_exponent=2.0)])
 def test_block_on_moving_ground_agrees_with_another_integrator(ground, friction):
     system = fc.ContactSystem(
         block((2e4, 1e4, 0.0)), normal=LinearContact(stiffness=4e6, damping=400.0),

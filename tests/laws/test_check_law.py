@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from law_values import made
 
 import fecontact as fc
 from fecontact.cli import execute
@@ -56,13 +57,13 @@ NEEDED = {
     cls for kind in (NormalLaw, FrictionLaw) for cls in law_names()[kind].values()],
     ids=lambda cls: cls.__name__)
 def test_laws_of_the_package_pass(cls):
-    check_law(cls(*NEEDED.get(cls, ())))
+    check_law(cls(*NEEDED[cls]) if cls in NEEDED else made(cls))
 
 
 def test_parameters_per_node_and_springs_with_smoothing_pass():
     check_law(RoughSurface((1e6, 2e6), 1e-6, 3.0))
     check_law(JenkinsFriction((2e6, 1e6), (0.4, 0.7)))
-    check_law(ExponentialFriction(0.3, 0.5, viscous_coefficient=1.0, smoothing="tanh"))
+    check_law(ExponentialFriction(0.3, 0.5, 1000.0, viscous_coefficient=1.0, smoothing="tanh"))
 
 
 @normal_law
@@ -219,7 +220,7 @@ def test_penetration_up_to_which_laws_are_zero(cls):
 
 
 def test_hysteresis_that_gives_energy_off_is_found():
-    law = BoucWenFriction()
+    law = BoucWenFriction(0.55, 5e-6)
     object.__setattr__(law, "beta", -0.5)
     with pytest.raises(fc.FecontactError, match=r"BoucWenFriction: cycles of slip .* give off"):
         check_law(law)

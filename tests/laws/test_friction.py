@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from law_values import made
 
 from fecontact import InputError, basis_from_matrices
 from fecontact.laws import ExponentialFriction
@@ -128,7 +129,8 @@ def test_stick_velocity_per_node():
 
 
 def test_velocity_scale_is_the_narrowest():
-    assert ExponentialFriction(smoothing_slope=(1e5, 1e6)).velocity_scale == pytest.approx(1e-6)
+    assert ExponentialFriction(0.8, 0.55, 1e3,
+                               smoothing_slope=(1e5, 1e6)).velocity_scale == pytest.approx(1e-6)
 
 
 # Parameters --------------------------------------------------------------------------------------
@@ -136,7 +138,7 @@ def test_velocity_scale_is_the_narrowest():
 def test_no_parameter_is_shared():
     share = np.array([0.25, 0.75])
     assert ExponentialFriction(*BOOK).table(share).tolist() == [[*BOOK, 0.0, 0.0]] * 2
-    assert ExponentialFriction((0.8, 0.6)).table(share)[:, 0].tolist() == [0.8, 0.6]
+    assert ExponentialFriction((0.8, 0.6), 0.55, 1000.0).table(share)[:, 0].tolist() == [0.8, 0.6]
 
 
 @pytest.mark.parametrize(("values", "message"), [
@@ -149,4 +151,4 @@ def test_no_parameter_is_shared():
 ])
 def test_values_are_checked(values, message):
     with pytest.raises(InputError, match=message):
-        ExponentialFriction(**values)
+        made(ExponentialFriction, **values)

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 import pytest
 from friction_conformance import check_friction_law
+from law_values import made
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -59,9 +60,10 @@ def every_law():
         for smoothing in SMOOTHINGS:
             viscous = {"viscous_coefficient": 3.0} if kind in VISCOUS else {}
             yield kind(smoothing_slope=2e5, smoothing=smoothing, **values, **viscous)
-    yield ProductFriction()
+    yield ProductFriction(0.14, 1.14, 2.0, 100.0)
     yield Frictionless()
-    yield ExponentialFriction(static_coefficient=(0.8, 0.5), smoothing="tanh")
+    yield ExponentialFriction(static_coefficient=(0.8, 0.5), smoothing="tanh",
+                              kinetic_coefficient=0.55, decay=1000.0)
 
 
 @pytest.mark.parametrize("law", list(every_law()), ids=lambda law: f"{type(law).__name__}")
@@ -111,7 +113,7 @@ def test_steep_smoothing_tends_to_the_sign(kind, smoothing):
 # Values from elsewhere ---------------------------------------------------------------------------
 
 def test_product_law_of_section_4_4():
-    law = ProductFriction()
+    law = ProductFriction(0.14, 1.14, 2.0, 100.0)
     # mu(1) = 0.14 (1 + 1.14 e^-2) arctan(100).
     assert law.coefficient(1.0) == pytest.approx(
         0.14 * (1.0 + 1.14 * math.exp(-2.0)) * (math.pi / 2.0 - 0.01 + 1e-6 / 3.0), rel=1e-9)
@@ -126,10 +128,10 @@ def test_product_law_of_section_4_4():
 
 def test_hopf_point_of_the_friction_oscillator():
     """Steady sliding is neutral where N times the slope and the damping cancel."""
-    law = ExponentialFriction()
+    law = ExponentialFriction(0.8, 0.55, 1e3)
     speed = brentq(lambda V: 14.0 * float(law.slope(V)) + 0.768, 5e-3, 12e-3, xtol=1e-14)
     assert speed == pytest.approx(8.336533e-3, abs=1e-9)
-    steep = ExponentialFriction(smoothing="tanh")
+    steep = ExponentialFriction(0.8, 0.55, 1e3, smoothing="tanh")
     speed = brentq(lambda V: 14.0 * float(steep.slope(V)) + 0.768, 5e-3, 12e-3, xtol=1e-14)
     assert speed == pytest.approx(8.424483793e-3, abs=1e-11)
 
@@ -210,14 +212,17 @@ def test_without_a_maximum():
 
 
 def test_a_viscous_term_leaves_the_limit_of_stick():
-    dry = ExponentialFriction().stick_velocity(1)[0]
-    assert ExponentialFriction(viscous_coefficient=0.1).stick_velocity(1)[0] == pytest.approx(
+    dry = ExponentialFriction(0.8, 0.55, 1e3).stick_velocity(1)[0]
+    assert ExponentialFriction(0.8, 0.55, 1e3,
+                               viscous_coefficient=0.1).stick_velocity(1)[0] == pytest.approx(
         dry, rel=1e-3)
 
 
 def test_curves_per_node():
-    law = ExponentialFriction(static_coefficient=(0.8, 0.7), smoothing_slope=(1e5, 1e6))
-    single = [ExponentialFriction(mu, smoothing_slope=k) for mu, k in ((0.8, 1e5), (0.7, 1e6))]
+    law = ExponentialFriction(static_coefficient=(0.8, 0.7), smoothing_slope=(1e5, 1e6),
+                              kinetic_coefficient=0.55, decay=1000.0)
+    single = [ExponentialFriction(mu, 0.55, 1000.0, smoothing_slope=k) for mu,
+              k in ((0.8, 1e5), (0.7, 1e6))]
     v = np.array([[1e-3], [2e-3], [-1e-4]])
     for question in ("coefficient", "slope"):
         expected = np.concatenate([getattr(one, question)(v) for one in single], axis=1)
@@ -253,7 +258,7 @@ def test_smoothing_in_the_table():
 ])
 def test_values_are_checked(kind, values, message):
     with pytest.raises(InputError, match=message):
-        kind(**values)
+        made(kind, **values)
 
 
 def test_ranges_in_annotations_hold_for_laws_of_ones_own():

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from friction_conformance import check_friction_law
+from law_values import REQUIRED
 from own_law import LogarithmicFriction
 
 import fecontact as fc
@@ -26,7 +27,7 @@ from fecontact.laws import (
 from fecontact.laws.synonyms import _WORDS
 
 # Values for parameters that have no defaults.
-GIVEN = {
+GIVEN = REQUIRED | {
     "stiffness": 1e6, "roughness_height": 1e-5, "restitution": 0.7,
     "reference_velocity": 0.1, "force": 14.0,
     "decay_length": 1e-6, "nominal_area": 1e-4, "coefficient": 1e-9, "asperities": 1e4,
@@ -66,6 +67,7 @@ FRICTION = """
 [friction]
 static_coefficient = 0.8
 kinetic_coefficient = 0.55
+decay = 1000.0
 """
 
 
@@ -280,8 +282,11 @@ damping = 6.0
 [interfaces.left.friction]
 law = "jenkins"
 stiffness = 1e6
+friction_coefficient = 0.55
 [interfaces.right.friction]
 static_coefficient = 0.8
+kinetic_coefficient = 0.55
+decay = 1000.0
 [interfaces.right.normal]
 law = "linear"
 stiffness = 1e6
@@ -417,7 +422,7 @@ def test_lists_per_node_are_counted_rightly():
     basis = Study.from_toml(HEAD).modal_basis()
     with pytest.raises(fc.FecontactError, match="3 values for 5 contact nodes"):
         fc.ContactSystem(basis, normal=RoughSurface((1e6,) * 3, 1e-6),
-                         friction=ExponentialFriction())
+                         friction=ExponentialFriction(0.8, 0.55, 1e3))
 
 
 def test_laws_are_found_by_what_others_call_them(capsys):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from friction_conformance import check_memory_law, memory_outputs, parameters
+from law_values import made
 from scipy.integrate import solve_ivp
 
 from fecontact import InputError
@@ -20,12 +21,12 @@ from fecontact.laws import (
 LAWS = [
     JenkinsFriction(2e6, 0.4), JenkinsFriction((2e6, 1e6), (0.4, 0.7)),
     IwanFriction(2e6, 0.4, elements=5), IwanFriction(2e6, 0.4, elements=1),
-    FourParameterIwanFriction(2e6, 0.4, elements=2),
+    FourParameterIwanFriction(2e6, 0.4, -0.5, 0.1, elements=2),
     FourParameterIwanFriction((2e6, 1e6), 0.4, chi=-0.8, beta=0.0, elements=2, spacing_ratio=1.5),
     DahlFriction(0.4, 2e5), DahlFriction((0.4, 0.5), 2e5, 1.5), DahlFriction(0.4, 2e5, 2.0),
-    LuGreFriction(), LuGreFriction(0.8, 0.5, 2e-3, 1.0, 1e5, 30.0, 20.0),
+    LuGreFriction(0.8, 0.55, 1e-3, 2.0, 1e5), LuGreFriction(0.8, 0.5, 2e-3, 1.0, 1e5, 30.0, 20.0),
     LuGreFriction(0.8, 0.5, 2e-3, 0.7, 1e5, 30.0, 0.0, 10.0),
-    BoucWenFriction(), BoucWenFriction(0.4, (5e-6, 1e-5), 0.7, 2.0),
+    BoucWenFriction(0.55, 5e-6), BoucWenFriction(0.4, (5e-6, 1e-5), 0.7, 2.0),
     BoucWenFriction(0.4, 5e-6, 1.0, 1.5),
 ]
 
@@ -258,7 +259,7 @@ def test_lugre_slides_along_its_stribeck_curve(v):
 
 def test_lugre_break_away_needs_less_force_at_a_faster_pull():
     """The frictional lag of the law: the static peak falls with the rate of the force."""
-    law = LuGreFriction()
+    law = LuGreFriction(0.8, 0.55, 1e-3, 2.0, 1e5)
     peaks = []
     for v in (1e-5, 1e-3, 1e-2):
         times = np.linspace(0.0, 1e-4 / v, 2001)
@@ -314,7 +315,7 @@ def test_bouc_wen_of_beta_one_is_dahl():
 
 @pytest.mark.parametrize("law", [
     JenkinsFriction(1e9, 0.4), IwanFriction(1e9, 0.4), DahlFriction(0.4, 1e9),
-    LuGreFriction(0.4, 0.4, bristle_stiffness=1e9), BoucWenFriction(0.4, 4e-10),
+    LuGreFriction(0.4, 0.4, 1e-3, 2.0, bristle_stiffness=1e9), BoucWenFriction(0.4, 4e-10),
 ], ids=lambda law: type(law).__name__)
 def test_stiff_laws_lose_what_coulomb_friction_does(law):
     X, F = 1e-6, 1.0
@@ -323,7 +324,8 @@ def test_stiff_laws_lose_what_coulomb_friction_does(law):
 
 
 def test_stick_follows_the_force():
-    law = LuGreFriction(static_coefficient=(0.8, 0.6), kinetic_coefficient=0.5)
+    law = LuGreFriction(static_coefficient=(0.8, 0.6), kinetic_coefficient=0.5,
+                        stribeck_velocity=1e-3, bristle_stiffness=1e5, stribeck_exponent=2.0)
     v, F = np.array([[0.0, 1e-2]]), np.array([[10.0, 20.0]])
     assert law.sticks(v, F, np.array([[7.5, 9.4]])).tolist() == [[True, True]]
     assert law.sticks(v, F, np.array([[-7.7, -9.6]])).tolist() == [[False, False]]
@@ -331,7 +333,7 @@ def test_stick_follows_the_force():
 
 def test_scales_are_those_of_the_pre_sliding_deflection():
     assert DahlFriction(0.4, 2e5).state_scale == pytest.approx([2e-6])
-    assert LuGreFriction().state_scale == pytest.approx([5.5e-6])
+    assert LuGreFriction(0.8, 0.55, 1e-3, 2.0, 1e5).state_scale == pytest.approx([5.5e-6])
     assert BoucWenFriction(0.4, (2e-6, 1e-6)).velocity_scale == pytest.approx(1e-5)
     assert JenkinsFriction(2e6, 0.4).state_scale == pytest.approx([2e-7])
     assert JenkinsFriction((1e6, 1e6), 0.4).state_scale == pytest.approx([2e-7])
@@ -360,11 +362,11 @@ def test_scales_are_those_of_the_pre_sliding_deflection():
 ])
 def test_values_are_checked(kind, values, message):
     with pytest.raises(InputError, match=message):
-        kind(**values)
+        made(kind, **values)
 
 
 def test_number_of_elements_is_whole():
-    assert IwanFriction(elements=4.0).memory == 4
-    assert IwanFriction().table(np.ones(1)).shape == (1, 17)
-    assert FourParameterIwanFriction(elements=3.0).memory == 4
-    assert FourParameterIwanFriction(elements=3, beta=0.0).memory == 3
+    assert IwanFriction(1e7, 0.55, elements=4.0).memory == 4
+    assert IwanFriction(1e7, 0.55).table(np.ones(1)).shape == (1, 17)
+    assert FourParameterIwanFriction(1e7, 0.55, -0.5, 0.1, elements=3.0).memory == 4
+    assert FourParameterIwanFriction(1e7, 0.55, -0.5, elements=3, beta=0.0).memory == 3

@@ -16,7 +16,8 @@ from fecontact.system.powers import POWERS
 
 TURN = 2.0 * np.pi
 STUDIES = ("[ground]\nspeed = 0.1\n[output]\nframes = 3\n",
-           "[ground]\nspeed = 0.2\n[output]\nframes = 5\n[friction]\nlaw = 'constant'\n")
+           "[ground]\nspeed = 0.2\n[output]\nframes = 5\n"
+           "[friction]\nlaw = 'constant'\nfriction_coefficient = 0.55\n")
 
 
 def vibration(amplitude, hertz, outputs=1001):

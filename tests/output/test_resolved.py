@@ -23,7 +23,7 @@ def point_mass(axis, **parts):
     rows["xy".index(axis)] = 1.0
     basis = fc.basis_from_matrices(
         [[MASS]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
-    return fc.ContactSystem(basis, **{"friction": ExponentialFriction(),
+    return fc.ContactSystem(basis, **{"friction": ExponentialFriction(0.8, 0.55, 1e3),
                                       "normal": RoughSurface(0.3e6, 5.2e-6, 6.0), **parts})
 
 

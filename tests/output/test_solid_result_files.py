@@ -259,7 +259,8 @@ SYSTEMS = {
                   boundaries=(fc.BoundaryLoad("top", pressure=1e5, shear=1e3, shear_across=7e3),
                               fc.BoundaryLoad("right", shear_across=fc.laws.Harmonic(
                                   1e3 / 3.0, 50.0)))),
-              "friction": BoucWenFriction(friction_coefficient=0.5, exponent=1.7, beta=0.7)},
+              "friction": BoucWenFriction(friction_coefficient=0.5, exponent=1.7, beta=0.7,
+                                          yield_displacement=5e-6)},
     "sliding": {"sliding": {"contact": SlidingTranslation(0.1, (1.0, 2.0, 0.0))}},
     "sliding in time": {"sliding": {"contact": SlidingRotation(
         2.0, (0.1, 0.05, 0.3), HarmonicSpeed(0.5, 100.0), axis=(0.0, 0.1, 1.0))}},

@@ -212,7 +212,7 @@ def test_rotation_in_a_study():
 geometry = { shape = "beam", length = 0.1, height = 0.01, element_size = 0.005 }
 basis = { modes = 5, contact_nodes = 4 }
 normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
-friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55 }
+friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
 [body]
 material = "steel"
 thickness = 1.0

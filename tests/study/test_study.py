@@ -35,7 +35,12 @@ from fecontact.integrate import SetValued
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.solvers import SOLVERS
 from fecontact.laws import ExponentialFriction, RoughSurface
-from fecontact.system.model_limits import Planned, implausible_values
+from fecontact.system.model_limits import (
+    Planned,
+    PlannedBodies,
+    implausible_bodies,
+    implausible_values,
+)
 
 TINY = """
 gap = 1e-6
@@ -65,6 +70,7 @@ damping = 6.0
 [friction]
 static_coefficient = [0.5, 0.6, 0.7, 0.8]
 kinetic_coefficient = 0
+decay = 1000.0
 
 [ground]
 speed = 1
@@ -91,7 +97,7 @@ def test_study_is_the_system_written_by_hand(tiny):
     by_hand = ContactSystem(
         basis, RoughSurface(0.3e6, 5.2e-6, 6.0),
         friction=ExponentialFriction(static_coefficient=(0.5, 0.6, 0.7, 0.8),
-                                     kinetic_coefficient=0.0),
+                                     kinetic_coefficient=0.0, decay=1000.0),
         ground=Ground(speed=1.0), load=Load(normal=10.0), gap=1e-6)
     system = tiny.system()
     assert system.parameters() == by_hand.parameters()
@@ -318,7 +324,7 @@ MISTAKES = [
     ({"output.points": [4]}, r"\[output\]: Contact node 4 does not exist"),
     ({"interfaces.contact.normal": {"stiffness": [1.0, 2.0], "roughness_height": 1e-6}},
      r"\[interfaces\.contact\.normal\]: stiffness has 2 values for 4 contact nodes"),
-    ({"interfaces.contct.friction.decay": 1.0},
+    ({"interfaces.contct.friction": {"law": "frictionless"}},
      r"\[interfaces\.contct\]: the basis has no interface 'contct' \(did you mean 'contact'\?\)"),
     ({"load.forces": [{"point": "D", "signal": {"law": "constant"}}]},
      r"\[load\.forces\]: There is no point 'D'"),
@@ -485,11 +491,24 @@ def test_friction_and_thickness_have_to_be_given(tiny):
 
 
 def test_another_law_keeps_only_its_own_keys(tiny):
-    changed = tiny.with_(**{"friction.law": "jenkins", "friction.stiffness": 1e6})
+    changed = tiny.with_(**{"friction.law": "jenkins", "friction.stiffness": 1e6,
+                            "friction.friction_coefficient": 0.4})
     assert (changed.friction.stiffness, type(changed.friction).__name__) == (1e6, "JenkinsFriction")
     kept = tiny.with_(**{"friction.static_coefficient": 0.4, "friction.kinetic_coefficient": 0.2})
-    kept = kept.with_(**{"friction.law": "gaussian"})
+    kept = kept.with_(**{"friction.law": "gaussian", "friction.stribeck_velocity": 1e-3})
     assert (kept.friction.static_coefficient, kept.friction.kinetic_coefficient) == (0.4, 0.2)
+
+
+@pytest.mark.parametrize(("changes", "missing"), [
+    ({"friction": {}}, "the keys 'decay', 'kinetic_coefficient', 'static_coefficient' of law = "
+                       "'exponential'"),
+    ({"friction": {"law": "constant"}}, "the key 'friction_coefficient' of law = 'constant'"),
+    ({"friction": {"law": "jenkins", "friction_coefficient": 0.3}}, "the key 'stiffness'"),
+    ({"friction.law": "lugre"}, "'bristle_stiffness', 'stribeck_exponent', 'stribeck_velocity'")])
+def test_coefficients_of_friction_must_be_given(tiny, changes, missing):
+    with pytest.raises(InputError, match=r"\[friction\] lacks .*fecontact laws") as caught:
+        tiny.with_(**changes)
+    assert missing in str(caught.value)
 
 
 def test_a_decimal_comma_is_recognised(tiny):
@@ -508,11 +527,17 @@ def test_a_decimal_comma_is_recognised(tiny):
     ({"friction.static_coefficient": 40.0}, "static_coefficient = 40 of .* is above 2"),
     ({"normal.roughness_height": 5.2e-3}, "roughness_height = 0.0052 m is more than a hundredth"),
     ({"ground.speed": 1000.0}, r"ground\.speed = 1e\+03 m/s is above 100 m/s"),
-    ({"gap": 50.0}, "smallest gap of 50 m is more than 100 times"),
+    ({"gap": 50.0}, "no contact can close: the smallest gap is 50 m"),
+    ({"gap": 50.0, "simulation.t_end": 2.0}, "smallest gap of 50 m is more than 100 times"),
     ({"simulation.t_end": 1e5}, "periods of the fastest mode")])
 def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
-    study = tiny.with_(**changes)
-    planned = Planned(study.system(), {"": study.elastic_body()}, study.t_end)
-    found, = implausible_values(planned)
+    found, = implausible(tiny.with_(**changes))
     assert re.search(message, found)
-    assert not implausible_values(Planned(tiny.system(), {"": tiny.elastic_body()}, tiny.t_end))
+    assert not implausible(tiny)
+
+
+def implausible(study):
+    system = study.system()
+    bodies = PlannedBodies({"": study.elastic_body()}, study.contact_faces, system)
+    return (*implausible_bodies(bodies),
+            *implausible_values(Planned(system, study.t_end, np.zeros(system.size))))

@@ -236,7 +236,7 @@ geometry = { shape = "block", element_size = 0.06 }
 body = { thickness = 0.1 }
 basis = { modes = 2, contact_nodes = 1 }
 normal = { stiffness = 10e6, roughness_height = 10e-6, damping = 40.0 }
-friction = { law = "exponential", kinetic_coefficient = 0.55, decay = 1000.0 }
+friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
 load = { normal = 14.0 }
 simulation = { initial = "sliding", t_end = 5.0, outputs = 2501 }
 [drive]

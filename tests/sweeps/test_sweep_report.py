@@ -59,7 +59,7 @@ geometry = { shape = "block", element_size = 0.03 }
 body = { thickness = 0.1 }
 basis = { modes = 4, contact_nodes = 3, damping = 0.01 }
 normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
-friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55 }
+friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
 load = { normal = 14.0 }
 simulation = { t_end = 0.01, outputs = 11 }
 [sweep]

@@ -19,9 +19,9 @@ from fecontact.laws import (
 LAWS = {
     "jenkins": JenkinsFriction(2e5, 0.4),
     "iwan": IwanFriction(2e5, 0.4, elements=5),
-    "four-parameter-iwan": FourParameterIwanFriction(2e5, 0.4, chi=-0.3, elements=4),
+    "four-parameter-iwan": FourParameterIwanFriction(2e5, 0.4, chi=-0.3, elements=4, beta=0.1),
     "dahl": DahlFriction(0.4, 2e4),
-    "lugre": LuGreFriction(0.5, 0.4, 1e-3, bristle_stiffness=2e4, bristle_damping=0.5),
+    "lugre": LuGreFriction(0.5, 0.4, 1e-3, 2.0, bristle_stiffness=2e4, bristle_damping=0.5),
     "bouc-wen": BoucWenFriction(0.4, 2e-5),
 }
 
@@ -99,7 +99,7 @@ def test_energy_balance_of_a_run(name):
 def test_small_oscillation_on_the_contacts_own_stiffness(name, stiffness):
     """Before it slides, the contact is a spring: free motion has the frequency sqrt(k / m)."""
     law = LAWS[name] if name != "lugre" else LuGreFriction(
-        0.5, 0.4, 1e-3, bristle_stiffness=2e4, bristle_damping=0.0)
+        0.5, 0.4, 1e-3, 2.0, bristle_stiffness=2e4, bristle_damping=0.0)
     point = basis_from_matrices([[2.0]], [[0.0]], {"contact": [[[1.0], [0.0], [0.0]]]})
     system = ContactSystem(point, normal=PrescribedForce(20.0), friction=law)
     w = np.sqrt(stiffness / 2.0)
@@ -114,7 +114,7 @@ def test_small_oscillation_on_the_contacts_own_stiffness(name, stiffness):
 
 
 def test_groups_have_laws_of_their_own():
-    friction = {"left": JenkinsFriction(1e5, 0.4), "right": ExponentialFriction()}
+    friction = {"left": JenkinsFriction(1e5, 0.4), "right": ExponentialFriction(0.8, 0.55, 1e3)}
     system = ContactSystem(
         basis(("left", "right")), normal=RoughSurface(1e6, 10e-6, 20.0), friction=friction,
         ground=Ground(speed=5e-3), load=Load(normal=20.0),

@@ -48,7 +48,7 @@ def beam(load, fixed=None, modes=8, normal=None, **options):
     basis = fc.modal_basis(body(fixed), modes, contact="bottom", contact_nodes=4, C=(0.1, 0.02),
                            **{"damping": 0.01, **options})
     return fc.ContactSystem(basis, normal=normal or RoughSurface(10e6, 10e-6, 40.0),
-                            friction=ExponentialFriction(), load=load)
+                            friction=ExponentialFriction(0.8, 0.55, 1e3), load=load)
 
 
 def x_of(system, times, initial=None, **options):

@@ -28,12 +28,12 @@ def basis():
 def test_what_could_do_no_work_is_refused(parts, message):
     with pytest.raises(fc.InputError, match=message):
         fc.ContactSystem(basis(), normal=PrescribedForce((1.0, 1.0)),
-                         **{"friction": ExponentialFriction(), **parts})
+                         **{"friction": ExponentialFriction(0.8, 0.55, 1e3), **parts})
 
 
 def test_what_moves_is_driven_and_loaded():
     system = fc.ContactSystem(
         basis(), normal=PrescribedForce((1.0, 1.0)), drive=fc.Drive(stiffness_x=3.0),
         load=fc.Load(forces=[fc.PointLoad(1, "x", signal=Constant(1.0))]),
-        friction=ExponentialFriction())
+        friction=ExponentialFriction(0.8, 0.55, 1e3))
     assert system.rhs(0.0, np.zeros(4))[2:] @ system.basis.contact_T[1, 0] == pytest.approx(1.0)

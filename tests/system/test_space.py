@@ -28,10 +28,12 @@ FRICTION = {
     "dahl": DahlFriction(0.5, presliding_stiffness=2e4, exponent=1.0),
     "dahl 2.5": DahlFriction(0.5, presliding_stiffness=2e4, exponent=2.5),
     "lugre": LuGreFriction(0.8, 0.55, stribeck_velocity=0.01, bristle_stiffness=2e4,
-                           bristle_damping=5.0, viscous_coefficient=0.4, damping_decay=10.0),
-    "bouc-wen": BoucWenFriction(friction_coefficient=0.5, exponent=1.7, beta=0.7),
-    "jenkins": JenkinsFriction(stiffness=4e5),
-    "iwan": IwanFriction(stiffness=4e5, elements=3),
+                           bristle_damping=5.0, viscous_coefficient=0.4, damping_decay=10.0,
+                           stribeck_exponent=2.0),
+    "bouc-wen": BoucWenFriction(friction_coefficient=0.5, exponent=1.7, beta=0.7,
+                                yield_displacement=5e-6),
+    "jenkins": JenkinsFriction(stiffness=4e5, friction_coefficient=0.55),
+    "iwan": IwanFriction(stiffness=4e5, elements=3, friction_coefficient=0.55),
 }
 GROUNDS = {
     "flat": fc.Ground(speed=0.1, speed_y=-0.2, rotation_speed=3.0, centre=(0.01, 0.02)),

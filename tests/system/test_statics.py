@@ -41,7 +41,8 @@ def beam(contact_nodes=8, modes=12, B=(0.0, 0.01), C=(0.1, 0.02), fixed=None, **
     body = ElasticBody(mesh, Material(), THICKNESS, fixed=fixed or {})
     basis = modal_basis(body, modes, contact="bottom", contact_nodes=contact_nodes, B=B, C=C,
                         damping=0.01)
-    return ContactSystem(basis, **{"friction": ExponentialFriction(), "normal": NORMAL,
+    return ContactSystem(basis,
+                         **{"friction": ExponentialFriction(0.8, 0.55, 1e3), "normal": NORMAL,
                                    "load": Load(14.0), **parts})
 
 
@@ -175,7 +176,7 @@ def test_stiff_body_pressed_off_its_middle():
         ElasticBody(rectangle(LENGTH, 0.1, 16, 8), Material(), THICKNESS), 3, contact="bottom",
         contact_nodes=8, C=(0.12, 0.1))
     system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0),
-                           friction=ExponentialFriction())
+                           friction=ExponentialFriction(0.8, 0.55, 1e3))
     q = static_equilibrium(system)
     force = contact(system, q)[0]
     s = basis.contact_x - 0.1
@@ -191,7 +192,7 @@ def test_stiff_body_lifts_off_on_one_side():
     basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 3, contact="bottom",
                         contact_nodes=n, C=(0.15, 0.1))
     system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0),
-                           friction=ExponentialFriction())
+                           friction=ExponentialFriction(0.8, 0.55, 1e3))
     q = static_equilibrium(system)
     force = contact(system, q)[0]
     reach = 3.0 * 0.05
@@ -210,7 +211,7 @@ def test_number_of_nodes_does_not_matter_for_a_uniformly_pressed_body():
         basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 3, contact="bottom",
                             contact_nodes=n, C=(0.1, 0.02))
         system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, R, 0.0), load=Load(14.0),
-                               friction=ExponentialFriction())
+                               friction=ExponentialFriction(0.8, 0.55, 1e3))
         depth = contact(system, static_equilibrium(system))[2]
         assert depth == pytest.approx(np.full(len(depth), penetration_of(14.0)), rel=1e-8)
 
@@ -328,7 +329,7 @@ def test_light_body_slides_off_a_crest_until_its_nodes_carry_it():
                         contact="bottom", contact_nodes=6, C=(0.1, HEIGHT))
     ground = Ground(amplitude=2e-4, wavelength=0.15)
     system = ContactSystem(basis, normal=RoughSurface(1e7, 1e-6, 0.0), load=Load(2.0),
-                           ground=ground, friction=ExponentialFriction())
+                           ground=ground, friction=ExponentialFriction(0.8, 0.55, 1e3))
     q = static_equilibrium(system)
     F = contact(system, q)[0]
     x = basis.contact_T[:, 0] @ q
@@ -373,7 +374,7 @@ def test_load_beside_the_face_tips_the_body():
                                             r"which meets the ground at x = 0\.15 m; the contact "
                                             r"nodes hold it at x = 0\.0125 to 0\.0875 m\)"):
         static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
-                                         friction=ExponentialFriction()))
+                                         friction=ExponentialFriction(0.8, 0.55, 1e3)))
 
 
 def test_sliding_block_tips_over_its_short_face():
@@ -415,7 +416,7 @@ def test_point_pushed_across_names_both():
                                 {"contact": rows[None], "C": slanted})
     with pytest.raises(AnalysisError, match=r"translation along the ground \(x\)"):
         static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
-                                         friction=ExponentialFriction()))
+                                         friction=ExponentialFriction(0.8, 0.55, 1e3)))
 
 
 @pytest.mark.parametrize("height", [-3e-3, -1e-4, 1e-4, 3e-3])
@@ -428,7 +429,7 @@ def test_ground_far_from_the_reference_place(height):
                                 {"contact": rows[None], "C": rows},
                                 contact_x=[np.sign(height) * 0.02])
     q = static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0), ground=ground,
-                                         friction=ExponentialFriction()))
+                                         friction=ExponentialFriction(0.8, 0.55, 1e3)))
     assert q[1] == pytest.approx(height - penetration_of(14.0), rel=1e-9)
 
 
@@ -446,7 +447,7 @@ def test_light_bodies_on_waves_and_gaps(seed):
             basis, normal=RoughSurface(10.0 ** rng.uniform(6.0, 9.0), 1e-7, 0.0), load=Load(load),
             ground=Ground(amplitude=2e-4, wavelength=10.0 ** rng.uniform(-1.5, 0.0),
                           normal="vertical"),
-            gap=tuple(rng.uniform(0.0, 1e-5, n)), friction=ExponentialFriction())
+            gap=tuple(rng.uniform(0.0, 1e-5, n)), friction=ExponentialFriction(0.8, 0.55, 1e3))
         F, _, u = contact(system, static_equilibrium(system))
         assert F.sum() == pytest.approx(load, rel=1e-6)
         assert F @ (basis.contact_x - at) == pytest.approx(0.0, abs=1e-6 * load * LENGTH)
@@ -461,7 +462,8 @@ def bracket(reduction="residual", B=(LENGTH, HEIGHT), **parts):
     basis = modal_basis(ElasticBody(mesh, Material(), THICKNESS), 8, reduction=reduction,
                         contact="feet", contact_nodes=4, C=(0.19, HEIGHT), B=B)
     return ContactSystem(basis, **{"normal": RoughSurface(1e5, 1e-6, 0.0),
-                                   "friction": ExponentialFriction(), "load": Load(100.0),
+                                   "friction": ExponentialFriction(0.8, 0.55, 1e3),
+                                   "load": Load(100.0),
                                    "drive": Drive(stiffness_x=1e5), **parts})
 
 

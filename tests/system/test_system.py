@@ -41,12 +41,13 @@ def random_system(n=3, m=10, seed=0, **parts):
     """A system with everything in it."""
     parts = {
         "normal": RoughSurface(1e6, R, 40.0),
-        "friction": ExponentialFriction(0.8, 0.55, 1000.0, 1e6),
+        "friction": ExponentialFriction(0.8, 0.55, 1e3, 1e6),
         "ground": Ground(speed=1e-3, amplitude=20e-6, wavelength=2.5e-3),
         "drive": Drive(5610.0, 99.0, 0.768, 0.02, 0.5e-3, -0.47e-3, 13.8),
         "load": Load(14.0), "gap": 1e-6, **parts,
     }
-    return ContactSystem(random_basis(n, m, seed), **{"friction": ExponentialFriction(), **parts})
+    return ContactSystem(random_basis(n, m, seed),
+                         **{"friction": ExponentialFriction(0.8, 0.55, 1e3), **parts})
 
 
 def state_with(system, t, penetration, rate, slip, seed=1):
@@ -211,7 +212,7 @@ def mass_point(mass=2.0, **parts):
     basis = basis_from_matrices(mass * np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "B": rows, "C": rows})
     return ContactSystem(basis, **{"normal": RoughSurface(0.3e6, 5.2e-6, 6.0),
-                                   "friction": ExponentialFriction(), **parts})
+                                   "friction": ExponentialFriction(0.8, 0.55, 1e3), **parts})
 
 
 def acceleration(system, t=0.0, place=(0.0, 0.0), velocity=(0.0, 0.0)):
@@ -254,7 +255,7 @@ def test_spring_and_absolute_dashpot_at_the_excitation_point():
 def test_waviness_travels_with_the_ground():
     ground = Ground(speed=0.02, amplitude=1e-4, wavelength=0.05)
     system = mass_point(normal=RoughSurface(1e6, 1e-5, 0.0), ground=ground,
-                        friction=ExponentialFriction(0.0, 0.0))
+                        friction=ExponentialFriction(0.0, 0.0, 1000.0))
     # The crest lies at a quarter of the wavelength and has moved by V t.
     crest = 0.05 / 4.0 + 0.02 * 0.6
     assert acceleration(system, 0.6, (crest, 0.0))[1] == pytest.approx(0.5 * 1e6 * 95e-6, rel=1e-9)
@@ -268,7 +269,7 @@ def test_node_places_enter_the_phase():
                                 contact_x=[0.0125, 0.0375])
     system = ContactSystem(basis, normal=RoughSurface(2e6, 1e-5, 0.0),
                            ground=Ground(amplitude=1e-4, wavelength=0.05),
-                           friction=ExponentialFriction())
+                           friction=ExponentialFriction(0.8, 0.55, 1e3))
     history = system.contact_history(np.zeros(1), np.zeros((1, 4)))[0]
     assert history[:, kernels.PENETRATION] == pytest.approx([1e-4, -1e-4], rel=1e-12)
     assert history[:, kernels.NORMAL_FORCE] == pytest.approx([1e6 * 95e-6, 0.0], rel=1e-12)
@@ -302,7 +303,7 @@ def beam(contact_nodes, **options):
 @pytest.mark.parametrize("n", [2, 5, 12, "all"])
 def test_rigid_translation_is_the_same_for_any_number_of_nodes(n):
     parts = {"normal": RoughSurface(3e6, R, 40.0), "ground": Ground(speed=0.01),
-             "friction": ExponentialFriction()}
+             "friction": ExponentialFriction(0.8, 0.55, 1e3)}
     for depth, rate in ((0.4e-5, 0.001), (3e-5, -0.01), (2e-5, 0.2)):
         start = RigidStart((1e-3, -depth, 0.0), (0.004, -rate, 0.0))
         results = []
@@ -321,7 +322,7 @@ def test_rigid_modes_feel_the_resultant():
     """The acceleration of the rigid modes times the mass is the sum of all forces."""
     system = ContactSystem(
         beam(5), normal=RoughSurface(3e6, R, 40.0), ground=Ground(speed=0.01),
-        friction=ExponentialFriction(), load=Load(14.0),
+        friction=ExponentialFriction(0.8, 0.55, 1e3), load=Load(14.0),
         drive=Drive(stiffness_x=1e4, damping_x=2.0, amplitude_x=1e-4, angular_frequency=30.0))
     model = Model(system)
     rng = np.random.default_rng(7)
@@ -341,7 +342,7 @@ def test_rigid_modes_feel_the_resultant():
 
 def test_share_follows_tributary_length():
     system = ContactSystem(beam("all"), normal=RoughSurface(3e6, R, 40.0),
-                           friction=ExponentialFriction())
+                           friction=ExponentialFriction(0.8, 0.55, 1e3))
     assert system.share.sum() == pytest.approx(1.0, rel=1e-14)
     assert system.arrays.normal_parameters[:, 0].sum() == pytest.approx(3e6, rel=1e-13)
     assert system.arrays.normal_parameters[:, 2].sum() == pytest.approx(40.0, rel=1e-13)
@@ -439,7 +440,7 @@ def test_systems_cannot_be_changed():
     ("gap", "wide", "gap = 'wide' must be a number"),
     ("ground", 0.1, "ground = 0.1 must be a Ground"), ("basis", None, "basis = None"),
     ("normal", Ground(), "must be a NormalLaw"), ("load", Drive(), "must be a Load"),
-    ("normal", ExponentialFriction(), "must be a NormalLaw"),
+    ("normal", ExponentialFriction(0.8, 0.55, 1e3), "must be a NormalLaw"),
     ("friction", RoughSurface(1e6, R), "must be a FrictionLaw"), ("drive", Load(), "a Drive"),
 ])
 def test_changes_are_checked(name, value, message):

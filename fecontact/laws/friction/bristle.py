@@ -247,8 +247,8 @@ class DahlFriction(LimitedFriction):
     kernel: ClassVar = dahl
     planar_kernel: ClassVar = _planar_dahl
 
-    friction_coefficient: Positive = 0.55
-    presliding_stiffness: Annotated[Positive, Unit("1/m")] = 1e5
+    friction_coefficient: Positive
+    presliding_stiffness: Annotated[Positive, Unit("1/m")]
     exponent: OneOrAbove = 1.0
 
     def bristle_stiffness_of(self, share: Array) -> Array:
@@ -314,11 +314,11 @@ class LuGreFriction(MemoryFriction):
     kernel: ClassVar = lugre
     planar_kernel: ClassVar = _planar_lugre
 
-    static_coefficient: PerNode = 0.8
-    kinetic_coefficient: Positive = 0.55
-    stribeck_velocity: Annotated[Positive, Unit("m/s")] = 1e-3
-    stribeck_exponent: Positive = 2.0
-    bristle_stiffness: Annotated[Positive, Unit("1/m")] = 1e5
+    static_coefficient: PerNode
+    kinetic_coefficient: Positive
+    stribeck_velocity: Annotated[Positive, Unit("m/s")]
+    stribeck_exponent: Positive
+    bristle_stiffness: Annotated[Positive, Unit("1/m")]
     bristle_damping: Annotated[NotNegative, Unit("s/m")] = 0.0
     viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     damping_decay: Annotated[NotNegative, Unit("s/m")] = 0.0
@@ -385,8 +385,8 @@ class BoucWenFriction(LimitedFriction):
     kernel: ClassVar = bouc_wen
     planar_kernel: ClassVar = _planar_bouc_wen
 
-    friction_coefficient: NotNegative = 0.55
-    yield_displacement: Annotated[Positive, Unit("m")] = 5e-6
+    friction_coefficient: NotNegative
+    yield_displacement: Annotated[Positive, Unit("m")]
     beta: Annotated[PerNode, Bound("0.5 or above", lambda x: x >= 0.5)] = 0.5
     exponent: OneOrAbove = 1.0
 

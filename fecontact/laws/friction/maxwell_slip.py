@@ -133,8 +133,8 @@ class _MaxwellSlip(LimitedFriction):
     planar_kernel: ClassVar = _planar_maxwell_slip
     extensive: ClassVar = frozenset({"stiffness"})
 
-    stiffness: Annotated[Positive, Unit("N/m")] = 1e7
-    friction_coefficient: NotNegative = 0.55
+    stiffness: Annotated[Positive, Unit("N/m")]
+    friction_coefficient: NotNegative
 
     scales_with_force: ClassVar[bool] = True
 
@@ -290,8 +290,8 @@ class FourParameterIwanFriction(_MaxwellSlip):
     72 (2005) 752-760.
     """
 
-    chi: Annotated[float, Bound("above -1 and at most 0", lambda x: (x > -1.0) & (x <= 0.0))] = -0.5
-    beta: Annotated[float, Bound("zero or above", lambda x: x >= 0.0)] = 0.1
+    chi: Annotated[float, Bound("above -1 and at most 0", lambda x: (x > -1.0) & (x <= 0.0))]
+    beta: Annotated[float, Bound("zero or above", lambda x: x >= 0.0)]
     elements: int = 16
     spacing_ratio: Annotated[float, Bound("one or above", lambda x: x >= 1.0)] = 1.3
 

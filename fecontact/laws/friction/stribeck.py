@@ -120,8 +120,8 @@ class _FallingFriction(SmoothedFriction):
         mu_0 and mu_inf, zero or above; friction rises with velocity if mu_0 is below mu_inf.
     """
 
-    static_coefficient: NotNegative = 0.8
-    kinetic_coefficient: NotNegative = 0.55
+    static_coefficient: NotNegative
+    kinetic_coefficient: NotNegative
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class ExponentialFriction(_FallingFriction):
 
     kernel: ClassVar = exponential
 
-    decay: Annotated[NotNegative, Unit("s/m")] = 1000.0
+    decay: Annotated[NotNegative, Unit("s/m")]
     smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
@@ -179,7 +179,7 @@ class GaussianFriction(_FallingFriction):
 
     kernel: ClassVar = gaussian
 
-    stribeck_velocity: Annotated[Positive, Unit("m/s")] = 1e-3
+    stribeck_velocity: Annotated[Positive, Unit("m/s")]
     smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
@@ -210,7 +210,7 @@ class HyperbolicFriction(_FallingFriction):
 
     kernel: ClassVar = hyperbolic
 
-    stribeck_velocity: Annotated[Positive, Unit("m/s")] = 1e-3
+    stribeck_velocity: Annotated[Positive, Unit("m/s")]
     smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
@@ -230,7 +230,7 @@ class ConstantFriction(SmoothedFriction):
 
     kernel: ClassVar = constant
 
-    friction_coefficient: NotNegative = 0.55
+    friction_coefficient: NotNegative
     smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     viscous_coefficient: Annotated[NotNegative, Unit("s/m")] = 0.0
     smoothing: Smoothing = "arctan"
@@ -257,7 +257,7 @@ class ProductFriction(MemorylessFriction):
     .. math:: R = F\, a_1 (1 + a_2 e^{-b_1 |v|}) \arctan(b_2 v)
 
     R [N] has the sign of the slip velocity v [m/s]. At high velocities ``R / F = pi a_1 / 2``.
-    The default values are those of section 4.4.
+    Section 4.4 has a_1 = 0.14, a_2 = 1.14, b_1 = 2 s/m and b_2 = 100 s/m.
 
     Parameters
     ----------
@@ -277,10 +277,10 @@ class ProductFriction(MemorylessFriction):
 
     kernel: ClassVar = product
 
-    factor: NotNegative = 0.14
-    excess: NotNegative = 1.14
-    decay: Annotated[NotNegative, Unit("s/m")] = 2.0
-    smoothing_slope: Annotated[Positive, Unit("s/m")] = 100.0
+    factor: NotNegative
+    excess: NotNegative
+    decay: Annotated[NotNegative, Unit("s/m")]
+    smoothing_slope: Annotated[Positive, Unit("s/m")]
 
     @property
     def velocity_scale(self) -> float:
@@ -317,7 +317,7 @@ class GalvanettoFriction(_FallingFriction):
 
     kernel: ClassVar = galvanetto
 
-    decay: Annotated[NotNegative, Unit("s/m")] = 1000.0
+    decay: Annotated[NotNegative, Unit("s/m")]
     growth: Annotated[NotNegative, Unit("s^2/m^2")] = 0.0
     smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     smoothing: Smoothing = "arctan"
@@ -353,9 +353,9 @@ class CubicFriction(SmoothedFriction):
 
     kernel: ClassVar = cubic
 
-    static_coefficient: PerNode = 0.8
-    minimum_coefficient: NotNegative = 0.55
-    minimum_velocity: Annotated[Positive, Unit("m/s")] = 1e-2
+    static_coefficient: PerNode
+    minimum_coefficient: NotNegative
+    minimum_velocity: Annotated[Positive, Unit("m/s")]
     smoothing_slope: Annotated[Positive, Unit("s/m")] = 1e6
     smoothing: Smoothing = "arctan"
 

@@ -9,12 +9,12 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
-from fecontact.laws.signals.harmonic import Constant
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.arrays import with_sides
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.equilibrium.balance import Balance
+from fecontact.system.loads import mean_load
 from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
 from fecontact.system.nodes import SystemArrays
 
@@ -181,15 +181,9 @@ def _at_mean(system: ContactSystem) -> SystemArrays:
     Only constant signals contribute; time-dependent ones are taken to have zero mean.
     """
     arrays = system.arrays
-    load = arrays.constant_load.copy()
-    springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
-    given = [*zip(springs, system.drive.motions[: len(springs)], strict=True),
-             *zip(arrays.load_shapes, system.load.signals.values(), strict=True)]
-    for shape, source in given:
-        if isinstance(source, Constant):
-            load += source.value * shape
     return arrays._replace(
-        constant_load=load, drive_shapes=np.zeros_like(arrays.drive_shapes),
+        constant_load=mean_load(arrays, system.drive, system.load),
+        drive_shapes=np.zeros_like(arrays.drive_shapes),
         load_shapes=np.zeros_like(arrays.load_shapes))
 
 
