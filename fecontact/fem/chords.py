@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.mesh import Mesh
@@ -62,7 +63,7 @@ def chords(mesh: Mesh, boundary: str, least_angle: float = 0.0) -> Chords | None
                   float(error.max()))
 
 
-def _curved(mesh: Mesh, facets: Integers) -> Array:
+def _curved(mesh: Mesh, facets: Integers) -> NDArray[np.bool_]:
     """Whether facets (k, n) have an edge that the mesh gives as curved."""
     if not len(mesh.curved_edges):
         return np.zeros(len(facets), bool)
