@@ -117,7 +117,7 @@ def key_numbers(
             values[name], titles[name] = value, title
 
     found = steadiness(trajectory)
-    chosen = tuple(points) or (usual_point(trajectory),)
+    chosen = tuple(points) or (usual_point(trajectory.system.basis),)
     for point in chosen:
         # Outputs too far apart show frequencies that the motion does not have.
         if found.kind != "at rest" and not alias_message(late):

@@ -145,7 +145,7 @@ def _coarse(run: Trajectory) -> Flags:
     forces = np.column_stack([normal.sum(axis=1), friction.sum(axis=1)])
     large = np.abs(forces).max(axis=0)
     spread = np.maximum(np.ptp(forces, axis=0), _SMALL_FORCE * large)
-    each = max(float(np.ptp(normal, axis=0).max()), _SMALL_FORCE * float(large[0]))
+    each = max(float(np.ptp(normal, axis=0).max(initial=0.0)), _SMALL_FORCE * float(large[0]))
     flags = np.zeros(len(run.time) - 1, dtype=bool)
     for values, scale in ((moved, sizes), (rates, rate_sizes), (forces, spread),
                           (normal, np.full(normal.shape[1], each))):

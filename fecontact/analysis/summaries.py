@@ -17,6 +17,7 @@ from fecontact.core.types import Array
 from fecontact.integrate.contact_quantities import ContactState
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces
+from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.powers import POWERS
 
 Point = str | int
@@ -35,10 +36,11 @@ class Summary:
         return summary(self.function)
 
 
-def usual_point(trajectory: Trajectory) -> Point:
-    """Default point: B, or the middle contact node for a basis without B."""
-    basis = trajectory.system.basis
-    return "B" if basis.T[0].any() else basis.contact_nodes // 2
+def usual_point(basis: ModalBasis) -> str | int:
+    """Default point: B; the middle contact node if no mode moves B, and C without contact."""
+    if basis.T[0].any():
+        return "B"
+    return basis.contact_nodes // 2 if basis.contact_nodes else "C"
 
 
 def duration(trajectory: Trajectory) -> float:
@@ -91,12 +93,12 @@ def rms_velocity(trajectory: Trajectory, point: Point | None = None) -> float:
 
 def _velocity(trajectory: Trajectory, point: Point | None) -> Array:
     """Velocity (N, d) of a point [m/s]."""
-    found = trajectory.velocity(usual_point(trajectory) if point is None else point)
+    found = trajectory.velocity(usual_point(trajectory.system.basis) if point is None else point)
     return found[:, : trajectory.system.basis.dimension]
 
 
 def _of_point(trajectory: Trajectory, point: Point | None) -> Array:
-    return trajectory.displacement(usual_point(trajectory) if point is None else point)
+    return trajectory.displacement(usual_point(trajectory.system.basis) if point is None else point)
 
 
 def stick_fraction(trajectory: Trajectory) -> float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from fecontact.analysis.summaries import usual_point
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, titled
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
@@ -70,7 +71,7 @@ def follow_branches(
     """
     basis, shown = system.basis, wanted.point
     if shown is None:
-        shown = "B" if basis.T[0].any() else basis.contact_nodes // 2
+        shown = usual_point(basis)
     # Check the names before the long computation.
     basis.point_row(shown, wanted.component)
     field = contact_field(system, {wanted.checked_parameter: wanted.first})

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecontact.analysis.histories import usual_component
+from fecontact.analysis.summaries import usual_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, titled
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, frequency_response
 from fecontact.core.errors import FecontactError
@@ -42,7 +43,7 @@ def observed_point(
     """Point and component that are observed; InputError if they do not exist."""
     basis, point = system.basis, wanted.point
     if point is None:
-        point = "B" if basis.T[0].any() else basis.contact_nodes // 2
+        point = usual_point(basis)
     component = wanted.component or usual_component(system)
     _ = basis.point_row(point, component)
     return point, component

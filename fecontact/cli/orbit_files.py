@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecontact.analysis.summaries import usual_point
 from fecontact.cli.run_files import StoredRun
 from fecontact.core.checks import whole_number
 from fecontact.core.errors import FecontactError, InputError, choices
@@ -209,7 +210,7 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
     settings = tomllib.loads(model.study or "").get("branch", {})
     basis, point = model.system.basis, settings.get("point")
     if point is None:
-        point = "B" if basis.T[0].any() else basis.contact_nodes // 2
+        point = usual_point(basis)
     return report_branches(named, field_of(first, model), target, title=title, study=model.study,
                            observe=(point, settings.get("component", "x")),
                            y=f"observed_{settings.get('show', 'maximum')}")

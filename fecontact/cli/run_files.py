@@ -97,19 +97,21 @@ def write_results_of_run(
 def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
     """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
     from fecontact.analysis.histories import usual_component
+    from fecontact.analysis.summaries import usual_point
     from fecontact.output.plots import run as plots
     from fecontact.output.plots.contact_map import plot_contact_map
 
     system, points = trajectory.system, study.output.points
-    middle = system.basis.contact_nodes // 2
-    point = points[0] if points else "B" if system.basis.T[0].any() else middle
-    history, phase, contact_map, energies = files = [
-        folder / f"{study.name}-{kind}.png"
-        for kind in ("history", "phase", "contact_map", "energies")]
+    point = points[0] if points else usual_point(system.basis)
+    kinds = ["history", "phase", "energies", *(["contact_map"] if system.basis.contact_nodes
+                                               else [])]
+    history, phase, energies, *contact_map = files = [
+        folder / f"{study.name}-{kind}.png" for kind in kinds]
     plots.plot_history(trajectory, points, path=history)
     plots.plot_phase(trajectory, point, usual_component(system), path=phase)
-    plot_contact_map(trajectory, path=contact_map)
     plots.plot_energies(trajectory, path=energies)
+    for file in contact_map:
+        plot_contact_map(trajectory, path=file)
     return files
 
 

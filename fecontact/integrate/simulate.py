@@ -210,9 +210,9 @@ def _warn_of_active_friction(run: Trajectory, rtol: float) -> None:
     if not np.isfinite(lost).all() or run.statistics.get("impacts"):
         return
     given = (np.maximum.accumulate(lost, axis=0) - lost).max(axis=0)
-    j = int(given.argmax())
-    if given[j] == 0.0:
+    if not given.any():
         return
+    j = int(given.argmax())
     exchanged = np.trapezoid(np.abs(run.slip_power), run.time, axis=0)
     if (given[j] > max(_GIVEN, 1e3 * rtol) * exchanged.max()
             and given[j] > rtol * run.energies.stored.max()):
@@ -247,7 +247,8 @@ def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
 
 
 def _depth(system: ContactSystem, state: Array, time: float) -> float:
-    return float(system.contact_history(np.array([time]), state[None])[0, :, PENETRATION].max())
+    history = system.contact_history(np.array([time]), state[None])
+    return float(history[0, :, PENETRATION].max(initial=-np.inf))
 
 
 def _depth_at_rest(system: ContactSystem, time: float) -> float:

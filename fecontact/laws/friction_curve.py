@@ -202,18 +202,19 @@ def _nodes(law: Curve) -> int:
 
 
 def _table(law: Curve, nodes: int) -> Array:
-    return law.table(np.full(nodes, 1.0 / nodes))
+    return law.table(np.full(nodes, 1.0 / max(nodes, 1)))
 
 
 def _per_node(
     law: Curve, nodes: int, answer: Callable[[Curve, Array], list[float]]
 ) -> Array:
     """Results (n, ...) from the law and parameters of one node, computed once for equal nodes."""
-    rows, first, inverse = np.unique(_table(law, nodes), axis=0, return_index=True,
+    # Of one node without any: the shape of a result is known from one only.
+    rows, first, inverse = np.unique(_table(law, max(nodes, 1)), axis=0, return_index=True,
                                      return_inverse=True)
     answers = []
     for row, node in zip(rows, first, strict=True):
         own = {entry.name: value[node] for entry in fields(cast(Any, law))
                if isinstance(value := getattr(law, entry.name), tuple)}
         answers.append(answer(replace(cast(Any, law), **own), np.ascontiguousarray(row)))
-    return np.array(answers)[inverse.reshape(-1)]
+    return np.array(answers)[inverse.reshape(-1)[:nodes]]

@@ -81,11 +81,13 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
                if isinstance(one, NonlinearSpring)}
     groups = {name: count for name, count in basis.groups if name not in springs}
     if not groups and not springs:
-        raise InputError(f"{title}: there are no contact nodes; name the faces that touch in "
-                         f"[interfaces.NAME], or join the bodies by a nonlinear spring in "
-                         f"[links.NAME]." if several else
-                         f"{title}: [basis]: contact = [] leaves the body without contact nodes; "
-                         f"name the boundary that touches the ground.")
+        for section in LAWS:
+            if getattr(study, section) is not None:
+                where = ("name the faces that touch in [interfaces.NAME]" if several else
+                         "name the boundary that touches the ground, [basis] contact")
+                raise InputError(f"{title}: [{section}] is a law of contact nodes, but there are "
+                                 f"no contact nodes; {where}, or leave out [{section}] for a "
+                                 f"linear system.")
     for name in study.interfaces:
         if name not in groups:
             raise InputError(f"{title}: [interfaces.{name}]: the basis has no interface '{name}'"

@@ -123,6 +123,7 @@ class BasisSettings:
         Number of modes, the rigid ones included.
     contact : str or list of str
         Boundary in contact with the ground, or several; each becomes an interface of its name.
+        Without any, ``contact = []``, the system is linear and needs no laws.
         Faces of solids look down, towards -z.
     contact_nodes : int or 'all', of solids also two integers, or list
         Number of contact nodes, or 'all' for every mesh node of the boundary; a list has one entry

@@ -43,8 +43,10 @@ def system_arrays(
     normal, normal_parameters = _law_table(normal_groups)
     friction, friction_parameters = _law_table(friction_groups)
     _set_return_times(basis, friction_groups, friction_parameters)
-    memory = [np.full(nodes.stop - nodes.start, (d - 1) * law.memory, dtype=np.int64)
-              for nodes, _, law in friction_groups]
+    # Of a node at least, as kernels take the largest number; without contact no node has it.
+    memory = np.zeros(max(n, 1), dtype=np.int64)
+    for nodes, _, law in friction_groups:
+        memory[nodes] = (d - 1) * law.memory
     scale, surface = ground.friction_scale_kernel, ground.surface_kernel
     first, second = motion.motions[0], motion.motions[-1]
     rows = basis.contact_T
@@ -73,7 +75,7 @@ def system_arrays(
         normal=normal,
         friction=friction,
         planar=_planar(friction_groups) if d == 3 else np.zeros(0, dtype=np.int64),
-        memory=np.concatenate(memory),
+        memory=memory,
         on_ground=basis.ground_nodes.astype(np.int64),
         profile=ground.profile_kernel.address,
         surface=0 if surface is None else surface.address,

@@ -18,6 +18,7 @@ from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.ground.ground import Ground
+from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.reduction.assembly.links import Links
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
@@ -53,6 +54,9 @@ NO_FRICTION_LAW = ("{}, although contact nodes can move along the ground: give a
                    "\"frictionless\" (Frictionless() in Python); `fecontact laws` lists them.")
 
 PARTS = ("normal", "friction", "sliding", "ground", "drive", "load")
+# Laws of a system without contact nodes, which act nowhere: its equations are linear.
+NO_LAWS: Mapping[str, NormalLaw | FrictionLaw] = MappingProxyType(
+    {"normal": PrescribedForce(0.0), "friction": ConstantFriction(0.0)})
 IN_SPACE_ONLY = frozenset({"ground.speed_y", "ground.rotation_speed", "ground.centre",
                            "ground.wave_direction", "drive.stiffness_z",
                            "drive.damping_z", "drive.amplitude_z"})
@@ -80,7 +84,8 @@ class ContactSystem(Summarised):
     ----------
     basis : ModalBasis
     normal : normal law, or mapping of interface to normal law
-        Normal force F (on the body, upwards) from penetration and its rate.
+        Normal force F (on the body, upwards) from penetration and its rate. Required if there are
+        contact nodes; a system without contact nodes is linear and has no laws.
     friction : friction law, or mapping of interface to friction law
         Friction force R (on the body, against the slip velocity). Required if a contact node can
         move along the ground.
@@ -107,14 +112,14 @@ class ContactSystem(Summarised):
     Raises
     ------
     InputError
-        Without contact nodes, a normal law, or a required friction law; for a part of wrong type,
-        laws for unknown interfaces, parameters or gaps that do not match the number of contact
-        nodes, speeds that cannot be combined (:attr:`prescribed_motion`), laws that
+        Without a required normal or friction law; for laws without contact nodes, a part of wrong
+        type, laws for unknown interfaces, parameters or gaps that do not match the number of
+        contact nodes, speeds that cannot be combined (:attr:`prescribed_motion`), laws that
         :func:`require_sound` refuses, and drives or loads in a direction in which no mode moves
         their point.
     """
 
-    # Basis and normal are required, with a message more helpful than Python's own.
+    # Basis and, with contact nodes, normal are required, with a message more helpful than Python's own.
     basis: ModalBasis = None  # type: ignore[assignment]
     normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
     friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]
@@ -147,8 +152,7 @@ class ContactSystem(Summarised):
     def _check(self) -> None:
         """Check all parts and bring them into their stored form."""
         if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
-            raise InputError("ContactSystem: there are no contact nodes; give the basis contact "
-                             "nodes, or the bodies an interface or a nonlinear spring.")
+            self._without_contact()
         if self.normal is None:
             raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
         if self.friction is None:
@@ -173,6 +177,17 @@ class ContactSystem(Summarised):
                 require_sound(one)
         require_motion(self.basis, self.drive, self.load)
         _ = self.arrays
+
+    def _without_contact(self) -> None:
+        """Give a system without contact nodes the laws :data:`NO_LAWS`; refuse other ones."""
+        for name, law in NO_LAWS.items():
+            given = getattr(self, name)
+            if given and given != law:
+                raise InputError(f"ContactSystem: {name} = {given!r} is a law of contact nodes, "
+                                 f"but there are no contact nodes; give the basis contact nodes "
+                                 f"or the bodies an interface, or leave out the law for a linear "
+                                 f"system.")
+            object.__setattr__(self, name, law)
 
     def _require_parts(self, names: Iterable[str]) -> None:
         for name in names:
@@ -223,8 +238,9 @@ class ContactSystem(Summarised):
         return [
             *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
               if name in own),
-            *((kind, names) for kind in ("normal", "friction") if (names := names_of_laws(
-                getattr(self, kind), self.basis.springs if kind == "friction" else ()))),
+            *((kind, names) for kind in NO_LAWS if self.basis.contact_nodes and (
+                names := names_of_laws(
+                    getattr(self, kind), self.basis.springs if kind == "friction" else ()))),
             *([("sliding", listed([f"{name} {sliding_speed(one)}" for name, one
                                    in self.sliding.items()]))] if self.sliding else []),
             ("ground", quantity(ground.speed, "m/s")
@@ -371,7 +387,9 @@ class ContactSystem(Summarised):
         if times.ndim != 1 or states.shape != (len(times), self.size):
             raise InputError(f"The states at {times.size} times must have shape ({times.size}, "
                              f"{self.size}), not {states.shape}.")
-        out = np.empty((len(times), self.basis.contact_nodes, kernels.state_columns(self.arrays)))
+        columns = (kernels.STATE_COLUMNS if self.basis.dimension == 2
+                   else kernels.SPACE_STATE_COLUMNS)
+        out = np.empty((len(times), self.basis.contact_nodes, columns))
         kernels.contact_history(times, states, self.arrays, out)
         return out
 

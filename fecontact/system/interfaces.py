@@ -217,7 +217,8 @@ class PrescribedMotion:
 
     def largest_speed(self, t0: float, t1: float) -> float:
         """Upper bound of the speed of any node's other side from t0 to t1 [m/s]."""
-        largest = np.abs(self.factors.reshape(len(self.motions), len(self.factors[0]), -1))
+        k, n, *_ = self.factors.shape
+        largest = np.abs(self.factors.reshape(k, n, 1 if self.factors.ndim == 2 else 2))
         speeds = [one.largest_speed(t0, t1) for one in self.motions]
         found = np.tensordot(speeds, largest, 1)
         return float(np.linalg.norm(found, axis=-1).max(initial=0.0))

@@ -221,12 +221,10 @@ def test_case_files_hold_several_bodies(tmp_path):
 
 def test_bad_input_is_named():
     a, b, law = mass(1.0), mass(2.0), LinearContact(1e5)
-    held = basis_from_matrices(np.eye(1), np.eye(1), {"p": np.eye(3, 1)})
     pairing = PointPairing("a", "p", "b", "p")
     touch = Interface("touch", pairing, law, NO_FRICTION)
     for message, arguments in (
         ("two interfaces have the name 'touch'", {"interfaces": [touch, touch]}),
-        ("there are no contact nodes", {"bodies": {"held": held}, "interfaces": []}),
         ("Interface 'touch' lacks friction", {"interfaces": [Interface("touch", pairing, law)]}),
         ("no body 'c'; the bodies are 'a', 'b'",
          {"interfaces": [Interface("touch", PointPairing("c", "p", "b", "p"), law)]}),

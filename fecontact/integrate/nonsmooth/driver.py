@@ -348,7 +348,7 @@ def _clusters(Tx: Array, sliding: Array) -> tuple[Integers, Array]:
             cluster[j] = len(rows)
             rows.append(row)
             factors.append(float(sliding[j]))
-    return cluster, np.array(rows)
+    return cluster, np.array(rows).reshape(-1, Tx.shape[1])
 
 
 def _of_clusters(tangential: Array, cluster: Integers) -> Array:

@@ -129,7 +129,9 @@ def _blocks(
 ) -> Blocks:
     """The blocks of ranges of modes and nodes, by which of them are not zero."""
     m, n = len(shapes), nodes[-1][1]
-    tangents = shapes.shape[1] // n
+    tangents = shapes.shape[1] // max(n, 1)
+    # Without contact nodes no mode moves any; kernels step by the length of ``nodes``.
+    moved = moved & (n > 0)
     parts = [(*modes[a], *nodes[b]) for b, a in np.argwhere(moved)]
     position, starts, reach = _elimination(modes, coupled)
     most = int(moved.sum(axis=1).max())
@@ -138,7 +140,7 @@ def _blocks(
         for place, a in enumerate(np.flatnonzero(moved[b])):
             spans[first:last, place] = modes[a]
     return Blocks(
-        nodes=np.arange(n), used=np.array([n]), shapes=shapes,
+        nodes=np.arange(max(n, 1)), used=np.array([n]), shapes=shapes,
         parts=_table(parts, 4),
         tiles=_table([(*part[:2], *columns) for part in parts
                       for columns in _each(part[2:], n, tangents, n <= FEW)], 4),

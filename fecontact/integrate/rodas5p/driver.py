@@ -248,7 +248,7 @@ def control_for(
         depth[nodes] = law.penetration_scale
         untouched[nodes] = law.untouched(nodes.stop - nodes.start)
     # What friction remembers fades without force.
-    untouched[system.arrays.memory > 0] = -np.inf
+    untouched[system.arrays.memory[: len(untouched)] > 0] = -np.inf
     with np.errstate(over="ignore", invalid="ignore"):
         energy = energy_scale(system, state) if work else 0.0
     counts = slider_counts(system)

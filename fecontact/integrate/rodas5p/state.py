@@ -282,4 +282,4 @@ def progress_for(
     return Progress(
         numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
         np.zeros(modes), np.zeros(powers), np.zeros(powers),
-        gradients_for(nodes, (size - 2 * modes) // nodes, dimension))
+        gradients_for(nodes, (size - 2 * modes) // max(nodes, 1), dimension))

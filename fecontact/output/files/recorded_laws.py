@@ -172,7 +172,7 @@ def recorded_system(
         history=_Recorded(rows, contact, needs),
         energy=_Recorded(penetration, energy, needs),
         sticking=_Recorded(np.hstack([slip, normal, friction]), contact_state == 1, needs),
-        states=0 if memory is None else memory.shape[1] // basis.contact_nodes, needs=needs)
+        states=0 if memory is None else memory.shape[1] // max(basis.contact_nodes, 1), needs=needs)
 
 
 def _law(part: str, tables: Mapping[str, Any], where: str, needs: str) -> Any:

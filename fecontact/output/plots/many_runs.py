@@ -61,7 +61,7 @@ def plot_runs(
     """
     require_runs("plot_runs", runs)
     first = next(iter(runs.values()))
-    point = usual_point(first) if point is None else point
+    point = usual_point(first.system.basis) if point is None else point
     component = usual_component(first.system) if component is None else component
     found = [history(run, quantity, point, component) for run in runs.values()]
     spectra = [amplitude_spectrum(run.time, one.values, resample=True)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.histories import Point, is_relative, point_name
 from fecontact.analysis.resolved import resolved
+from fecontact.analysis.summaries import usual_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
@@ -73,7 +74,7 @@ def plot_history(
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
     colours, faces = distinct_colours(len(points)), contact_faces(trajectory.system.basis)
-    single = not faces[0].name
+    single = not faces or not faces[0].name
     motions = [("displacement", "m", [trajectory.displacement(point) for point in points]),
                ("velocity", "m/s", [trajectory.velocity(point) for point in points])]
     motions = [(name, unit, _without_round_off(values)) for name, unit, values in motions]
@@ -82,7 +83,9 @@ def plot_history(
         value[:, row].any() for _, _, values in motions for value in values)] or [0]
     rubs = bool(trajectory.friction_forces.any())
     panels: list[Any] = [[f"{name} {_AXES[row]}" for name, _, _ in motions] for row in moving]
-    panels.append(["normal force", "friction force" if rubs else "normal force"])
+    touches = bool(trajectory.system.basis.contact_nodes)
+    if touches:
+        panels.append(["normal force", "friction force" if rubs else "normal force"])
     with new_figure(10.0, 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
         axes = figure.subplot_mosaic(panels, sharex=True)
@@ -102,7 +105,7 @@ def plot_history(
                     trajectory.friction_force)
         if d == 3 and rubs:
             _friction_in_space(axes["friction force"], trajectory, time, faces)
-        for panel, name, forces in (normal, friction)[: 1 + (rubs and d == 2)]:
+        for panel, name, forces in (normal, friction)[: touches + (rubs and d == 2)]:
             totals = [forces[:, face.nodes].sum(axis=1) for face in faces]
             factor = _labelled(axes[panel], f"total {name}", "N", *totals)
             for face, total, colour in zip(faces, totals, ["#303030"] if single else
@@ -112,7 +115,7 @@ def plot_history(
             figure.align_ylabels([axes[panel] for panel in side])
         figure.legend(*axes[panels[0][0]].get_legend_handles_labels(), loc="outside upper center",
                       ncols=max(1, min(len(points), 6)))
-        if not single:
+        if not single and touches:
             # Above the forces: within the panel it would hide curves.
             axes["normal force"].legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98),
                                         ncols=max(1, min(len(faces), 6)))
@@ -258,10 +261,12 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
 
 
 def usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
-    """Point B, unless it is fixed, and the middle contact node of each face."""
+    """Point B, unless it is fixed, and the middle contact node of each face; C without any."""
     basis = trajectory.system.basis
-    middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)]
-    return (*(("B",) if basis.T[0].any() else ()), *middles[:_MOST_MIDDLES])
+    middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)
+               if face.nodes.stop > face.nodes.start]
+    found = (*(("B",) if basis.T[0].any() else ()), *middles[:_MOST_MIDDLES])
+    return found or (usual_point(basis),)
 
 
 def _label(point: Point, trajectory: Trajectory) -> str:

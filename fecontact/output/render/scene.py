@@ -185,13 +185,16 @@ class Scene(BodyScene):
         super().__init__(motion, width, height, line=line, fineness=fineness)
         if motion.has_ground:
             self._add_ground(width, fineness * line)
-        self._add_contact(fineness * line)
+        self._touches = motion.trajectory.system.basis.contact_nodes > 0
+        if self._touches:
+            self._add_contact(fineness * line)
 
     def _draw(self, frame: int) -> None:
         super()._draw(frame)
         if self._motion.has_ground:
             self._draw_ground(frame)
-        self._draw_contact(frame)
+        if self._touches:
+            self._draw_contact(frame)
 
     def _aim(self, aspect: float) -> None:
         """Place the camera so that body and ground fill the picture in all frames."""

@@ -62,7 +62,7 @@ def report_runs(
     found = compare_runs(runs, points, studies=studies)
     first = next(iter(runs.values()))
     component = usual_component(first.system) if component is None else component
-    chosen: Sequence[Point] = tuple(points) or (usual_point(first),)
+    chosen: Sequence[Point] = tuple(points) or (usual_point(first.system.basis),)
     payload, colours = Payload(), distinct_colours(len(runs))
     begin = max(float(run.time[0]) for run in runs.values())
     end = min(float(run.time[-1]) for run in runs.values())

@@ -131,6 +131,8 @@ def touching_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
     AnalysisError
         If there are none, for ``what`` is shown on them.
     """
+    if not basis.contact_nodes:
+        raise AnalysisError(f"There is no {what}: the system has no contact nodes.")
     found = tuple(face for face in _passes(basis) if not face.spring)
     if not found:
         raise AnalysisError(f"There is no {what}: nonlinear springs join the bodies, which touch "

@@ -50,7 +50,7 @@ class Balance:
     def _penetration(self, scale: float) -> float:
         """Uniform penetration under which the face carries the load, at most 1e6 scales."""
         # Work of the load in a unit mean rise of the contact nodes.
-        rise = self.arrays.Ty.mean(axis=0)
+        rise = self.arrays.Ty.sum(axis=0) / max(len(self.arrays.Ty), 1)
         wanted = abs(float(self.load @ rise)) / max(float(rise @ rise), 1e-300)
         depth = scale
         while depth < 1e6 * scale and self.normal(np.full(len(self.arrays.gap), depth))[0].sum() < (
@@ -208,8 +208,8 @@ class Balance:
 
     def _limited(self, step: Array, longest: float, exactly: bool = False) -> Array:
         """A step in which no contact node moves farther than ``longest``."""
-        moved = max(float(np.abs(self.arrays.Tx @ step).max()),
-                    float(np.abs(self.arrays.Ty @ step).max()), 1e-300)
+        moved = max(float(np.abs(self.arrays.Tx @ step).max(initial=0.0)),
+                    float(np.abs(self.arrays.Ty @ step).max(initial=0.0)), 1e-300)
         return step * (longest / moved if exactly else min(1.0, longest / moved))
 
     def _energy(self, q: Array, stored: Callable[[Array], Array]) -> float:
