@@ -119,7 +119,7 @@ class ContactSystem(Summarised):
         their point.
     """
 
-    # Basis and, with contact nodes, normal are required, with a message more helpful than Python's own.
+    # Basis, and normal of contact nodes, are required: the message is better than Python's own.
     basis: ModalBasis = None  # type: ignore[assignment]
     normal: NormalLaw | Mapping[str, NormalLaw] = None  # type: ignore[assignment]
     friction: FrictionLaw | Mapping[str, FrictionLaw] = None  # type: ignore[assignment]

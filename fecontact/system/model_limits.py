@@ -299,7 +299,7 @@ def _unheld(planned: Planned) -> Iterator[str]:
 def _gap(planned: Planned) -> Iterator[str]:
     """Gaps that the body cannot close within the run, or that are far larger than it."""
     system, extents = planned.system, planned.extents
-    gap = float(np.min(system.arrays.gap + _untouched(system)))
+    gap = float(np.min(system.arrays.gap + _untouched(system), initial=np.inf))
     if not extents or not np.isfinite(gap) or gap <= system.penetration_scale:
         return
     reach = _reach(planned)
