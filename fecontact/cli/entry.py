@@ -1,5 +1,6 @@
 """Entry point: runs a command line; errors become one sentence and an exit code."""
 
+import re
 import sys
 import warnings
 from typing import Any
@@ -15,6 +16,9 @@ from fecontact.core.resources.memory import (
     require_address_space,
     shown_memory,
 )
+
+
+_MISSING = re.compile(r"Glyph (\d+) .* missing from")  # a warning of matplotlib
 
 
 def main() -> None:
@@ -41,11 +45,20 @@ def execute(tokens: list[str]) -> int:
 
 
 def _show_warning(otherwise: Any) -> Any:
-    """Print a warning as one line, without its place in the code."""
+    """Print a warning as one line, without its place in the code.
+
+    Characters that the font of pictures lacks are named once.
+    """
+    missing: list[str] = []
 
     def show(message: Any, category: Any, *rest: Any, **more: Any) -> None:
         if issubclass(category, ModelWarning):
             note(f"warning: {message}")
+        elif (found := _MISSING.match(str(message))) is not None:
+            if not missing:
+                note(f"warning: the font of pictures lacks '{chr(int(found[1]))}' and perhaps "
+                     f"other characters of a name; boxes stand in their place.")
+            missing.append(found[1])
         else:
             otherwise(message, category, *rest, **more)
 

@@ -46,7 +46,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
 
 
 # Beyond these limits, products of a few values may overflow or underflow.
-_LEAST, _MOST = 1e-60, 1e60
+_LEAST, LARGEST = 1e-60, 1e60
 
 
 def require_positive(owner: str, **values: float) -> None:
@@ -55,27 +55,33 @@ def require_positive(owner: str, **values: float) -> None:
         if not (_is_number(value) and 0.0 < value <= sys.float_info.max):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number above "
                              f"zero.")
-        if not _LEAST <= value <= _MOST:
+        if not _LEAST <= value <= LARGEST:
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number from {_LEAST:g} "
-                             f"to {_MOST:g}.")
+                             f"to {LARGEST:g}.")
 
 
 def require_not_negative(owner: str, **values: float) -> None:
-    """Raise :class:`InputError` unless every value is a finite number of at least zero."""
+    """Raise :class:`InputError` unless every value is a number from zero to 1e60."""
     for name, value in values.items():
         if not (_is_number(value) and 0.0 <= value <= sys.float_info.max):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number, zero or "
                              f"above.")
+        if value > LARGEST:
+            raise InputError(f"{owner}: {name} = {shown(value)} must be a number from zero to "
+                             f"{LARGEST:g}.")
 
 
 def require_finite(owner: str, **values: float) -> None:
-    """Raise :class:`InputError` unless every value is a finite number."""
+    """Raise :class:`InputError` unless every value is a number from -1e60 to 1e60."""
     for name, value in values.items():
         if not _is_number(value):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number.")
         # Whole numbers may be larger than any other.
         if not abs(value) <= sys.float_info.max:
             raise InputError(f"{owner}: {name} = {shown(value)} must be finite.")
+        if abs(value) > LARGEST:
+            raise InputError(f"{owner}: {name} = {shown(value)} must be a number from "
+                             f"{-LARGEST:g} to {LARGEST:g}.")
 
 
 def require_choice(owner: str, name: str, value: object, names: Iterable[str]) -> None:

@@ -14,7 +14,7 @@ from typing_extensions import TypeAliasType
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.docstrings import inherit_documentation
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import LARGEST, InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.laws.friction_curve import stick_velocity
 from fecontact.laws.sampling import stored_energy
@@ -108,6 +108,9 @@ class NodeLaw:
             value = tuple(float(item) for item in array) if array.ndim else float(array)
             if not np.isfinite(value).all():
                 raise InputError(f"{self._title(entry.name)} = {value!r} must be finite.")
+            if np.abs(value).max() > LARGEST:
+                raise InputError(f"{self._title(entry.name)} = {shown(value)} must be a number "
+                                 f"from {-LARGEST:g} to {LARGEST:g}.")
             object.__setattr__(self, entry.name, value)
             for one in ranges:
                 self.require(one.allowed, one.holds, entry.name)

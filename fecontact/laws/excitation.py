@@ -272,6 +272,7 @@ class Load:
             if gravity.shape not in ((2,), (3,)) or not np.isfinite(gravity).all():
                 raise InputError(f"Load: gravity = {self.gravity!r} must be two finite numbers, "
                                  f"the accelerations in x and y, or of a solid three [m/s^2].")
+            require_finite("Load", gravity=float(gravity[np.argmax(np.abs(gravity))]))
             object.__setattr__(self, "gravity", tuple(gravity.tolist()))
         for name, kind in (("forces", PointLoad), ("boundaries", BoundaryLoad)):
             given = getattr(self, name)

@@ -11,6 +11,7 @@ from fecontact.core.errors import (
     FecontactError,
     InputError,
     require_finite,
+    require_not_negative,
     require_positive,
     shown,
 )
@@ -105,4 +106,5 @@ def gap_values(gap: Gap, places: Array) -> float | tuple[float, ...]:
     if not np.isfinite(values).all() or (values < 0.0).any():
         raise InputError(f"gap = {values.min() if values.size else values} must be finite and "
                          f"zero or above.")
+    require_not_negative("gap", gap=float(values.max(initial=0.0)))
     return tuple(values.tolist()) if values.ndim else float(values)

@@ -2,10 +2,14 @@
 
 import warnings
 
+import numpy as np
+
 from fecontact.cli.console import echo, note, show
 from fecontact.cli.tables import table
 from fecontact.core.errors import ModelWarning
+from fecontact.output.files.fields_of_frames import FieldKind
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import legend_label
 
 CLEARS = "pad\x1b[2J\x07"  # clears a terminal and rings its bell
 SHOWN = r"pad\x1b[2J\x07"
@@ -24,6 +28,21 @@ def test_warnings_of_the_model_are_escaped(capsys):
 
     _show_warning(warnings.showwarning)(ModelWarning(CLEARS), ModelWarning, "file", 1)
     assert capsys.readouterr().err == f"warning: {SHOWN}\n"
+
+
+def test_characters_that_the_font_lacks_are_named_once(capsys):
+    from fecontact.cli.entry import _show_warning
+
+    tell = _show_warning(warnings.showwarning)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.showwarning = tell
+        with new_figure(3.0, 2.0) as figure:
+            figure.text(0.5, 0.5, "\u6f22\u5b57")
+            figure.canvas.draw()
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "the font of pictures lacks '" in err
 
 
 def test_cells_of_tables_are_no_markup(capsys):
@@ -45,3 +64,26 @@ def test_dollars_in_labels_are_no_mathematics(tmp_path):
         axes.legend()
     assert (tmp_path / "odd.png").is_file()
     assert all(text.get_parse_math() for text in axes.get_yticklabels())
+
+
+def test_dollars_in_titles_of_pictures_are_no_mathematics():
+    from fecontact.output.render.mode_movie import _ModeStrips
+
+    plain, odd = (_ModeStrips(640, 360, title).header(title, "") for title in ("a", r"$\frac{1}{$"))
+    assert (odd < 128).sum() > 3 * (plain < 128).sum() > 0
+
+
+def test_names_with_an_underscore_stand_in_legends(tmp_path):
+    with new_figure(3.0, 2.0, tmp_path / "odd.png") as figure:
+        axes = figure.subplots()
+        axes.plot([1.0, 2.0], label=legend_label("_face"))
+        assert [text.get_text().strip() for text in axes.legend().get_texts()] == ["_face"]
+
+
+def test_numbers_beyond_single_precision_are_its_largest():
+    kind = FieldKind("displacement", "Point", (), "m", rounded=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        stored = kind.flat(np.array([[1e300, -1e39, 1.0, np.nan]]))
+    largest = np.finfo(np.float32).max
+    assert np.array_equal(stored, [largest, -largest, 1.0, np.nan], equal_nan=True)

@@ -11,7 +11,7 @@ from fecontact.integrate import Rodas5P, Scipy, SetValued
 SOLVERS = (Rodas5P(), Rodas5P(series="never"), Rodas5P(collocation="always"), Scipy("LSODA"))
 
 
-@pytest.mark.parametrize("frequency", [1e12, 1e100, 1e300])
+@pytest.mark.parametrize("frequency", [1e12, 1e30, 1e60])
 def test_periods_without_number_are_refused(frequency):
     for solver in (*SOLVERS, SetValued()):
         for system in (friction_oscillator(), impact_oscillator()):

@@ -144,8 +144,7 @@ def test_energy_from_nowhere_has_a_status():
 
 
 @pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
-@pytest.mark.parametrize("change", ["velocity", "speed"])
-def test_energies_beyond_all_numbers_have_a_status(change):
+def test_energies_beyond_all_numbers_have_a_status():
     """(1e300)^2 overflows, a motion at 1e300 m/s does not."""
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
@@ -154,12 +153,7 @@ def test_energies_beyond_all_numbers_have_a_status(change):
     system = ContactSystem(basis, RoughSurface(10e6, 10e-6, 40.0),
                            ExponentialFriction(0.8, 0.55, 1e3),
                            load=Load(14.0))
-    start = "rest"
-    if change == "velocity":
-        start = RigidStart(velocity=(1e300, 0.0, 0.0))
-    else:
-        system = system.with_(**{"ground.speed": 1e308})
-    run = simulate(system, 0.1, initial=start, outputs=11)
+    run = simulate(system, 0.1, initial=RigidStart(velocity=(1e300, 0.0, 0.0)), outputs=11)
     assert run.status is Status.ENERGY_NOT_FINITE
     assert not np.isfinite(run.energies.imbalance)
 

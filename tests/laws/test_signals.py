@@ -340,7 +340,8 @@ def test_signal_of_ones_own():
     (lambda: Tabulated((0, 1), (0, float("nan"))), r"values\[1\] = nan must be finite"),
     (lambda: Tabulated((0, 1), (0, 1), scale=float("nan")), "Tabulated: scale = nan"),
     (lambda: Tabulated((0, 1e-300, 1), (0, 1, 0)), "times has points 1e-300 apart"),
-    (lambda: Tabulated((0, 1), (0, 1e9), scale=1e300), r"scale = 1e\+300 reaches inf"),
+    (lambda: Tabulated((0, 1), (0, 1e9), scale=1e300), r"scale = 1e\+300 must be a number from"),
+    (lambda: Tabulated((0, 1), (0, 1e9), scale=1e59), r"scale = 1e\+59 reaches 1e\+68"),
     (lambda: Tabulated(1.0, 2.0), r"times = 1\.0 must be a list of numbers"),
     (lambda: Tabulated((0, 1), (1, 2), file="a"), "file = 'a' cannot be combined with times"),
 ])

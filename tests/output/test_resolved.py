@@ -175,3 +175,20 @@ def test_thinned_lines_keep_single_peaks_at_uneven_times():
     rest = np.abs(shown) < 2.0
     assert np.abs(np.interp(np.linspace(0.01, 0.99, 500), x[rest], shown[rest])
                   - np.sin(7.0 * np.linspace(0.01, 0.99, 500))).max() < 0.01
+
+
+def test_repeats_that_end_early_with_as_many_outputs_do_not_count(monkeypatch):
+    """The last output of a run that ends early is where it ended, before the time wanted."""
+    from fecontact.analysis import resolved as module
+
+    run = hit(7)
+
+    def cut(system, t_end, *, outputs, **options):
+        again = fc.simulate(system, t_end, outputs=outputs, **options)
+        time = again.time.copy()
+        time[-1] = 0.5 * (time[-2] + time[-1])
+        return fc.Trajectory(again.system, time, again.modal_coordinates, again.modal_velocities,
+                             again.work, fc.Status.ENERGY_GREW, again.statistics)
+
+    monkeypatch.setattr(module, "simulate", cut)
+    assert len(module.resolved(run).trajectory.time) == len(run.time)

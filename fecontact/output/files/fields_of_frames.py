@@ -21,6 +21,7 @@ from fecontact.output.files.frames import (
 from fecontact.reduction.modal_basis import ModalBasis
 
 _VECTOR = ("x", "y", "z")
+_LARGEST = float(np.finfo(np.float32).max)
 _STATES = "-1 no contact node, 0 open, 1 stick, 2 slip"
 
 
@@ -36,7 +37,12 @@ class FieldKind:
     rounded: bool = False  # to 16 significant bits, which compress well
 
     def flat(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values (F, N) or (F, N, k) as rows of VTK, components that a plane lacks zero."""
+        """Values (F, N) or (F, N, k) as rows of VTK, components that a plane lacks zero.
+
+        Numbers beyond single precision become its largest number, 3.4e38.
+        """
+        if self.kind is np.float32:
+            values = np.clip(values, -_LARGEST, _LARGEST)
         if self.rounded:
             values = _rounded(values)
         if not self.components:
@@ -51,8 +57,11 @@ def _rounded(values: NDArray[Any]) -> NDArray[Any]:
 
     The last byte of each number is zero, and compresses to nothing.
     """
-    bits = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
-    return ((bits + np.uint32(0x80)) & np.uint32(0xFFFFFF00)).view(np.float32)
+    single = np.ascontiguousarray(values, dtype=np.float32)
+    bits = single.view(np.uint32)
+    near = ((bits + np.uint32(0x80)) & np.uint32(0xFFFFFF00)).view(np.float32)
+    # The largest numbers would become infinite.
+    return np.where(np.isfinite(near), near, single)
 
 
 

@@ -21,7 +21,7 @@ from fecontact.output.plots.diagram_insets import (
 )
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis, parameter_label
-from fecontact.output.plots.style import DASHES, distinct_colours
+from fecontact.output.plots.style import DASHES, distinct_colours, legend_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -239,7 +239,7 @@ def _legend(
 ) -> None:
     from matplotlib.lines import Line2D
 
-    handles: list[Any] = [Line2D([], [], color=colour, linewidth=1.8, label=name)
+    handles: list[Any] = [Line2D([], [], color=colour, linewidth=1.8, label=legend_label(name))
                           for name, colour in colours.items()]
     if dashed:
         handles.append(Line2D([], [], color="#303030", linewidth=1.8, label="stable"))

@@ -19,7 +19,7 @@ from fecontact.output.plots.analysis import LOWEST_DECADES, end_of_content, spec
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis, parameter_label
 from fecontact.output.plots.run import thinned
-from fecontact.output.plots.style import distinct_colours
+from fecontact.output.plots.style import distinct_colours, legend_label
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
 
@@ -78,7 +78,7 @@ def plot_runs(
         for name, run, one, spectrum, colour in zip(
                 runs, runs.values(), found, spectra, distinct_colours(len(runs)), strict=True):
             upper.plot(*thinned(run.time / time_unit, one.values / unit), color=colour,
-                       linewidth=1.0, label=name)
+                       linewidth=1.0, label=legend_label(name))
             frequency, values = spectrum_line(spectrum.frequency_hz, spectrum.values, end)
             lower.semilogy(frequency, np.maximum(values, 1e-300) / height, color=colour,
                            linewidth=1.0)

@@ -12,7 +12,7 @@ from fecontact.core.units import quantity, suitable_unit
 from fecontact.laws.ground.sliding import SlidingRotation
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS
+from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS, legend_label
 from fecontact.reduction.assembly.contact_faces import several_bodies, shown_faces
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES
@@ -91,7 +91,7 @@ def plot_shear(
                 at = states[nodes] == code
                 if at.any():
                     upper.plot(x[at], shear[nodes][at] / force, "o", color=_STATE_COLOURS[name],
-                               markersize=4.5, label=name)
+                               markersize=4.5, label=legend_label(name))
             lower.plot(x, slip[nodes] / factor, color=COLOURS[0], marker="o", markersize=3.0)
             handles, names = upper.get_legend_handles_labels()
             legend = dict(zip(names, handles, strict=True)) | legend

@@ -22,6 +22,7 @@ from fecontact.output.plots.style import (
     ENERGY_COLOURS,
     add_note,
     distinct_colours,
+    legend_label,
 )
 from fecontact.reduction.assembly.contact_faces import ContactFace, contact_faces
 
@@ -99,7 +100,8 @@ def plot_history(
                                    *(value[:, row] for value in values))
                 for number, (point, value) in enumerate(zip(points, values, strict=True)):
                     axis.plot(*thinned(time, value[:, row] / factor), color=colours[number],
-                              linewidth=1.2 if number else 2.0, label=_label(point, trajectory))
+                              linewidth=1.2 if number else 2.0,
+                              label=legend_label(_label(point, trajectory)))
         normal = "normal force", "normal force", trajectory.normal_force
         friction = ("friction force", f"friction force in -{'x' if single else 't'}",
                     trajectory.friction_force)
@@ -110,7 +112,8 @@ def plot_history(
             factor = _labelled(axes[panel], f"total {name}", "N", *totals)
             for face, total, colour in zip(faces, totals, ["#303030"] if single else
                                            distinct_colours(len(faces)), strict=True):
-                axes[panel].plot(*thinned(time, total / factor), color=colour, label=face.name)
+                axes[panel].plot(*thinned(time, total / factor), color=colour,
+                                 label=legend_label(face.name))
         for side in zip(*panels, strict=True):
             figure.align_ylabels([axes[panel] for panel in side])
         figure.legend(*axes[panels[0][0]].get_legend_handles_labels(), loc="outside upper center",
@@ -140,7 +143,7 @@ def _friction_in_space(
     if faces[0].name:
         factor = _labelled(axis, "size of total friction", "N", *sizes)
         for face, size, colour in zip(faces, sizes, distinct_colours(len(faces)), strict=True):
-            axis.plot(*thinned(time, size / factor), color=colour, label=face.name)
+            axis.plot(*thinned(time, size / factor), color=colour, label=legend_label(face.name))
         return
     factor = _labelled(axis, "total friction on the body", "N", totals[0], sizes[0])
     axis.plot(*thinned(time, sizes[0] / factor), color="#b8b4ad", linewidth=2.4, label="size")

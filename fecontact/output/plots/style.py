@@ -104,3 +104,8 @@ def add_note(figure: "Figure", drawn: Resolved | Sampled) -> None:
 def state_names(trajectory: Trajectory) -> tuple[str, ...]:
     """Open, stick, slip by their numbers; open and contact in a run without friction forces."""
     return ("open", "stick", "slip") if trajectory.friction_force.any() else ("open", "contact")
+
+
+def legend_label(name: str) -> str:
+    """A name as matplotlib shows it in legends, which leave out what begins with an underscore."""
+    return f" {name}" if name.startswith("_") else name

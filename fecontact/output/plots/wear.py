@@ -11,7 +11,7 @@ from fecontact.core.units import suitable_unit
 from fecontact.integrate.wear import WearHistory
 from fecontact.output.plots.face_panels import scale_row
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS
+from fecontact.output.plots.style import COLOURS, legend_label
 from fecontact.reduction.assembly.contact_faces import ContactFace, shown_faces
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -80,7 +80,8 @@ def plot_wear(
             area = length[face.nodes] / length[face.nodes].sum()
             for values, name, colour in ((depth.max(axis=1), "largest", COLOURS[1]),
                                          (depth @ area, "mean", COLOURS[0])):
-                growth.plot(history.cycles, values / depth_unit, color=colour, label=name)
+                growth.plot(history.cycles, values / depth_unit, color=colour,
+                            label=legend_label(name))
             growth.set_xlabel("cycles")
             profile.set_title(face.title or title)
         for panel in panels[1]:

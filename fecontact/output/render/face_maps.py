@@ -136,7 +136,8 @@ class FaceMaps:
             axes.set_anchor("N")
             first, second = one.plan.labels
             seen = f"   → {first}  ↑ {second}" if number == 0 or first not in "xyz" else ""
-            axes.set_title(one.title + seen, fontsize=0.92 * self.font, color=DARK, loc="center",
+            axes.set_title(one.title + seen, parse_math=False, fontsize=0.92 * self.font,
+                           color=DARK, loc="center",
                            family="DejaVu Sans", pad=0.35 * self.font)
             lines = [line for line in axes.collections if line is not patches]
             arrows = draw_arrows(axes, one.plan, np.zeros_like(one.plan.places),

@@ -12,7 +12,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.run import thinned
-from fecontact.output.plots.style import COLOURS, DASHES, distinct_colours
+from fecontact.output.plots.style import COLOURS, DASHES, distinct_colours, legend_label
 from fecontact.output.render.frames_data import Motion
 from fecontact.reduction.assembly.contact_faces import contact_faces
 
@@ -129,7 +129,7 @@ class ForceChart:
         for line in totals:
             axes.plot(*thinned(trajectory.time[part] / time_unit, line.values / unit),
                       color=line.colour, linestyle=line.style, linewidth=0.1 * self.font,
-                      label=line.name)
+                      label=legend_label(line.name))
         if len(motion.times) > 1:
             axes.set_xlim(motion.times[0] / time_unit, motion.times[-1] / time_unit)
         axes.set_ylabel(f"total [{force_symbol}]", fontsize=0.9 * self.font, color=_DARK)
@@ -139,8 +139,10 @@ class ForceChart:
         axes.grid(color=_GRID)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns,
+        legend = axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns,
                     fontsize=0.9 * self.font, frameon=False, borderaxespad=0.0, borderpad=0.2)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
         canvas.draw()
         image = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
         box = axes.get_window_extent()

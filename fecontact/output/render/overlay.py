@@ -64,7 +64,7 @@ class Strips:
     def _text(self, figure: Any, x: float, y: float, text: str, **options: Any) -> Any:
         options = {"fontsize": FONT * self.size, "color": DARK, "va": "center",
                    "family": "DejaVu Sans"} | options
-        return figure.text(x, y, text, **options)
+        return figure.text(x, y, text, parse_math=False, **options)
 
     def header(self, title: str | None, note: str) -> Image:
         """The upper strip: a title, shortened to the room that a note leaves beside it."""

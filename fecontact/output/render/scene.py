@@ -344,7 +344,8 @@ def label_image(text: str, size: float) -> NDArray[np.float64]:
     figure = Figure(figsize=((len(text) + 2) * size / 100.0, 2.0 * size / 100.0), dpi=100)
     figure.patch.set_alpha(0.0)
     canvas = FigureCanvasAgg(figure)
-    figure.text(0.5, 0.5, text, ha="center", va="center", color=DARK, family="DejaVu Sans",
+    figure.text(0.5, 0.5, text, parse_math=False, ha="center", va="center", color=DARK,
+                family="DejaVu Sans",
                 fontsize=0.72 * size,
                 path_effects=[withStroke(linewidth=0.72 * rim, foreground="white", alpha=0.8)])
     canvas.draw()

@@ -19,7 +19,7 @@ from fecontact.laws.wear import WearLaw
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan, face_plans
-from fecontact.output.plots.style import COLOURS, STATE_COLOURS, add_note, state_names
+from fecontact.output.plots.style import COLOURS, STATE_COLOURS, add_note, legend_label, state_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES
@@ -270,7 +270,8 @@ def wear_maps(history: WearHistory, basis: ModalBasis, title: str, path: str | P
         factor, symbol = suitable_unit(float(depth.max()), "m")
         for values, name, colour in ((depth.max(axis=1), "largest", COLOURS[1]),
                                      (depth @ area / area.sum(), "mean", COLOURS[0])):
-            growth.plot(*thinned(history.cycles, values / factor), color=colour, label=name)
+            growth.plot(*thinned(history.cycles, values / factor), color=colour,
+                        label=legend_label(name))
         growth.set(xlabel="cycles", ylabel=f"worn depth [{symbol}]")
         growth.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
