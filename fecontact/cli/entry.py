@@ -17,7 +17,6 @@ from fecontact.core.resources.memory import (
     shown_memory,
 )
 
-
 _MISSING = re.compile(r"Glyph (\d+) .* missing from")  # a warning of matplotlib
 
 
