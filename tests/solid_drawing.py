@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecontact.core.units import UNITS
+from fecontact.output.plots.solids.plans import FacePlan
 from fecontact.output.report.bodies import Motions
 from fecontact.output.report.contact import contact_table
 from fecontact.output.report.drawing import (
@@ -77,6 +78,13 @@ class Solid:
     ground: DrawnGround
 
 
+def squares(places, sides):
+    """A plan whose patches are rectangles about places (k, 2)."""
+    corners = places[:, None] + 0.5 * sides * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    return FacePlan(None, corners, np.arange(len(places)), edges, places, np.empty(0), ("x", "y"))
+
+
 def solid(counts=(10, 6, 4), modes=20, times=201, nodes=(8, 5), waviness=0.0, end=0.02):
     """The block from 0 to ``end`` [s], its nodes in any order, as meshes have them."""
     places, triangles = box_surface(counts)
@@ -105,7 +113,8 @@ def solid(counts=(10, 6, 4), modes=20, times=201, nodes=(8, 5), waviness=0.0, en
     along = -COEFFICIENT * pressed[:, :, None] * slip / np.maximum(size_of_slip, 0.45)
     states = np.where(pressed == 0.0, 0, np.where(size_of_slip[..., 0] < 0.45, 1, 2))
     face = {"title": "contact", "label": "contact position x", "first": 0,
-            "abscissa": plan[:, 0].tolist(), "plan": plan.T.tolist(),
+            "abscissa": plan[:, 0].tolist(),
+            "plan": squares(plan, np.divide(SIZE[:2], nodes)),
             "sizes": np.full(len(plan), SIZE[0] * SIZE[1] / len(plan)).tolist()}
     contact = DrawnContact([face], np.broadcast_to(np.eye(3), (len(plan), 3, 3)),
                            np.concatenate([along, pressed[:, :, None]], axis=2), states,

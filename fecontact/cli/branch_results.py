@@ -45,6 +45,7 @@ def write_branch_results(
     from fecontact.output.plots.bifurcation_diagram import plot_branches
     from fecontact.output.plots.stability import plot_eigenvalues
     from fecontact.output.report.branch_report import report_branches
+    from fecontact.study.study import without_defaults
 
     files = [write_branches(folder / f"{name}-branch.h5", result.found, study=study, root=root,
                             system=result.contact_field.system())]
@@ -59,7 +60,8 @@ def write_branch_results(
         names=list(result.found), beneath=beneath, observe=result.observe, path=files[-1])
     files.append(report_branches(
         result.found, result.contact_field, folder / f"{name}-branch.html", observe=result.observe,
-        y=f"observed_{show}", title=name, study=study, usable_hz=usable_hz))
+        y=f"observed_{show}", title=name, study=without_defaults(study),
+        usable_hz=usable_hz))
     if wanted.kind != "orbits":
         files.append(folder / f"{name}-stability.png")
         plot_eigenvalues(several[0], range_hz=(0.0, highest_hz), path=files[-1])

@@ -16,6 +16,7 @@ from fecontact.reduction.report import beyond_basis
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.point import BranchPoint
     from fecontact.study.study import Study
+    from fecontact.system.contact_system import ContactSystem
 
 _COLUMNS = ("level", "kind", "parameter", "frequency_hz", "stable", "amplitude", "minimum",
             "maximum", "first_harmonic", "phase", "third_harmonic", "truncation_error",
@@ -42,15 +43,16 @@ def write_response_results(
     """
     from fecontact.output.plots.responses.response import plot_response
     from fecontact.output.report.response_report import report_response
+    from fecontact.study.study import without_defaults
 
     name = f"{study.name}-response"
     files = [keep_response(study, response, folder),
              *(folder / f"{name}.{ending}" for ending in ("csv", "png", "html"))]
     usable = study.usable_hz
     write_text(files[1], response_csv(response, usable))
-    plot_response(response, usable_hz=usable, path=files[2])
+    plot_response(response, system=study.system(), usable_hz=usable, path=files[2])
     report_response(response, study.system(), files[3], observe=observe, title=study.name,
-                    study=study.to_toml(), usable_hz=usable)
+                    study=without_defaults(study.to_toml()), usable_hz=usable)
     return files
 
 
@@ -91,7 +93,9 @@ def _third(response: FrequencyResponse, level: int) -> list[str]:
     return [repr(float(one)) for one in np.abs(response.harmonic(3, level))]
 
 
-def response_table(response: FrequencyResponse, usable_hz: float = math.inf) -> Any:
+def response_table(
+    response: FrequencyResponse, usable_hz: float = math.inf, system: "ContactSystem | None" = None
+) -> Any:
     """Table of peaks and special points of all levels; those above ``usable_hz`` are marked."""
     from fecontact.cli.tables import table
     from fecontact.core.units import quantity
@@ -101,7 +105,7 @@ def response_table(response: FrequencyResponse, usable_hz: float = math.inf) -> 
     # An angular frequency is told in Hz; the frequency of the response is then the same.
     over_frequency = response.parameter_name.endswith("angular_frequency")
     name, texts = ("", [""]) if response.level_name is None else level_texts(
-        response.level_name, response.levels)
+        response.level_name, response.levels, system)
     rows = []
     for level, branch in enumerate(response.branches):
         amplitude, peak = response.amplitude(level), response.peak(level)

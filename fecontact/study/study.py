@@ -8,7 +8,7 @@ from typing import Any
 from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.bifurcation.response_options import ResponseSettings, flat_levels
 from fecontact.core.checks import as_path, require_kind, require_regular_file, whole_number
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.tables import (
     convert,
     from_table,
@@ -277,18 +277,19 @@ class Study(Summarised, StudyModels):
         for name in ("preload", "sweep"):
             if getattr(self, name) is not None:
                 sections[name] = to_table(getattr(self, name), defaults=defaults)
-        return {"gap": plain(self.gap), **first, **interfaces,
+        gap = {} if self.gap == 0.0 and not defaults else {"gap": plain(self.gap)}
+        return {**gap, **first, **interfaces,
                 **{name: table for name, table in sections.items()
                    if table or defaults or name in LAWS}}
 
-    def to_toml(self) -> str:
-        """The resolved study as TOML text, with every key, including default values.
+    def to_toml(self, *, defaults: bool = True) -> str:
+        """The resolved study as TOML text, with every key, or without those of default value.
 
         ``Study.from_toml(study.to_toml(), study.path) == study``.
         """
         import tomli_w
 
-        return tomli_w.dumps(self.tables())
+        return tomli_w.dumps(self.tables(defaults=defaults))
 
     def with_(self, **changes: Any) -> "Study":
         """Copy of the study with other values, given by dotted keys of the file.
@@ -427,3 +428,16 @@ def _gap(value: Any, title: str) -> Gap:
     if not all(0.0 <= number < float("inf") for number in numbers):
         raise InputError(f"{title}: gap = {shown(value)} must be finite and zero or above.")
     return gap
+
+
+def without_defaults(text: str | None) -> str | None:
+    """Study as TOML text without keys of default value, as far as that runs no code of its author.
+
+    Text that names laws in Python files, or that this version cannot read, is returned unchanged.
+    """
+    if text is None or ".py:" in text:
+        return text
+    try:
+        return Study.from_toml(text).to_toml(defaults=False)
+    except FecontactError:
+        return text

@@ -78,7 +78,7 @@ def report_sweep(
         "rows": [[*_row(table, case), "" if command is None else command(case)]
                  for case in range(len(table))],
         "shades": colour_maps()["displacement"],
-        "study": study_tables(study),
+        "study": study_tables(study, "sweep"),
         "versions": list(map(list, library_versions().items())),
     }
     return write_page(path, title, payload.block(header), "sweep")

@@ -87,7 +87,7 @@ def response(
         assert found.response is not None
         with waiting("Writing"):
             files = write_response_results(described, found.response, observe, folder)
-        show(response_table(found.response, described.usable_hz))
+        show(response_table(found.response, described.usable_hz, system))
         echo_unresolved(found.response.branches)
         for branch in found.response.branches:
             if branch.message:

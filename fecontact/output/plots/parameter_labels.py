@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+_FORCE = re.compile(r"load\.forces\.(\d+)\.signal\.(\w+)")
+
+
 class _InUnit(Formatter):
     """Ticks at values in SI units, labelled in a prefixed unit."""
 
@@ -47,16 +50,36 @@ def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array)
         (axes.xaxis if which == "x" else axes.yaxis).set_major_formatter(_InUnit(factor))
 
 
-def parameter_label(name: str, owner: type = ContactSystem) -> str:
+def parameter_label(
+    name: str, owner: type = ContactSystem, system: ContactSystem | None = None
+) -> str:
     """Axis label of a parameter, with its unit if it has one.
 
     ``ground.speed`` becomes ``ground speed [m/s]``. Names that are not parameters of the dataclass
-    ``owner``, or whose unit depends on the law, get no unit.
+    ``owner``, or whose unit depends on the law, get no unit. With the system,
+    ``load.forces.0.signal.amplitude`` becomes ``force at B x [N]``.
     """
+    if found := _FORCE.fullmatch(name):
+        return _force_label(int(found[1]), found[2], system)
     inner = re.sub(r"^links\.[^.]+\.", "links.", re.sub(r"^interfaces\.[^.]+\.", "", name))
     units = _units(owner).get(inner, frozenset())
     words = re.sub(r"\b(\w+) \1\b", r"\1", re.sub(r"[._]", " ", name.removeprefix("interfaces.")))
     return f"{words} [{next(iter(units))}]" if len(units) == 1 else words
+
+
+def _force_label(number: int, key: str, system: ContactSystem | None) -> str:
+    """Label of a number of the signal of a force, by the place and direction of the force."""
+    what, unit = f"force {number}", ""
+    if system is not None and number < len(system.load.forces):
+        force = system.load.forces[number]
+        moment = force.component.startswith("phi")
+        what = f"{'moment' if moment else 'force'} at {force.point} {force.component}"
+        unit = "N m" if moment else "N"
+    if key != "amplitude":
+        units = _units(ContactSystem).get(f"load.forces.signal.{key}", frozenset())
+        what = f"{key.replace('_', ' ')} of the {what}"
+        unit = next(iter(units)) if len(units) == 1 else ""
+    return f"{what} [{unit}]" if unit else what
 
 
 @cache

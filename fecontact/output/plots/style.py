@@ -35,7 +35,7 @@ STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
 
 # Colours of a stress reach to this percentile if its peak is so much above it that they would show
 # little: at clamped corners and below forces stresses grow with each refinement of the mesh.
-_PERCENTILE, _SHARP = 99.0, 0.7
+PERCENTILE, _SHARP = 99, 0.7
 
 # Frequencies beyond those up to which a basis is usable.
 BEYOND, BEYOND_COLOUR = "beyond the basis", "#e4e0d8"
@@ -78,12 +78,17 @@ def shaded_beyond(axes: "Sequence[Axes]", usable_hz: float) -> bool:
     return True
 
 
+def beyond_words(peak: str) -> str:
+    """Words beside a bar whose colours end at the percentile of a stress."""
+    return f"{PERCENTILE} % of the values are below, peak {peak}"
+
+
 def stress_limit(sizes: Array) -> float:
     """Where the colours of a stress end, from its sizes at the nodes: their largest, or their 99th
     percentile where few nodes have much more than all others.
     """
     largest = float(sizes.max(initial=0.0))
-    usual = float(np.percentile(sizes, _PERCENTILE)) if len(sizes) else 0.0
+    usual = float(np.percentile(sizes, PERCENTILE)) if len(sizes) else 0.0
     return usual if 0.0 < usual < _SHARP * largest else largest
 
 

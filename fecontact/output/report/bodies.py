@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.types import Array
+from fecontact.core.units import quantity
+from fecontact.output.plots.style import beyond_words, stress_limit
 from fecontact.output.report.drawing import DrawnBodies
 from fecontact.output.report.payload import Payload
 
@@ -24,8 +26,6 @@ _SHAPES = 8e-5
 _ALONE = 1e-4  # error of a mode that is shown alone, of its largest value
 # Largest error of von Mises stress per error of its components, (4 + 3 k)^(1/2) with k shears.
 _VON_MISES = {4: 7.0**0.5, 6: 13.0**0.5}
-_PEAK = 0.98  # part of the nodes whose largest stress lies within the colour range
-_PEAKED = 1.5  # ratio of the peak to that stress above which the peak is left out of the range
 # What contact faces of solids are painted with.
 PRESSURE, STATE = "contact pressure", "contact state"
 _BLOCK = 2**18  # numbers of a field over nodes and times that stay in cache
@@ -99,8 +99,7 @@ class Motions:
     @property
     def stress_range(self) -> float:
         """End of the colour range [Pa]: singular corners do not darken all others."""
-        usual = float(np.quantile(self._stresses, _PEAK))
-        return usual if 0.0 < _PEAKED * usual < self.largest_stress else self.largest_stress
+        return stress_limit(self._stresses)
 
     def box(self, scale: float) -> list[float]:
         """Smallest and largest x, y (and z) that the bodies reach, magnified [m]."""
@@ -216,6 +215,7 @@ def bodies_table(motions: Motions, payload: Payload) -> dict[str, Any]:
         "parts": [{"name": name, "label": node} for name, node in bodies.labels],
         "modes": bodies.modes,
         "largest": {"displacement": motions.largest_displacement,
-                    "stress": motions.stress_range, "peak": motions.largest_stress},
+                    "stress": motions.stress_range, "peak": motions.largest_stress,
+                    "beyond": beyond_words(quantity(motions.largest_stress, "Pa"))},
         "peak": motions.peak_node, **owned,
     }

@@ -84,7 +84,7 @@ def report_branches(
     largest = max(float(np.abs(one).max()) for one in heights)
     factor, symbol = suitable_unit(largest, "m") if y.startswith("observed") else (1.0, "")
     diagram = Diagram(
-        parameter_label(next(iter(named.values())).parameter_name),
+        parameter_label(next(iter(named.values())).parameter_name, system=field.system()),
         y.replace("_", " ").replace("observed", f"displacement {component} of {point},")
         + f" [{symbol}]" * bool(symbol),
         [branch.parameter for branch in named.values()], [one / factor for one in heights])

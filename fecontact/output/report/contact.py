@@ -8,11 +8,11 @@ import numpy as np
 
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
-from fecontact.fem.faces.frames import tangents_of
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.height_map import HeightMap
 from fecontact.output.files.frames import contact_forces
+from fecontact.output.plots.solids.plans import FacePlan, face_plan
 from fecontact.output.plots.style import STATE_COLOURS, state_names
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.report.bodies import PRESSURE, STATE
@@ -23,7 +23,6 @@ from fecontact.reduction.assembly.contact_faces import (
     contact_directions,
     touching_faces,
 )
-from fecontact.reduction.modal_basis import ModalBasis
 
 _FORCE = 0.95e-4  # largest error of a force, of the largest force
 _ROWS = 3e-6  # step of the rows of contact nodes, of their largest value
@@ -31,7 +30,6 @@ _PROFILE = 24  # points of the ground's profile per wave
 _MOST_POINTS = 20_000  # of the profile
 _MAP = 4  # points of a map of heights per measured one, along each axis
 _MOST_OF_MAP = 256
-_ROUND = 0.5  # length of the mean normal below which a face goes around an axis
 _OPEN = "#dddddd"  # of open contact on the faces of solids
 _BESIDE = 0.6  # ground drawn on either side of the bodies, of their width
 
@@ -47,7 +45,7 @@ def drawn_contact(run: Trajectory, motion: Motion | None) -> DrawnContact:
         faces=[{"title": face.title or "contact", "label": face.label,
                 "first": face.nodes.start, "abscissa": face.abscissa.tolist(),
                 "sizes": face.tributary.tolist()}
-               | ({"plan": _plan(basis, face).T.tolist()} if solid else {})
+               | ({"plan": face_plan(basis, face)} if solid else {})
                for face in _touching(run)],
         axes=axes, forces=np.einsum("tnk,nik->tni", contact_forces(run), axes),
         states=np.minimum(run.contact_state, len(names) - 1), names=names,
@@ -71,7 +69,8 @@ def contact_table(contact: DrawnContact, payload: Payload) -> dict[str, Any]:
     d = contact.forces.shape[2]
     step = max(2.0 * _FORCE * largest / np.sqrt(d), SMALLEST)
     found: dict[str, Any] = {
-        "faces": contact.faces,
+        "faces": [face | ({"plan": _plan_table(face["plan"], payload)} if "plan" in face else {})
+                  for face in contact.faces],
         "states": list(contact.names),
         "colours": [STATE_COLOURS.get(name, "") for name in contact.names],
         "state": payload.add(contact.states, later=True),
@@ -92,6 +91,14 @@ def contact_table(contact: DrawnContact, payload: Payload) -> dict[str, Any]:
     return found
 
 
+def _plan_table(plan: FacePlan, payload: Payload) -> dict[str, Any]:
+    """Facets of the patches of a face in its plan [m], and the lines between patches."""
+    step = 1e-4 * float(np.ptp(plan.box, axis=0).max()) or SMALLEST
+    return {"corners": payload.add(plan.corners, step), "owner": payload.add(plan.owner),
+            "edges": payload.add(plan.edges, step), "labels": plan.labels,
+            "box": plan.box.T.ravel().tolist()}
+
+
 def _alike(contact: DrawnContact) -> list[int]:
     """For each force (n d) that of the nearest earlier node, which is alike; -1 for the first."""
     if contact.places is None:
@@ -108,24 +115,6 @@ def _touching(run: Trajectory) -> tuple[ContactFace, ...]:
         return touching_faces(run.system.basis, "contact map")
     except AnalysisError:
         return ()
-
-
-def _plan(basis: ModalBasis, face: ContactFace) -> Array:
-    """Places (k, 2) of the contact nodes of a solid's face in its mean tangent plane [m].
-
-    Those of a face around an axis, such as a bore, are unrolled about it.
-    """
-    places, normals = basis.contact_places[face.nodes], basis.normals[face.nodes]
-    share = face.tributary / face.tributary.sum()
-    mean = share @ normals
-    size = float(np.linalg.norm(mean))
-    if size > _ROUND:
-        return np.asarray(places @ tangents_of((mean / size)[None])[0].T)
-    axis = np.linalg.eigh((share[:, None] * normals).T @ normals)[1][:, 0]
-    along, across = tangents_of(axis[None])[0]
-    arm = places - share @ places
-    x, y = arm @ along, arm @ across
-    return np.column_stack([np.hypot(x, y).mean() * np.arctan2(y, x), arm @ axis])
 
 
 def painted_ends(contact: DrawnContact) -> dict[str, list[float]]:

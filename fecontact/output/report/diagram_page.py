@@ -105,7 +105,7 @@ def write_diagrams(
         "branches": _branch_tables(named, diagrams, kept, shown.texts, payload),
         "samples": SAMPLES,
         "observed": shown.observed,
-        "study": study_tables(study),
+        "study": study_tables(study, "branch", "response"),
         "versions": list(map(list, library_versions().items())),
         "contact": None, "ground": None,
     }

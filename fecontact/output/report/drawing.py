@@ -5,6 +5,7 @@ In the plane d = 2, in space d = 3; there the axis z points away from the ground
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -90,7 +91,7 @@ class DrawnContact:
     ----------
     faces : list of dict
         Title, label of the abscissa, first node, abscissae and tributary sizes of each face; in
-        space ``plan`` (2, k) are the places of its nodes in the tangent plane.
+        space its ``plan``, a :class:`FacePlan`.
     axes : (n, d, d) array
         Unit vectors of each node: one tangent or two, then the normal.
     forces : (N, n, d) array
@@ -110,7 +111,7 @@ class DrawnContact:
         Of the patches of solids [m^2].
     """
 
-    faces: list[dict[str, object]]
+    faces: list[dict[str, Any]]
     axes: Array
     forces: Array
     states: NDArray[np.integer]

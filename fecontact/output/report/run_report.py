@@ -11,6 +11,7 @@ import numpy as np
 from fecontact.analysis.histories import Point
 from fecontact.analysis.key_numbers import key_numbers
 from fecontact.analysis.run_facts import notes, run_facts
+from fecontact.analysis.sampling import alias_message
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, quantity, round_125
@@ -36,7 +37,8 @@ from fecontact.output.report.payload import Payload
 _SHADES = 64  # of a colour map
 _VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
 _PAINTS = {"von_mises": "von Mises stress"}
-_NOT_OF_RUNS = ("branch", "sweep", "wear", "preload", "render", "output")  # sections of a study
+# Sections of a study that do not change the motion.
+_NOT_OF_RUNS = ("branch", "response", "sweep", "wear", "preload", "render", "output")
 
 
 def report(
@@ -101,6 +103,8 @@ def run_block(
         require_scale("report", scale)
     payload = Payload()
     found, told = _finite(run), [*notes(run), *run.limits_exceeded]
+    if message := alias_message(found):
+        told.append(f"In this run {message}")
     if len(found.time) < len(run.time):
         told.append(f"Only the first {len(found.time)} of {len(run.time)} output times have a "
                     f"motion of finite numbers.")
@@ -162,10 +166,11 @@ def _visible_scale(motions: Motions, motion: Motion) -> float:
     return max(1.0, round_125(_VISIBLE * motions.bodies.extent / size)) if size > 0.0 else 1.0
 
 
-def study_tables(study: str | None) -> list[dict[str, Any]]:
+def study_tables(study: str | None, *also: str) -> list[dict[str, Any]]:
     """Sections of a study that matter for a run, with their keys and values as text.
 
-    Sections of sections have dotted names; keys without a value are left out.
+    ``also`` names further sections that matter. Sections of sections have dotted names; keys
+    without a value are left out.
     """
     found: list[dict[str, Any]] = []
 
@@ -179,7 +184,8 @@ def study_tables(study: str | None) -> list[dict[str, Any]]:
                 collect(f"{name}.{key}" if name else key, value)
 
     tables = tomllib.loads(study or "")
-    collect("", {name: table for name, table in tables.items() if name not in _NOT_OF_RUNS})
+    collect("", {name: table for name, table in tables.items()
+                 if name in also or name not in _NOT_OF_RUNS})
     found.sort(key=lambda section: not section["name"])
     return found
 
@@ -191,6 +197,8 @@ def _text(value: Any) -> str:
         return f"{value:.10g}"
     if isinstance(value, list):
         return ", ".join(map(_text, value))
+    if isinstance(value, dict):
+        return ", ".join(f"{key} = {_text(one)}" for key, one in value.items())
     return str(value)
 
 

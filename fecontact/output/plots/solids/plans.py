@@ -14,7 +14,7 @@ import numpy as np
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import suitable_unit
 from fecontact.fem.faces.frames import tangents_of
-from fecontact.output.files.contact_facets import contact_facets
+from fecontact.output.files.contact_facets import ContactFacets, contact_facets
 from fecontact.reduction.assembly.contact_faces import ContactFace, shown_faces
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -104,20 +104,23 @@ def face_plans(basis: ModalBasis, what: str) -> tuple[FacePlan, ...]:
     Without shapes over the body patches are squares of their areas.
     """
     faces = shown_faces(basis, what)
+    patches = None if basis.mode_shapes is None else contact_facets(basis).patches
+    return tuple(face_plan(basis, face, patches) for face in faces)
+
+
+def face_plan(
+    basis: ModalBasis, face: ContactFace, patches: ContactFacets | None = None
+) -> FacePlan:
+    """Plan of one contact face of solids; ``patches`` are those of all faces."""
     if basis.mode_shapes is None:
-        return tuple(_of_squares(basis, face) for face in faces)
-    patches = contact_facets(basis).patches
-    places = basis.mode_shapes.nodes
-    found = []
-    for face in faces:
-        inside = (face.nodes.start <= patches.owner) & (patches.owner < face.nodes.stop)
-        owner = patches.owner[inside] - face.nodes.start
-        if len(np.unique(owner)) < face.nodes.stop - face.nodes.start:
-            found.append(_of_squares(basis, face))
-            continue
-        facets = patches.facets[inside]
-        found.append(_plan(basis, face, places[facets], owner, facets))
-    return tuple(found)
+        return _of_squares(basis, face)
+    patches = contact_facets(basis).patches if patches is None else patches
+    inside = (face.nodes.start <= patches.owner) & (patches.owner < face.nodes.stop)
+    owner = patches.owner[inside] - face.nodes.start
+    if len(np.unique(owner)) < face.nodes.stop - face.nodes.start:
+        return _of_squares(basis, face)
+    facets = patches.facets[inside]
+    return _plan(basis, face, basis.mode_shapes.nodes[facets], owner, facets)
 
 
 def _of_squares(basis: ModalBasis, face: ContactFace) -> FacePlan:

@@ -135,9 +135,9 @@ async function build(host, data, told) {
   const timing = controls(data, clock, player, resize, 3);
   host.append(head(data), el("main", {},
     el("div.left", {}, ...section("Diagram", ...diagrams.map(({ node }) => node))),
-    el("div", {}, el("section", {}, ...player ? [player.node] : [], timing.bar, timing.more),
+    el("div", {}, el("section", {}, ...player ? [player.node, player.bar.node] : [], timing.bar, timing.more),
       ...section("Point", facts), ...section("Motion", history.node, phase.node))),
-  ...cards("Study", data.study), foot(data));
+  ...cards("Study, in SI units", data.study), foot(data));
   const refresh = () => { player?.resize(); for (const diagram of diagrams) diagram.resize(); resize(); };
   clock.watchers.push(() => { player?.draw(); history.point(); phase.point(); });
   phase.lines[0].x = part(orbits.displacement, 0);

@@ -5,9 +5,17 @@ class ContactMap extends Chart {
     super(clock, { title: face.title, lines: [{ name: "" }], legend: states, xLabel: clock.label,
       height: clamp(60 + 9 * face.abscissa.length, 90, 220), kind: "map" });
     Object.assign(this, { contact, face, shades, what: "state" });
-    const pick = el("select", { ariaLabel: "quantity", onchange: () => { this.what = pick.value; this.draw(); } },
+    const pick = el("select", { ariaLabel: "quantity", onchange: () => {
+      this.what = pick.value;
+      this.bar.hide(this.what === "state");
+      this.draw();
+    } },
       ...options(["state", "normal force", "tangential force"]));
     this.node.firstChild.append(pick);
+    this.bar = new ColourBar();
+    this.node.append(this.bar.node);
+    this.bar.show(shades, "0", quantity(contact.largest, "N"));
+    this.bar.hide(true);
   }
 
   // State or size of a force at a node and an instant.
@@ -75,23 +83,32 @@ class Footprint extends ContactMap {
   draw() { this.point(); }
 
   point() {
-    const c = this.context, { plan, sizes, first } = this.face, { width, height } = this, n = sizes.length;
-    const [left, right, low, high] = plan.flatMap((one) => [min(...one), max(...one)]);
-    // Nodes of a grid fill it; others are squares of their size.
-    const sides = plan.map((one, k) => {
-      const lines = new Set(one.map((x) => x.toFixed(9))).size, span = k ? high - low : right - left;
-      return lines > 1 && lines * lines <= 9 * n && lines < n ? span / (lines - 1) : Math.sqrt(max(...sizes));
-    });
-    const size = min((width - 20) / (right - left + sides[0]), (height - 28) / (high - low + sides[1]));
-    const value = this.reader(), [w, h] = sides.map((side) => size * side);
+    const { plan: { corners, owner, edges, labels, box: [left, right, low, high] }, first } = this.face;
+    const c = this.context, { width, height } = this, value = this.reader();
+    const size = min((width - 20) / (right - left), (height - 28) / (high - low));
+    const path = ({ values, columns }, k) => {
+      c.beginPath();
+      for (let i = k * columns; i < (k + 1) * columns; i += 2) {
+        c.lineTo(width / 2 + size * (values[i] - (left + right) / 2),
+          (height - 20) / 2 - size * (values[i + 1] - (low + high) / 2));
+      }
+      c.closePath();
+    };
     c.clearRect(0, 0, width, height);
-    plan[0].forEach((x, k) => {
-      const colour = this.painted(value(first + k, this.clock.index));
-      c.fillStyle = colour ? `rgb(${colour})` : css("open");
-      c.fillRect(width / 2 + size * (x - (left + right) / 2) - w / 2 + 0.5,
-        (height - 20) / 2 - size * (plan[1][k] - (low + high) / 2) - h / 2 + 0.5, w - 1, h - 1);
+    c.lineWidth = 0.6;
+    owner.values.forEach((node, k) => {
+      const colour = this.painted(value(first + node, this.clock.index));
+      c.fillStyle = c.strokeStyle = colour ? `rgb(${colour})` : css("open");
+      path(corners, k);
+      c.fill();
+      c.stroke();
     });
+    c.strokeStyle = css("ink");
+    for (let k = 0; k < edges.rows; k++) {
+      path(edges, k);
+      c.stroke();
+    }
     letters(c, "center");
-    c.fillText(`${quantity(right - left + sides[0], "m")} × ${quantity(high - low + sides[1], "m")}`, width / 2, height - 6);
+    c.fillText(`${labels[0]}: ${quantity(right - left, "m")}, ${labels[1]}: ${quantity(high - low, "m")}`, width / 2, height - 6);
   }
 }

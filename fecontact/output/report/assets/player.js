@@ -69,6 +69,7 @@ class Player {
     [this.#below, this.#canvas, this.#above] = [el("canvas"), el("canvas"), el("canvas")];
     this.node = el("div.stage", {}, this.#below, this.#canvas, this.#above);
     this.node.player = this;
+    this.bar = new ColourBar();
     this.#canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     this.#canvas.addEventListener("webglcontextrestored", () => { if (!this.closed) { this.#begin(); this.draw(); } });
     this.#begin();
@@ -445,7 +446,7 @@ class Player {
       c.strokeText(name, ...at);
       c.fillText(name, ...at);
     }
-    if (!["none", "contact state"].includes(this.paint)) this.#bar(c);
+    this.#tell();
   }
 
   #drawContact(c, contact) {
@@ -514,21 +515,13 @@ class Player {
     heads.closePath();
   }
 
-  #bar(c) {
-    const width = min(180, 0.3 * this.#width), left = this.#width - width - 14, top = 12;
-    this.#shades().forEach((one, k) => {
-      c.fillStyle = `rgb(${one})`;
-      c.fillRect(left + width * k / 64, top, width / 64 + 0.6, 7);
-    });
-    letters(c, "left");
-    c.textBaseline = "top";
-    const alone = this.mode >= 0, what = this.paint === "displacement" ? "m" : "Pa";
-    const [low, high] = this.#limits, { peak } = this.data.bodies.largest;
-    const beyond = this.paint.includes("stress") && !alone && high < peak;
-    c.fillText(alone ? "" : quantity(low, what), left, top + 11);
-    c.textAlign = "right";
-    c.fillText(alone ? "largest" : quantity(high, what) + (beyond ? `, peak ${quantity(peak, what)}` : ""),
-      left + width, top + 11);
-    c.textBaseline = "alphabetic";
+  // An arrow where values lie beyond the colours.
+  #tell() {
+    const alone = this.mode >= 0, { paint } = this, what = paint === "displacement" ? "m" : "Pa";
+    const [low, high] = this.#limits, { peak, beyond } = this.data.bodies.largest;
+    const more = paint.includes("stress") && !alone && high < peak;
+    this.bar.hide(["none", "contact state"].includes(paint));
+    this.bar.show(this.#shades(), alone ? low < 0 ? "−largest" : "0" : quantity(low, what),
+      alone ? "largest" : `${more ? "▶ " : ""}${quantity(high, what)}${more ? `; ${beyond}` : ""}`);
   }
 }

@@ -23,7 +23,8 @@ function states(contact) {
     const dot = el("i");
     dot.style.background = contact.colours[k] || "transparent";
     return el("span", {}, dot, name);
-  }), ...contact.slides?.length ? [`sliding: ${contact.slides.join(", ")}`] : []);
+  }), ...contact.slides?.length ? [`sliding: ${contact.slides.join(", ")}`] : [],
+  `longest arrow: ${quantity(contact.largest, "N")}`);
 }
 
 async function build(host, data, told) {
@@ -45,7 +46,7 @@ async function build(host, data, told) {
   const timing = controls(data, clock, player, resize);
   const nodes = (some) => some.map((one) => one.node);
   host.append(head(data), el("main", {},
-    el("div.left", {}, el("section", {}, ...player ? [player.node] : [],
+    el("div.left", {}, el("section", {}, ...player ? [player.node, player.bar.node] : [],
     timing.bar, timing.more, ...player && data.contact ? [states(data.contact)] : []),
     ...section("Contact", ...nodes(maps))),
     el("div", {}, ...section("Histories", ...nodes(charts)),
@@ -55,7 +56,7 @@ async function build(host, data, told) {
       ...player ? section("Modes", modesTable(data, player, timing)) : [])),
   el("div.two", {}, ...section("Run", table([], data.facts), ...data.numbers.length ? [el("h3", {}, data.numbersOf), table([], data.numbers)] : []),
     ...section("System", table([], data.system))),
-  ...cards("Study", data.study), foot(data));
+  ...cards("Study, in SI units", data.study), foot(data));
   const refresh = () => { player?.resize(); resize(); };
   clock.watchers.push(() => { if (player && player.mode < 0) player.draw(); },
     () => { for (const one of all) one.point(); });

@@ -13,9 +13,8 @@ class Cases extends Chart {
       this.node.firstChild.append(field(name, select));
       return select;
     });
-    this.bar = el("canvas.bar", { width: 64, height: 1 });
-    this.ends = [el("span"), el("span")];
-    this.node.append(el("p.legend", {}, this.ends[0], this.bar, this.ends[1], data.told));
+    this.bar = new ColourBar();
+    this.node.append(this.bar.node, el("p.legend", {}, data.told));
   }
 
   draw() {
@@ -23,11 +22,8 @@ class Cases extends Chart {
     Object.assign(this.lines[0], { x: this.along.values, y: this.up.values });
     this.xLabel = this.along.title;
     super.draw();
-    const { shades } = this.data, c = this.bar.getContext("2d"), known = this.shade.values.filter((v) => v === v);
-    shades.forEach((one, k) => { c.fillStyle = `rgb(${one})`; c.fillRect(k, 0, 1, 1); });
-    [min(...known), max(...known)].forEach((end, k) => {
-      this.ends[k].textContent = known.length ? +end.toPrecision(4) : "";
-    });
+    const known = this.shade.values.filter((v) => v === v);
+    this.bar.show(this.data.shades, ...[min(...known), max(...known)].map((end) => known.length ? +end.toPrecision(4) : ""));
   }
 
   // Cells as large as the values lie apart, small squares where they lie anyhow.
@@ -97,7 +93,7 @@ async function build(host, data, told) {
   });
   host.append(head(data), el("main", {}, el("div.left", {}, ...section("Cases", cases.node)),
     el("div", {}, ...section("Case", facts), ...section("Sweep", table([], data.facts)))),
-  ...cards("Study", data.study), foot(data));
+  ...cards("Study, in SI units", data.study), foot(data));
   cases.resize();
   cases.clock.set(0);
   return { close: ready(host, told, () => cases.resize()) };

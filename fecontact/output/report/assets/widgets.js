@@ -9,6 +9,23 @@ function quantity(value, unit, digits = 3) {
   return `${+(value / factor).toPrecision(digits)} ${symbol}`;
 }
 
+// Colours, with texts at both ends.
+class ColourBar {
+  constructor() {
+    this.ends = [el("span"), el("span")];
+    this.bar = el("canvas.bar", { width: 64, height: 1 });
+    this.node = el("p.legend", {}, this.ends[0], this.bar, this.ends[1]);
+  }
+
+  show(shades, low, high) {
+    const c = this.bar.getContext("2d");
+    shades.forEach((one, k) => { c.fillStyle = `rgb(${one})`; c.fillRect(k, 0, 1, 1); });
+    [low, high].forEach((text, k) => { this.ends[k].textContent = text; });
+  }
+
+  hide(away) { this.node.style.visibility = away ? "hidden" : ""; }
+}
+
 class Clock {
   constructor(times, told) {
     this.watchers = [];
