@@ -15,7 +15,8 @@ from fecontact.core.units import quantity
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces
 
-_FORCES = ("mean_normal_force", "peak_normal_force", "mean_friction_force", "peak_friction_force")
+_NORMAL = ("mean_normal_force", "peak_normal_force")
+_FORCES = (*_NORMAL, "mean_friction_force", "peak_friction_force")
 _STILL = 1e-9  # of the largest amplitude, below which a component does not move
 
 
@@ -62,7 +63,7 @@ class KeyNumbers:
         if found.kind == "unknown":
             return "unknown: too few output times"
         if found.period is None:
-            return f"no, differs by {100.0 * found.misfit:.3g} %"
+            return f"no, it repeats only to within {100.0 * found.misfit:.3g} % of its size"
         text = f"yes, periodic with {quantity(found.period, 's', 4)}"
         if self.drive_period is None:
             return text
@@ -80,7 +81,8 @@ def key_numbers(
 
     Dominant frequency (largest peak of the velocity spectrum), amplitudes (half the range) of
     points in each direction, mean and peak of the total normal and friction forces, of several
-    interfaces of each, mean power lost by friction. Frequencies need even output times; without
+    interfaces of each, mean power lost by friction. Without friction its numbers are left out.
+    Frequencies need even output times; without
     them, and of points that do not move, they are left out.
 
     Parameters
@@ -134,11 +136,13 @@ def key_numbers(
             del values[name]
     if basis.contact_nodes:
         faces = [face.name for face in contact_faces(basis) if face.name]
+        rubbing = bool(trajectory.friction_forces.any())
         for face in faces or [""]:
-            for name in _FORCES:
+            for name in _FORCES if rubbing else _NORMAL:
                 title = name.replace("_", " ") + f" of {face}" * bool(face)
                 take(name + f"@{face}" * bool(face), title, **({"face": face} if face else {}))
-        take("friction_power", "mean friction power")
+        if rubbing:
+            take("friction_power", "mean friction power")
     return KeyNumbers(values, found, (float(late.time[0]), float(late.time[-1])), titles,
                       _drive_period(trajectory))
 

@@ -20,7 +20,7 @@ def run_facts(trajectory: Trajectory) -> list[tuple[str, str]]:
         ("time", f"{quantity(float(time[0]), 's')} ... {quantity(float(time[-1]), 's')}"),
         (("steps", f"{statistics['steps']} in {seconds:.1f} s") if "steps" in statistics else
          ("computed", f"in {seconds:.1f} s")),
-        ("energy imbalance", f"{trajectory.energies.imbalance:.1e}"),
+        ("energy imbalance", f"{trajectory.energies.imbalance:.1e} of the largest energy"),
         *(() if trajectory.events is None else (("events", _events(trajectory.events)),)),
         ("largest displacement", f"{quantity(size, 'm')} at {place}"),
         *_contact_rows(trajectory),
@@ -75,11 +75,17 @@ def largest_displacement(trajectory: Trajectory) -> tuple[float, str]:
 
 
 def contact_shares(trajectory: Trajectory, nodes: slice = slice(None)) -> dict[str, float]:
-    """Fractions of time and contact face of some nodes that are open, in stick and in slip."""
+    """Fractions of time and contact face of some nodes that are open, in stick and in slip.
+
+    Without friction forces they are open or closed.
+    """
     weight = trajectory.system.basis.tributary[nodes]
     states = trajectory.contact_state[:, nodes]
-    return {state.name.lower(): float(((states == state) @ (weight / weight.sum())).mean())
-            for state in ContactState}
+    found = {state.name.lower(): float(((states == state) @ (weight / weight.sum())).mean())
+             for state in ContactState}
+    if trajectory.friction_force.any():
+        return found
+    return {"open": found["open"], "closed": found["stick"] + found["slip"]}
 
 
 def notes(trajectory: Trajectory) -> list[str]:

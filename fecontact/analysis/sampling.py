@@ -75,6 +75,32 @@ def warn_of_aliases(trajectory: Trajectory) -> None:
         warnings.warn(f"In this run {message}", ModelWarning, stacklevel=3)
 
 
+def between_outputs(trajectory: Trajectory, count: int) -> Trajectory:
+    """The run with times between its outputs, where these are too few for ``count`` of its times.
+
+    The run itself is returned if it has as many outputs or they resolve its fastest strong motion,
+    and where the motion between them cannot be computed again.
+    """
+    if len(trajectory.time) >= count or not alias_message(trajectory):
+        return trajectory
+    found = resolved(trajectory)
+    return found.trajectory if found.coarse <= _UNKNOWN else trajectory
+
+
+def coarse_frames_message(trajectory: Trajectory, shown: Array) -> str:
+    """Sentence on times to show more than half the fastest period apart; else empty."""
+    period = fastest_period(trajectory)
+    if len(shown) < 2 or (apart := float(np.diff(shown).max())) <= 0.5 * period:
+        return ""
+    lasting = 0.1 * period * len(shown)
+    remedy = f"draw at most {quantity(lasting, 's')}, by t_start and t_end"
+    if len(trajectory.time) <= len(shown):
+        remedy = f"run with outputs at most {quantity(0.1 * period, 's')} apart, or {remedy}"
+    return (f"frames lie {quantity(apart, 's')} apart, more than half the period of the fastest "
+            f"strong motion, {quantity(period, 's')}, which the movie shows too slow or backwards; "
+            f"{remedy}.")
+
+
 def evenly_sampled_history(
     trajectory: Trajectory, quantity_name: str, point: Point, component: str
 ) -> Sampled:

@@ -327,22 +327,18 @@ def movie(
     wear: "WearLaw | None" = None,
 ) -> Path:
     """Render a run with a progress bar; returns the file or folder."""
-    from fecontact.analysis.sampling import fastest_period
-    from fecontact.core.units import quantity
-    from fecontact.output.files.frames import frame_indices
-    from fecontact.output.render.movie import render
+    from fecontact.analysis.sampling import coarse_frames_message
+    from fecontact.output.render.movie import frames_of, render
 
-    shown = trajectory.time[frame_indices(trajectory.time, settings.frames, settings.t_start,
-                                          settings.t_end)]
-    period = fastest_period(trajectory)
-    if len(shown) > 1 and (apart := float((shown[1:] - shown[:-1]).max())) > 0.5 * period:
-        lasting = 0.1 * period * len(shown)
-        echo(f"note: frames lie {quantity(apart, 's')} apart, more than half the period of the "
-             f"fastest strong motion, {quantity(period, 's')}, which the movie shows too slow or "
-             f"backwards; draw at most {quantity(lasting, 's')}, by t_start and t_end.")
+    start, end = settings.t_start, settings.t_end
+    drawn, frames = frames_of(trajectory, settings.frames, start, end)
+    if message := coarse_frames_message(drawn, drawn.time[frames]):
+        echo(f"note: {message}")
+    if wear is None and drawn is not trajectory:
+        trajectory, start, end = drawn, None, None
     return render(trajectory, target, frames=settings.frames, fps=settings.fps,
                   size=settings.size, colour=settings.colour, scale=settings.scale,
-                  title=settings.title, t_start=settings.t_start, t_end=settings.t_end,
+                  title=settings.title, t_start=start, t_end=end,
                   view=settings.view, wear=wear, progress=True)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import as_path, require_kind
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, quantity, suitable_unit
 from fecontact.output.files.stored_system import library_versions
@@ -52,7 +52,7 @@ def report_sweep(
         For a sweep without cases, another suffix, or a file that cannot be written.
     """
     require_kind("report_sweep", SweepTable, table=table)
-    path = require_page(as_path(path, "a report"))
+    path = require_page(path)
     if not len(table):
         raise InputError("The sweep has no cases to report.")
     title, payload = path.stem if title is None else title, Payload()

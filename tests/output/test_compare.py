@@ -2,14 +2,19 @@
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from report_reading import Shown
+from response_study import STUDY as RESPONSE_STUDY
 from synthetic import basis
+from test_report_branches import STUDY as BRANCH_STUDY
 
 import fecontact as fc
 from fecontact import ContactSystem, InputError
 from fecontact.analysis import compare_runs
+from fecontact.bifurcation.diagram import follow_branches
+from fecontact.bifurcation.responses import follow_responses
 from fecontact.cli import execute
-from fecontact.io import report_runs
+from fecontact.io import report_runs, write_branches
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.plot import plot_runs
 from fecontact.system.powers import POWERS
@@ -39,7 +44,9 @@ def runs():
 
 def test_differences_of_parameters_and_numbers(runs):
     found = compare_runs(runs, ["B"], studies=STUDIES)
-    assert found.parameters == {"ground.speed": ("0.1", "0.2"), "friction.law": ("", "constant")}
+    assert found.parameters == {
+        "ground.speed": ("0.1", "0.2"), "friction.law": ("", "constant"),
+        "friction.friction_coefficient": ("", "0.55")}
     assert found.change("amplitude_x@B") == pytest.approx(0.5, rel=2e-2)
     assert found.change("dominant_frequency@B") == pytest.approx(0.25, rel=1e-2)
     assert found.change("mean_normal_force") == pytest.approx(0.0, abs=1e-9)
@@ -91,3 +98,29 @@ def test_the_command(runs, tmp_path, monkeypatch, capsys):
     assert (tmp_path / "slow-compare.png").is_file()
     assert execute(["compare", "slow.vtkhdf"]) == 1
     assert "compare takes two files or more, not 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("over", ["drive.angular_frequency", "ground.speed"])
+def test_responses_and_branches_over_each_other(over, tmp_path, capsys):
+    """Files of two studies: the value that differs stands in the table, the curves in a picture."""
+    if over == "ground.speed":
+        text = BRANCH_STUDY.replace("bounds = [7e-3, 12e-3]", "bounds = [11.9e-3, 12e-3]")
+        found = fc.Study.from_toml(text)
+        result = follow_branches(found.system(), found.branch)
+        branches = result.found
+    else:
+        text = RESPONSE_STUDY.replace("[8.0, 13.0]", "[8.0, 8.1]")
+        found = fc.Study.from_toml(text)
+        response = follow_responses(found.system(), found.response).response
+        branches = {str(level): one for level, one in enumerate(response.branches)}
+    files = []
+    for name, load in (("light", 14.0), ("heavy", 15.0)):
+        files.append(tmp_path / f"{name}.h5")
+        write_branches(files[-1], branches, system=found.system(), study=found.with_(
+            **{"load.normal": load}).to_toml())
+    assert execute(["compare", *map(str, files)]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "parameter light heavy" in out
+    assert "load.normal 14 15" in out
+    assert f"wrote {tmp_path}/light-compare.png" in out
+    assert imread(tmp_path / "light-compare.png").std() > 0.02

@@ -7,15 +7,24 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 from matplotlib.image import imread
+from scipy.interpolate import CubicSpline
 from synthetic import basis, run
 
-from fecontact import InputError, MissingLibraryError, render
-from fecontact.laws import ConstantFriction
+from fecontact import (
+    ContactSystem,
+    InputError,
+    MissingLibraryError,
+    render,
+    simulate,
+)
+from fecontact.analysis.sampling import between_outputs, coarse_frames_message
+from fecontact.laws import ConstantFriction, Frictionless, RoughSurface
 from fecontact.output.files.frames import frame_indices
 from fecontact.output.render import movie
 from fecontact.output.render import offscreen as probe
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion
+from fecontact.output.render.movie import frames_of
 from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.scene import NODE_COLOURS, Scene, needed_height
 from fecontact.plot import STATE_COLOURS, picture
@@ -399,3 +408,36 @@ def test_interrupt_while_a_frame_is_drawn_ends_the_movie(tmp_path):
         render(run(), tmp_path / "a.mp4", frames=5, size=(320, 180), progress=interrupt)
     assert list(tmp_path.iterdir()) == []
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def vibrating_bar(outputs):
+    """A bar that swings freely at its first elastic mode over six periods, and this period [s]."""
+    system = ContactSystem(basis(contact_nodes=3), RoughSurface(1e6, 1e-6), Frictionless(),
+                           gap=4e-5)
+    hertz = float(system.basis.frequencies_hz[system.basis.frequencies_hz > 0.0][0])
+    start = np.zeros(2 * system.basis.modes)
+    start[np.flatnonzero(system.basis.frequencies_hz > 0.0)[0]] = 1e-4
+    return simulate(system, 6.0 / hertz, initial=start, outputs=outputs), 1.0 / hertz
+
+
+def test_frames_between_outputs_that_are_too_far_apart():
+    """Eight outputs in six periods; the frames are those of a run with outputs at their times."""
+    coarse, _ = vibrating_bar(8)
+    fine, _ = vibrating_bar(121)
+    assert between_outputs(fine, 500) is fine
+    assert between_outputs(coarse, 8) is coarse
+    found, frames = frames_of(coarse, 121)
+    assert len(frames) > 60
+    expected = CubicSpline(fine.time, fine.modal_coordinates)(found.time)
+    assert np.abs(expected).max() > 0.9e-4
+    assert np.abs(found.modal_coordinates - expected).max() < 0.01 * np.abs(expected).max()
+
+
+def test_a_movie_that_shows_motion_too_slow_or_backwards_has_a_note():
+    run, period = vibrating_bar(121)
+    note = coarse_frames_message(run, run.time[::15])
+    assert note.startswith("frames lie ")
+    assert "; draw at most" in note
+    assert not coarse_frames_message(run, run.time[run.time <= 2.0 * period][::2])
+    coarse, _ = vibrating_bar(8)
+    assert "; run with outputs at most" in coarse_frames_message(coarse, coarse.time)

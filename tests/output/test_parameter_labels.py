@@ -1,13 +1,15 @@
 """Labels of parameters, with the units that the annotations of their classes name."""
 
 import re
+from types import SimpleNamespace
 from typing import get_type_hints
 
 import numpy as np
 import pytest
 
-from fecontact import Study
+from fecontact import Load, PointLoad, Study
 from fecontact.core.docstrings import documented
+from fecontact.laws import Harmonic
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import (
     _classes,
@@ -15,6 +17,7 @@ from fecontact.output.plots.parameter_labels import (
     name_axis,
     parameter_label,
 )
+from fecontact.output.plots.responses.response import frequency_axis, level_texts
 
 
 @pytest.mark.parametrize(("name", "label"), [
@@ -32,6 +35,23 @@ from fecontact.output.plots.parameter_labels import (
 ])
 def test_labels(name, label):
     assert parameter_label(name) == label
+
+
+def test_forces_are_named_by_their_place_and_direction():
+    forces = (PointLoad("B", "x", signal=Harmonic(3.0, 10.0)),
+              PointLoad("C", "phi", signal=Harmonic(3.0, 10.0)))
+    system = SimpleNamespace(load=Load(forces=forces))
+    name = "load.forces.0.signal"
+    assert parameter_label(f"{name}.amplitude", system=system) == "force at B x [N]"
+    assert parameter_label(f"{name}.angular_frequency", system=system) == (
+        "angular frequency of the force at B x [rad/s]")
+    assert parameter_label("load.forces.1.signal.amplitude", system=system) == (
+        "moment at C phi [N m]")
+    assert parameter_label(f"{name}.amplitude") == "force 0"
+    assert frequency_axis(f"{name}.angular_frequency", system) == (
+        2.0 * np.pi, "frequency of the force at B x [Hz]")
+    assert level_texts(f"{name}.amplitude", np.array([0.5, 2e3]), system) == (
+        "force at B x", ["0.0005 kN", "2 kN"])
 
 
 def test_ticks_are_in_a_unit_that_suits_the_values():

@@ -186,7 +186,7 @@ def test_a_page_asks_nothing_of_a_network_and_is_the_same_each_time(tmp_path):
 
 @pytest.mark.parametrize("kind", page.SCRIPTS)
 def test_the_script_is_small(kind):
-    assert len(page.script(kind).encode()) <= 36_000
+    assert len(page.script(kind).encode()) <= 32_000
 
 
 def test_texts_of_a_study_stay_texts(tmp_path):

@@ -171,7 +171,16 @@ def test_faces_of_two_solids_are_painted_on_both_sides(browser, pair, tmp_path):
     (face,) = header["faces"]
     assert face["title"] == "lining: disc and pad"
     low_x, high_x, low_y, high_y = face["plan"]["box"]
-    assert (high_x - low_x, high_y - low_y) == pytest.approx((0.01, 0.01), rel=1e-6)
+    # The facets of the patches fill the face of 20 mm x 20 mm, not only the middles of its nodes.
+    assert (high_x - low_x, high_y - low_y) == pytest.approx((0.02, 0.02), rel=1e-6)
+    corners = shown.array("contact", "faces", 0, "plan", "corners")
+    corners = corners.reshape(len(corners), -1, 2)
+    x, y = corners[..., 0], corners[..., 1]
+    areas = 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+    assert areas.min() > 0.0
+    assert areas.sum() == pytest.approx(0.02**2, rel=1e-3)
+    owner = shown.array("contact", "faces", 0, "plan", "owner").astype(int)
+    assert np.bincount(owner, areas) == pytest.approx(face["sizes"], rel=1e-3)
     titles = [chart["title"] for chart in shown.header["charts"]]
     assert "total friction force along t2" in titles
     with Opened(browser, path) as opened:

@@ -1,6 +1,7 @@
 """Study files: what they describe, round trips, and what is said of mistakes."""
 
 import re
+import tomllib
 from dataclasses import fields
 
 import numpy as np
@@ -30,11 +31,13 @@ from fecontact import (
     write_mesh,
 )
 from fecontact.cli.templates import TEMPLATES, template
+from fecontact.core.dotted_parameters import flattened
 from fecontact.fem.shapes import Beam, Block, Pendulum
 from fecontact.integrate import SetValued
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.solvers import SOLVERS
 from fecontact.laws import ExponentialFriction, RoughSurface
+from fecontact.study.study import without_defaults
 from fecontact.system.model_limits import (
     Planned,
     PlannedBodies,
@@ -119,6 +122,23 @@ def test_resolved_study_reads_back_the_same(text):
     resolved = study.to_toml()
     assert Study.from_toml(resolved) == study
     assert Study.from_toml(resolved).to_toml() == resolved
+
+
+def test_keys_that_differ_from_their_defaults():
+    """What a study gives stays, what it leaves out is not there; the study is the same."""
+    text = template("block")
+    study = Study.from_toml(text)
+    short = without_defaults(study.to_toml())
+    assert Study.from_toml(short) == study
+    given = flattened(tomllib.loads(text))
+    kept = flattened(tomllib.loads(short))
+    assert set(kept) <= set(given)
+    assert {"ground.speed", "drive.stiffness_x", "load.normal"} <= set(kept)
+    named = short + '\n[friction]\nlaw = "own.py:Law"\n'
+    assert without_defaults(named) == named
+    assert without_defaults("[geometry]\nshape = 3\n") == "[geometry]\nshape = 3\n"
+    assert without_defaults(None) is None
+
 
 
 def test_resolved_study_has_every_key_that_has_a_value(tiny):

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import synthetic
+from joined_bodies import stack_run
 from systems import impact_oscillator
 
-from fecontact import ContactSystem, Ground, InputError, RigidStart, Trajectory, simulate
+from fecontact import ContactSystem, Ground, InputError, RigidStart, Study, Trajectory, simulate
+from fecontact.cli.templates import template
 from fecontact.laws import ConstantFriction, EnergyWear, RoughSurface
 from fecontact.sweeps.summaries import SUMMARIES, functions_for, summarise, unit_of
 from fecontact.system.powers import FRICTION, POWERS
@@ -70,6 +72,47 @@ def test_contact(run):
     forward = np.arccos(V / (1e-4 * 2.0 * np.pi * 400.0)) / np.pi
     assert found["mean_friction_force"] == pytest.approx(
         0.5 * MU * force * (2.0 * forward - 1.0), abs=0.5 * MU * force * 2e-3)
+
+
+def test_forces_of_one_of_several_interfaces():
+    """Those of both interfaces add up to those of the whole system."""
+    stack = stack_run()
+    found = values(stack, *(f"{kind}_{force}_force{at}" for kind in ("mean", "peak")
+                            for force in ("normal", "friction") for at in ("", "@shoe", "@foot")))
+    for force in ("normal", "friction"):
+        mean = f"mean_{force}_force"
+        assert found[mean] == pytest.approx(found[f"{mean}@shoe"] + found[f"{mean}@foot"], rel=1e-9)
+        peaks = [found[f"peak_{force}_force@{name}"] for name in ("shoe", "foot")]
+        assert max(peaks) > 0.0
+        assert found[f"peak_{force}_force"] <= sum(peaks) * (1.0 + 1e-9)
+    # The first eight contact nodes are those of the shoe.
+    shoe = stack.normal_force[:, :8].sum(axis=1)
+    assert found["peak_normal_force@shoe"] == pytest.approx(shoe.max())
+    assert unit_of("peak_normal_force@shoe") == "N"
+    with pytest.raises(InputError, match="There is no interface 'sole'; choose from 'foot'"):
+        values(stack, "peak_normal_force@sole")
+
+
+def test_friction_of_solids_is_that_of_both_directions():
+    """A pad that slides at 45 degrees: mu F in all, mu F / sqrt(2) along each direction."""
+    system = replace(Study.from_toml(template("solid")).system(), ground=Ground(),
+                     friction=ConstantFriction(MU, smoothing_slope=1e9))
+    basis = system.basis
+    rows = basis.contact_T[:, :3, :6].reshape(-1, 6)
+
+    def rigid(*vector):
+        return np.linalg.lstsq(rows, np.tile(vector, basis.contact_nodes), rcond=None)[0]
+
+    t = np.linspace(0.0, 1e-3, 11)
+    q, rate = np.zeros((2, len(t), basis.modes))
+    rate[:, :6] = rigid(0.1, 0.1, 0.0)
+    q[:, :6] = t[:, None] * rigid(0.1, 0.1, 0.0) + rigid(0.0, 0.0, -1e-5)
+    motion = Trajectory(system, t, q, rate, np.zeros((len(t), len(POWERS))))
+    found = values(motion, "peak_friction_force", "mean_friction_force", "peak_normal_force")
+    assert found["peak_normal_force"] > 0.0
+    limit = MU * found["peak_normal_force"]
+    assert found["peak_friction_force"] == pytest.approx(limit, rel=1e-4)
+    assert abs(found["mean_friction_force"]) == pytest.approx(limit / np.sqrt(2.0), rel=1e-4)
 
 
 def test_power_and_wear(run):

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     UNRESOLVED,
     UNRESOLVED_MEANING,
-    details_of,
-    special_point,
 )
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
@@ -386,22 +384,14 @@ def _taken(
     return _scaled(*starts.corrected(problem, starts.unknowns(problem, sampled, 0.0)))
 
 
-def with_observed(
-    branch: Branch, row: Array, observed: str, level_name: str | None, level: float
-) -> Branch:
-    """The branch with what is observed at its points, and its level as attributes."""
+def observed_amplitudes(branch: Branch, row: Array) -> Array:
+    """Half the range (N,) of an observed quantity at the points of a branch of orbits."""
     layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
     _require_observable(layout, row)
     b = layout.harmonic
     X = np.array([point.u[: (2 * H + 1) * b] for point in branch.points]).reshape(-1, 2 * H + 1, b)
-    seen = observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
-    attributes = {**branch.attributes, **_told(observed, level_name, level)}
-    header = BranchHeader(branch.parameter_name, attributes)
-    points = [special_point(point.u, point.tangent, {
-        **point.values, **{name: values[k] for name, values in seen.items()}}, point.kind,
-                            details_of(point), header)
-              for k, point in enumerate(branch.points)]
-    return replace(branch, points=tuple(points), attributes=attributes)
+    found = observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
+    return np.array(found["observed_amplitude"])
 
 
 def _require_observable(layout: Layout, row: Array) -> None:

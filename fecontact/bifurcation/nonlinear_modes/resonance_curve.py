@@ -18,9 +18,9 @@ from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import observed_row
 from fecontact.bifurcation.harmonic.response import (
     branch_of_response,
+    observed_amplitudes,
     preloaded,
     rest_state,
-    with_observed,
 )
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.checks import require_kind
@@ -208,7 +208,7 @@ def _first(
                        frequencies)
     branch = branch_of_response(field, values, free, None, given.bounds[0],
                                 replace(method, tolerance=None), given, held, both=False)
-    sizes = with_observed(branch, row, "", None, np.nan).column("observed_amplitude")
+    sizes = observed_amplitudes(branch, row)
     place = int(np.argmax(sizes))
     if place in (0, len(sizes) - 1):
         raise AnalysisError(f"The response has no peak between the frequencies "

@@ -88,7 +88,8 @@ def sweep(
 
     with waiting("Writing"):
         page = report_sweep(table, folder / "index.html", title=described.name,
-                            study=without_defaults(described.to_toml()), command=partial(command, table))
+                            study=without_defaults(described.to_toml()),
+                            command=partial(command, table))
     return _report(table, described.sweep, folder, page, partial(command, table))
 
 

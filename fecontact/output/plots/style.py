@@ -80,7 +80,7 @@ def shaded_beyond(axes: "Sequence[Axes]", usable_hz: float) -> bool:
 
 def beyond_words(peak: str) -> str:
     """Words beside a bar whose colours end at the percentile of a stress."""
-    return f"{PERCENTILE} % of the values are below, peak {peak}"
+    return f"{PERCENTILE} % of the nodes stay below, peak {peak}"
 
 
 def stress_limit(sizes: Array) -> float:

@@ -130,6 +130,8 @@ class ForceChart:
             axes.plot(*thinned(trajectory.time[part] / time_unit, line.values / unit),
                       color=line.colour, linestyle=line.style, linewidth=0.1 * self.font,
                       label=legend_label(line.name))
+        # Nearly constant forces stay clear of the border.
+        axes.margins(y=0.1)
         if len(motion.times) > 1:
             axes.set_xlim(motion.times[0] / time_unit, motion.times[-1] / time_unit)
         axes.set_ylabel(f"total [{force_symbol}]", fontsize=0.9 * self.font, color=_DARK)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.analysis.sampling import between_outputs
 from fecontact.core.checks import as_path, require_frame_rate
 from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.core.files.atomic_write import beside, put, replaced, unwritable
@@ -69,7 +70,8 @@ def render(
         ``frame_0000.png`` and so on. Earlier files of these names are replaced, and further
         pictures of an earlier series removed.
     frames, fps : int, float
-        Number of frames, evenly spaced, at most that of output times; frames per second.
+        Number of frames, evenly spaced, and frames per second. At most the number of outputs,
+        unless they are too far apart for the motion: it is then computed between them.
     size : (int, int)
         Width and height in pixels, even, at least 320 x 180.
     colour : "displacement" or "von_mises"
@@ -99,7 +101,10 @@ def render(
     """
     path, movie = target(path, fps, size)
     require_field(trajectory)
-    indices = frame_indices(trajectory.time, frames, t_start, t_end)
+    if wear is None:  # whose depth counts from the start of the run
+        trajectory, indices = frames_of(trajectory, frames, t_start, t_end)
+    else:
+        indices = frame_indices(trajectory.time, frames, t_start, t_end)
     if not len(indices):
         raise InputError("frames = 0 makes no movie; give at least 1.")
     motion = _motion(trajectory, indices, colour, scale, view, wear)
@@ -108,6 +113,23 @@ def render(
     require_rendering(size, MOVING)
     return write_images(_images(motion, size, title, slowness), len(indices), path, fps, size,
                         progress)
+
+
+def frames_of(
+    trajectory: Trajectory, frames: int, t_start: float | None = None, t_end: float | None = None
+) -> tuple[Trajectory, NDArray[np.intp]]:
+    """The run whose times are drawn, and the indices of these times.
+
+    The run itself, unless its outputs are fewer than the frames and too far apart for the motion:
+    then its part from ``t_start`` to ``t_end`` with times between the outputs.
+    """
+    indices = frame_indices(trajectory.time, frames, t_start, t_end)
+    if not 1 < len(indices) < frames:
+        return trajectory, indices
+    part = trajectory.between(float(trajectory.time[indices[0]]),
+                              float(trajectory.time[indices[-1]]))
+    finer = between_outputs(part, frames)
+    return (trajectory, indices) if finer is part else (finer, frame_indices(finer.time, frames))
 
 
 def target(path: str | Path, fps: float, size: tuple[int, int]) -> tuple[Path, bool]:

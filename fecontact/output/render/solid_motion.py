@@ -123,7 +123,7 @@ def motion_words(motion: SolidMotion) -> list[str]:
         return []
     found = []
     if ground.motion is not None or ground.motion_y is not None:
-        found.append("ground moves in time")
+        found.append("ground moves, speed varies")
     elif ground.speed or ground.speed_y:
         speed = float(np.hypot(ground.speed, ground.speed_y))
         degrees = round(np.degrees(np.arctan2(ground.speed_y, ground.speed)))

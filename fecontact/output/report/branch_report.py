@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.core.checks import as_path, require_kind
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import suitable_unit
 from fecontact.output.plots.parameter_labels import parameter_label
@@ -71,7 +71,7 @@ def report_branches(
     """
     require_kind("report_branches", (Branch, Mapping), branches=branches)
     require_kind("report_branches", ContactField, field=field)
-    path = require_page(as_path(path, "a report"))
+    path = require_page(path)
     named = {"branch": branches} if isinstance(branches, Branch) else dict(branches)
     for name, branch in named.items():
         require_kind("report_branches", Branch, **{name: branch})

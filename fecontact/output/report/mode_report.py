@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
-from fecontact.core.checks import as_path, require_kind
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import quantity, suitable_unit
 from fecontact.output.report.diagram_page import SAMPLES, Diagram, Shown, sampled, write_diagrams
@@ -60,7 +60,7 @@ def report_modes(
     if not given or len({mode.observed for mode in given}) > 1:
         raise InputError("report_modes needs at least one mode, all of the same observed "
                          "displacement.")
-    path = require_page(as_path(path, "a report"))
+    path = require_page(path)
     named = _numbered(given)
     unit = "rad" if observe[1].startswith("phi") else "m"
     scale, symbol = suitable_unit(max(float(mode.amplitude.max()) for mode in given), unit)

@@ -8,7 +8,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
-from fecontact.core.checks import as_path, require_kind
+from fecontact.core.checks import require_kind
 from fecontact.core.units import quantity, suitable_unit
 from fecontact.output.plots.responses.response import frequency_axis, level_texts
 from fecontact.output.report.branch_report import COLUMNS, shown_of
@@ -57,7 +57,7 @@ def report_response(
     """
     require_kind("report_response", FrequencyResponse, response=response)
     require_kind("report_response", ContactSystem, system=system)
-    path = require_page(as_path(path, "a report"))
+    path = require_page(path)
     names = [response.parameter_name, *([response.level_name] if response.level_name else [])]
     field = contact_field(system, dict.fromkeys(names))
     named = dict(zip(_names(response, system), response.branches, strict=True))

@@ -9,7 +9,6 @@ import numpy as np
 from fecontact.analysis.comparison import compare_runs
 from fecontact.analysis.histories import Point, history, usual_component
 from fecontact.analysis.summaries import usual_point
-from fecontact.core.checks import as_path
 from fecontact.core.units import UNITS
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.stored_system import library_versions
@@ -58,7 +57,7 @@ def report_runs(
         As :func:`fecontact.analysis.compare_runs`, for another suffix, or a file that cannot be
         written.
     """
-    path = require_page(as_path(path, "a report"))
+    path = require_page(path)
     found = compare_runs(runs, points, studies=studies)
     first = next(iter(runs.values()))
     component = usual_component(first.system) if component is None else component

@@ -86,7 +86,7 @@ def report(
         For a file above 20 MB.
     """
     require_kind("report", Trajectory, run=run)
-    path = require_page(as_path(path, "a report"))
+    path = require_page(path)
     title = path.stem if title is None else title
     return write_page(path, title, run_block(run, title, study, points, scale, versions))
 
@@ -238,8 +238,9 @@ def colour_maps() -> dict[str, list[list[int]]]:
                                PRESSURE: "viridis", "component": "coolwarm"}.items()}
 
 
-def require_page(path: Path) -> Path:
+def require_page(path: str | Path) -> Path:
     """The path of a page; InputError for another suffix."""
+    path = as_path(path, "a report")
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path} must end in .html: a report is a page.")
     return path

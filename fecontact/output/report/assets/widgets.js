@@ -23,7 +23,7 @@ class ColourBar {
     [low, high].forEach((text, k) => { this.ends[k].textContent = text; });
   }
 
-  hide(away) { this.node.style.visibility = away ? "hidden" : ""; }
+  hide(away) { this.node.style.display = away ? "none" : ""; }
 }
 
 class Clock {
