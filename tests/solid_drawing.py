@@ -135,7 +135,8 @@ def solid_header(drawn, payload, scale=50.0):
              "values": payload.add(force[:, None], 1e-4 * force.max())}
     box = drawn.motions.box(scale)
     return {"format": 2, "title": "Block in space", "status": "synthetic", "good": True,
-            "notes": [], "facts": [], "system": [], "study": [], "versions": [], "units": UNITS,
+            "notes": [], "facts": [], "numbers": [], "system": [], "study": [], "versions": [],
+            "units": UNITS, "spectra": [],
             "time": payload.add(drawn.time, 1e-9), "charts": [chart], "phases": [],
             "energies": [], "balance": "", "maps": colour_maps(),
             "contact": contact_table(drawn.contact, payload),
