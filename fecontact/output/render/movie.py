@@ -70,8 +70,7 @@ def render(
         ``frame_0000.png`` and so on. Earlier files of these names are replaced, and further
         pictures of an earlier series removed.
     frames, fps : int, float
-        Number of frames, evenly spaced, and frames per second. At most the number of outputs,
-        unless they are too far apart for the motion: it is then computed between them.
+        Number of even frames, between outputs where these are too sparse; frames per second.
     size : (int, int)
         Width and height in pixels, even, at least 320 x 180.
     colour : "displacement" or "von_mises"
