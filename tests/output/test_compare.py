@@ -120,7 +120,7 @@ def test_responses_and_branches_over_each_other(over, tmp_path, capsys):
             **{"load.normal": load}).to_toml())
     assert execute(["compare", *map(str, files)]) == 0
     out = " ".join(capsys.readouterr().out.split())
-    assert "parameter light heavy" in out
+    assert "parameter, in SI units light heavy" in out
     assert "load.normal 14 15" in out
     assert f"wrote {tmp_path}/light-compare.png" in out
     assert imread(tmp_path / "light-compare.png").std() > 0.02

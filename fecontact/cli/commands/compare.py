@@ -94,7 +94,7 @@ def _show_parameters(names: "Sequence[str]", rows: "Sequence[Sequence[str]]") ->
     from fecontact.cli.tables import table
 
     if rows:
-        show(table("parameter", *names, rows=rows))
+        show(table("parameter, in SI units", *names, rows=rows))
     else:
         echo("All parameters that the files hold are equal.")
 
