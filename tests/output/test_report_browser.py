@@ -4,6 +4,7 @@ Needs Chromium and Playwright; see ``browsing.py``.
 """
 
 import io
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -123,6 +124,22 @@ def test_contact_nodes_have_the_colours_of_their_states(browser, path, trajector
                 assert np.abs(around - colours[state]).max(axis=1).min() < 10.0
                 met.add(state)
         assert met == {1, 2}
+
+
+def test_contacts_shorter_than_a_pixel_are_on_the_map(browser, tmp_path):
+    """Ten contacts of one output each among 4001."""
+    whole = run(times=4001)
+    q = np.zeros_like(whole.modal_coordinates)
+    q[:, 1] = 3e-5
+    q[200::400, 1] = -4e-5
+    path = report(replace(whole, modal_coordinates=q, modal_velocities=0.0 * q),
+                  tmp_path / "short.html")
+    with Opened(browser, path) as opened:
+        opened.page.wait_for_selector("html[data-whole]", state="attached")
+        picture = opened.picture(".map .plot")
+    coloured = np.ptp(picture[len(picture) // 3], axis=1) > 60.0
+    # The cursor stands at the first instant.
+    assert np.count_nonzero(np.diff(coloured.astype(int)) > 0) == 11
 
 
 def test_clicks_on_charts_move_the_time(browser, path, trajectory):

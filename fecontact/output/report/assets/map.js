@@ -50,7 +50,8 @@ class ContactMap extends Chart {
       order.forEach((node, row) => {
         const at = face.first + node;
         let most = value(at, from);
-        for (let i = from + 1; what !== "state" && i < until; i++) most = max(most, value(at, i));
+        // A contact shorter than a column of pixels is shown too.
+        for (let i = from + 1; i < until; i++) most = what === "state" ? most || value(at, i) : max(most, value(at, i));
         const colour = this.painted(most);
         if (colour) image.data.set([...colour, 255], 4 * (row * columns + column));
       });
@@ -65,7 +66,7 @@ class ContactMap extends Chart {
     c.textBaseline = "middle";
     const millimetres = (k) => (1e3 * face.abscissa[order[k]]).toPrecision(3).replace(/\.0*$/, "");
     c.fillText(millimetres(0), left - 6, top + 8);
-    c.fillText(millimetres(n - 1), left - 6, bottom - 8);
+    if (n > 1) c.fillText(millimetres(n - 1), left - 6, bottom - 8);
     if (n > 1) c.fillText(`${face.label.slice(-1)} [mm]`, left - 6, 0.5 * (top + bottom));
     this.bottomLabels(c, ticks(...x, clamp((right - left) / 80, 2, 10)));
   }
