@@ -97,9 +97,8 @@ def simulate(
     -------
     Trajectory or FieldRun
         Also if the run ended early, by Ctrl-C or because the solver failed; see its ``status``.
-        A ModelWarning before the run names values that are more likely an error.
-        Each of its ``limits_exceeded`` is a ModelWarning, and so is friction that gave energy to
-        the motion, as LuGre friction with large bristle damping can.
+        ModelWarnings name values that are likely an error, ``limits_exceeded``, and friction that
+        gave energy to the motion, as LuGre friction with large bristle damping can.
 
     Raises
     ------

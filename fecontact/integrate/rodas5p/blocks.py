@@ -131,7 +131,7 @@ def _blocks(
     m, n = len(shapes), nodes[-1][1]
     tangents = shapes.shape[1] // max(n, 1)
     # Without contact nodes no mode moves any; kernels step by the length of ``nodes``.
-    moved = moved.astype(bool) & (n > 0)
+    moved = (moved != 0.0) & (n > 0)
     parts = [(*modes[a], *nodes[b]) for b, a in np.argwhere(moved)]
     position, starts, reach = _elimination(modes, coupled)
     most = int(moved.sum(axis=1).max())
