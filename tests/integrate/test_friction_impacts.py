@@ -117,6 +117,7 @@ def test_a_spring_that_is_about_to_press_closes_a_stop(k, speed, contact):
     run, speeds = thrown(two_masses(k, 1), [-1.0, speed], times, restitution=0.0)
     assert run.status is Status.FINISHED
     assert run.statistics["events"] < 10
+    assert run.statistics["impacts"] == 1
     assert run.work[:, CONTACT_DAMPING] == pytest.approx(np.full(4, 0.5), abs=1e-9)
     if contact:
         assert speeds == pytest.approx(

@@ -48,12 +48,13 @@ def test_all_impacts_are_found(end):
     system = mass(UPWARDS, gap=1.0)
     times = np.linspace(0.0, end, 2001)
     run = integrate_set_valued(system, np.array([1.01, 0.0]), times, rtol=1e-11, restitution=0.5)
-    x, moments, speeds = bouncing(1.01, 0.5, times)
+    x, _, speeds = bouncing(1.01, 0.5, times)
     assert sum(speed > 1e-4 for speed in speeds) == (3 if end == 20.0 else 11)
     assert run.status is Status.FINISHED
     # Those that pass less than 1e-9 m deep are below the error of the steps.
     felt = sum(0.5 * speed**2 > 1e-9 for speed in speeds)
-    assert felt <= run.statistics["impacts"] <= len(moments)
+    # An approach within rounding of the largest speed is no impact.
+    assert felt <= run.statistics["impacts"] <= sum(speed > 1e-16 for speed in speeds)
     # An impact at 1e-5 m/s left out shifts the phase by twice that.
     assert run.states[:, 0] == pytest.approx(x, abs=3e-4)
     assert run.states[times <= 60.0, 0] == pytest.approx(x[times <= 60.0], abs=1e-8)

@@ -92,10 +92,7 @@ SOLVERS = {"rodas5p": None, "events": SetValued(scheme="events"),
            "stepping": SetValued(scheme="stepping"), "rigid": SetValued(restitution=0.6)}
 
 
-@pytest.mark.parametrize("name", [
-    *list(SOLVERS)[:3],
-    # A stop on waves that starts inside its ground ends with MINIMUM_STEP.
-    pytest.param("rigid", marks=pytest.mark.xfail(reason="starts inside wavy ground"))])
+@pytest.mark.parametrize("name", list(SOLVERS))
 def test_each_side_slides_at_its_own_speed(name):
     """Two oscillators that know nothing of each other, at 0.4 m/s on waves and at -0.15 m/s."""
     angle, options = 0.7, {} if SOLVERS[name] is None else {"solver": SOLVERS[name]}

@@ -1,11 +1,14 @@
-"""Touch-down of event-driven runs from penetrations of zero and its neighbours, against Rodas5P.
+"""Touch-down of event-driven runs from penetrations of zero and its neighbours.
 
 A stop without penetration is neither open nor closed by its sign: what the run does there may not
 depend on the last digit of a penetration.
 """
 
+from itertools import product
+
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import fecontact as fc
 from fecontact import Status
@@ -109,3 +112,92 @@ def test_neighbours_of_zero_have_one_future(speed, slip, gap, side):
     impulse = -speed - run.penetration_rate[:, 0] + WEIGHT * run.time
     assert run.slip_velocity[:, 0] == pytest.approx(
         np.maximum(slip - 0.3 * impulse, 0.0), abs=1e-7)
+
+
+def pair(nodes, mu, load, gap, spring):
+    """Two masses on springs, of which the first or both have a rigid stop; K and M (4, 4)."""
+    M, K = np.diag([1.0, 1.0, 0.7, 0.7]), np.diag([200.0, 30.0, 150.0, 40.0])
+    for a, b, k in ((0, 2, 300.0), (1, 3, spring)):
+        K[[a, b], [a, b]] += k
+        K[[a, b], [b, a]] -= k
+    rows = np.zeros((2, 3, 4))
+    rows[0, 0, 0] = rows[0, 1, 1] = rows[1, 0, 2] = rows[1, 1, 3] = 1.0
+    basis = fc.basis_from_matrices(M, K, {"contact": rows[:nodes], "C": rows[0], "D": rows[1]})
+    return fc.ContactSystem(basis, normal=LinearContact(1e6), friction=ConstantFriction(mu, 1e3),
+                            load=fc.Load(load), gap=gap), M, K
+
+
+@pytest.mark.parametrize(("e", "mu", "load"), [
+    *product([0.0, 0.5], [0.0, 0.3], [0.0, 10.0, 100.0]), (1.0, 0.0, 0.0), (1.0, 0.3, 100.0)])
+def test_masses_that_start_at_their_stops(e, mu, load):
+    """Their motion along the ground is that of the springs where there is no friction.
+
+    The friction of point masses has no effect on their normal accelerations: no start is a paradox.
+    """
+    rng = np.random.default_rng(11)
+    for nodes, gap, spring in product([1, 2], [0.0, 1.0 / 3.0], [10.0, 1e3]):
+        system, M, K = pair(nodes, mu, load, gap, spring)
+        speed = rng.normal(size=4) * (rng.random(4) < 0.6)
+        place = np.zeros(4)
+        place[1::2] = np.nextafter(-gap, -gap + rng.integers(-1, 2, 2))
+        rows = np.vstack([system.basis.T[system.basis.point_index(name), :2] for name in "CD"])
+        start = np.linalg.solve(rows, np.stack([place, speed], axis=1)).T.ravel()
+        run = fc.simulate(system, 0.1, initial=start, outputs=5, rtol=1e-8,
+                          solver=SetValued(restitution=e))
+        assert run.status is Status.FINISHED
+        assert run.energies.imbalance < 1e-6
+        assert run.penetration.max() < 1e-9
+        if mu == 0.0:
+            A = np.zeros((4, 4))
+            A[:2, 2:], A[2:, :2] = np.eye(2), -np.linalg.solve(M, K)[::2, ::2]
+            along = expm(0.1 * A) @ np.concatenate([place[::2], speed[::2]])
+            assert rows[::2] @ run.states[-1, 4:] == pytest.approx(along[2:], abs=1e-6)
+
+
+def accelerations(places, height, mu, inertia):
+    """Number of sets of normal forces of a body that slides on two nodes under 10 N.
+
+    By trying all cases of which nodes are pressed.
+    """
+    normal = np.array([[0.0, 1.0, a] for a in places])
+    pushing = normal - mu * np.array([1.0, 0.0, height])
+    W = normal @ np.diag([1.0, 1.0, 1.0 / inertia]) @ pushing.T
+    found = []
+    for pressed in product([False, True], repeat=2):
+        F, on = np.zeros(2), np.array(pressed)
+        if on.any():
+            F[on] = np.linalg.solve(W[np.ix_(on, on)], np.full(on.sum(), 10.0))
+        if (F >= 0.0).all() and (W @ F - 10.0 >= -1e-9).all():
+            found.append(F)
+    return len(found)
+
+
+def test_a_paradox_has_no_acceleration_or_several():
+    rng, counts = np.random.default_rng(5), []
+    for _ in range(60):
+        places, height = (rng.uniform(-1.0, 0.2), rng.uniform(-0.2, 1.0)), rng.uniform(-2.0, 2.0)
+        mu, inertia = rng.uniform(0.0, 3.0), rng.uniform(0.05, 1.0)
+        rows = [[[1.0, 0.0, height], [0.0, 1.0, a], [0.0, 0.0, 1.0]] for a in places]
+        basis = fc.basis_from_matrices(np.diag([1.0, 1.0, inertia]), np.zeros((3, 3)), {
+            "contact": rows, "C": np.eye(3)})
+        system = fc.ContactSystem(basis, normal=LinearContact(1e6), load=fc.Load(10.0),
+                                  friction=ConstantFriction(mu, 1e3))
+        speed = np.linalg.solve(basis.T[basis.point_index("C")], [1.0, 0.0, 0.0])
+        run = fc.simulate(system, 1e-6, initial=np.concatenate([np.zeros(3), speed]), outputs=2,
+                          solver=SetValued(restitution=0.0))
+        counts.append(accelerations(places, height, mu, inertia))
+        assert (run.status is Status.PARADOX) == (counts[-1] != 1)
+    assert {0, 1} <= set(counts)
+
+
+@pytest.mark.parametrize("e", [0.0, 1.0])
+@pytest.mark.parametrize("speed", [0.0, 1e-18, -1e-18])
+def test_rounding_is_no_impact(speed, e):
+    """A mass at rest on its stop, at a speed within rounding of its slip."""
+    system = mass(gap=GAP, mu=0.0)
+    row = system.basis.T[-1, :2]
+    start = np.linalg.solve(row, [[0.0, 0.5], [-GAP, speed]]).T.ravel()
+    run = fc.simulate(system, 0.1, initial=start, outputs=3, solver=SetValued(restitution=e))
+    assert run.status is Status.FINISHED
+    assert run.statistics["impacts"] == 0
+    assert run.normal_force[:, 0] == pytest.approx(WEIGHT, rel=1e-9)

@@ -41,6 +41,8 @@ _SWEEPS = 2000
 # What is left of the conditions in a solution, and the difference between two that are not the
 # same, relative to the largest terms.
 _RESIDUAL, _APART = 1e-13, 1e-6
+# Accelerations or velocities that are the same, relative to the terms of b.
+_SAME = 1e-10
 
 
 class Conditions(NamedTuple):
@@ -60,6 +62,8 @@ class Conditions(NamedTuple):
         Whether a node can be pressed.
     mode : (k,) array
         STICK for a cluster that may stick or slip, its sense for one that slips, OPEN for none.
+    size : float
+        Size of the terms of b; an entry of y within their rounding is zero.
     """
 
     matrix: Array
@@ -70,6 +74,7 @@ class Conditions(NamedTuple):
     cluster: Integers
     touching: NDArray[np.bool_]
     mode: Integers
+    size: float
 
 
 class Case(NamedTuple):
@@ -100,7 +105,7 @@ def new_case(n, k):
 @helper
 def _follow(c, case):
     """Fill ``case.y`` from ``case.x``; returns the size of its terms."""
-    size = 0.0
+    size = c.size
     for r in range(len(c.given)):
         total, terms = c.given[r], abs(c.given[r])
         for s in range(len(c.given)):
@@ -290,7 +295,10 @@ def _copy(case, other):
 
 @routine
 def _try_all(c, sticking, first_only, trial, case):
-    """Number of solutions that differ, up to two; the first is put into ``case``."""
+    """Number of solutions that differ, up to two; the first is put into ``case``.
+
+    Solutions whose velocities or accelerations agree within rounding do not differ.
+    """
     found = 0
     for index in range(count_cases(c)):
         if not _set_case(index, c, trial):
@@ -306,9 +314,9 @@ def _try_all(c, sticking, first_only, trial, case):
         else:
             apart, scale = 0.0, 0.0
             for r in range(len(trial.x)):
-                apart = max(apart, abs(trial.x[r] - case.x[r]))
-                scale = max(scale, max(abs(trial.x[r]), abs(case.x[r])))
-            if apart > _APART * scale:
+                apart = max(apart, c.matrix[r, r] * abs(trial.x[r] - case.x[r]))
+                scale = max(scale, c.matrix[r, r] * max(abs(trial.x[r]), abs(case.x[r])))
+            if apart > max(_APART * scale, _SAME * c.size):
                 found = 2
                 break
     return found

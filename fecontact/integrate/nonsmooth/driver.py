@@ -288,6 +288,7 @@ def nonsmooth_problem(
     sliding[cluster] = arrays.sliding
     ground = system.ground
     wave = ground.shortest_wavelength if ground.wavy else None
+    plane = system.basis.dimension == 2
     problem = kinds.NonsmoothProblem(
         arrays, node_values("static_coefficient", static_coefficient, system.basis, -1.0), cluster,
         rows, sliding, 1e-4 * longest, int(restitution is not None),
@@ -295,8 +296,8 @@ def nonsmooth_problem(
         _of_clusters(node_values("tangential_restitution", tangential, system.basis, 0.0), cluster),
         0,
         np.array([*ground.height_range, np.inf if wave is None else wave]),
-        int(system.prescribed_motion.constant), compiled_derivative.address,
-        compiled_change.address)
+        int(system.prescribed_motion.constant), compiled_derivative.address if plane else 0,
+        compiled_change.address if plane and restitution is not None else 0)
     rubbing = np.any(rows != 0.0, axis=1)
     if restitution is not None and system.basis.springs:
         raise InputError(f"SetValued: restitution puts rigid stops in place of all normal laws, "
@@ -305,7 +306,7 @@ def nonsmooth_problem(
     if restitution is not None:
         rough = _rough_nodes(groups, problem.static)
         rubbing &= np.array([rough[cluster == c].any() for c in range(len(rows))])
-        if system.basis.dimension == 2:
+        if plane:
             _require_independence(arrays.Ty, rows[rubbing])
     return problem, rubbing
 

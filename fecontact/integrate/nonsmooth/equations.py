@@ -171,6 +171,26 @@ def lifting_row(j, i, w, s):
 
 
 @helper
+def place_size(j, Y, p):
+    """Size of the terms of the penetration of node j [m], of whose rounding it has 1e-16."""
+    s = p.system
+    size = abs(s.gap[j]) + max(abs(p.relief[0]), abs(p.relief[1]))
+    for i in range(s.Ty.shape[1]):
+        size += abs(s.Ty[j, i] * Y[i])
+    return size
+
+
+@helper
+def force_size(i, Y, pushes, s):
+    """Size of the terms of the force on mode i without contact; ``pushes`` are prescribed."""
+    m = s.Ty.shape[1]
+    size = abs(pushes[i])
+    for k in range(m):
+        size += abs(s.stiffness[i, k] * Y[k]) + abs(s.damping[i, k] * Y[m + k])
+    return size
+
+
+@helper
 def slipping_force(j, slip, sign, pressing, s):
     """R of node j that slips with the given sign, also where its slip velocity is still zero."""
     v = sign * max(sign * slip, CREEP)

@@ -13,9 +13,9 @@ from numba import types
 from fecontact.core.compiled import helper, i8, kernel
 from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
-from fecontact.integrate.nonsmooth.equations import derivative
+from fecontact.integrate.nonsmooth.equations import derivative, place_size
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
-from fecontact.integrate.nonsmooth.event_search import ROOM, first_changes
+from fecontact.integrate.nonsmooth.event_search import ROOM, ROUNDING, first_changes, least_depth
 from fecontact.integrate.nonsmooth.problem import (
     DEPTH_SIZE,
     DIVERGED,
@@ -24,7 +24,6 @@ from fecontact.integrate.nonsmooth.problem import (
     FORCE,
     GOING_ON,
     HELD,
-    IMPACTS,
     LAST_ERROR,
     LENGTH,
     LIMITS,
@@ -69,7 +68,7 @@ EARLY = 0.25
 _DAMPED, _SMALLEST_ERROR = 0.03, 1e-4
 # Events in a row without any time between them after which a run is stuck.
 _MOST_IDLE = 200
-# Penetration rates at the start below this part of the largest are no approach.
+# Penetration rates at the start below this part of the largest are those of stops at rest.
 _SLOW = 1e-9
 # Repeated steps in a row, without any time between them, in which what lets go may still hold;
 # after these rounding alone holds it.
@@ -84,6 +83,21 @@ def _outcome(flight):
 
 
 @helper
+def _place_size(j, p, limits, progress):
+    """Size of the places of node j [m], of whose rounding its penetration has 1e-16."""
+    return place_size(j, progress.state, p) + least_depth(j, p, limits)
+
+
+@helper
+def _height(p, limits, progress):
+    """Largest distance of a stop from its ground so far, or size of its places now [m]."""
+    height = progress.largest[DEPTH_SIZE]
+    for j in range(len(p.cluster)):
+        height = max(height, _place_size(j, p, limits, progress))
+    return height
+
+
+@helper
 def _start(t, p, limits, progress, w, room):
     """Decide at the start of a run which clusters stick and which stops are closed."""
     largest = progress.largest
@@ -92,22 +106,16 @@ def _start(t, p, limits, progress, w, room):
         room.released[c] = room.arrived[c] = False
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
     if p.rigid != 0:
-        height, clusters = 0.0, len(p.rows)
         for j in range(len(p.cluster)):
-            room.touched[j] = w.nodes[j, PENETRATION] >= 0.0
+            depth = w.nodes[j, PENETRATION]
+            room.touched[j] = depth >= -ROUNDING * _place_size(j, p, limits, progress)
             room.parting[j] = False
-            height = max(height, abs(w.nodes[j, PENETRATION]))
             largest[RATE_SIZE] = max(largest[RATE_SIZE], abs(w.nodes[j, RATE]))
-        slow = _SLOW * largest[RATE_SIZE]
-        for j in range(len(p.cluster)):
-            room.past[clusters + j] = room.touched[j] and w.nodes[j, RATE] > slow
+            largest[DEPTH_SIZE] = max(largest[DEPTH_SIZE], abs(depth))
         flight = change_contacts_at(p.change)(
-            t, p, progress, room, w, slow, height, 1e-9 * limits.longest, room.rate)
-        # Stops that are approached at the start are struck; what rests on one touches it only.
-        room.touched[:] = room.past[clusters:]
-        struck = np.count_nonzero(room.touched)
-        progress.counts[IMPACTS] += struck
-        progress.counts[EVENTS] += 1 if struck > 0 else 0
+            t, p, progress, room, w, _SLOW * largest[RATE_SIZE], _height(p, limits, progress),
+            1e-9 * limits.longest, room.rate)
+        progress.counts[EVENTS] += 1 if room.touched.any() else 0
         return _outcome(flight)
     decide_clusters(t, p, progress, room, 1e-12 * largest[SLIP_SIZE], w, room.rate)
     return GOING_ON
@@ -273,14 +281,13 @@ def _change_stops(t, again, p, limits, progress, w, room):
         event = room.past[clusters + j]
         # A flight that has begun without speed and ends at once is none: the stop stays closed.
         if (again and event and closed[j] == 0 and room.fresh[clusters + j]
-                and w.nodes[j, RATE] <= slow):
+                and abs(w.nodes[j, RATE]) <= slow):
             closed[j] = HELD
         room.touched[j] = event and closed[j] == 0
         room.parting[j] = event and closed[j] == 1
-        if room.touched[j]:
-            progress.counts[IMPACTS] += 1
     return change_contacts_at(p.change)(
-        t, p, progress, room, w, slow, largest[DEPTH_SIZE], 1e-9 * limits.longest, room.slopes[0])
+        t, p, progress, room, w, slow, _height(p, limits, progress), 1e-9 * limits.longest,
+        room.slopes[0])
 
 
 @helper

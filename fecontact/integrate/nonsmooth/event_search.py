@@ -32,7 +32,12 @@ from fecontact.integrate.bernstein import (
 )
 from fecontact.integrate.nonsmooth.dop853 import PARTS, SLOPES
 from fecontact.integrate.nonsmooth.problem import OPEN, STICK, NonsmoothProblem
-from fecontact.integrate.nonsmooth.steps.flights import FLIGHT_FIELDS, YOUNG, first_landing
+from fecontact.integrate.nonsmooth.steps.flights import (
+    FLIGHT_FIELDS,
+    SUNK,
+    YOUNG,
+    first_landing,
+)
 from fecontact.integrate.nonsmooth.steps.rates import nothing_given
 from fecontact.integrate.nonsmooth.steps.releases import QUARTERS, first_let_go
 from fecontact.laws.signatures import ground_at, normal_at
@@ -261,8 +266,10 @@ def _search_stops(step, p, progress, room):
         if largest(b) + p.relief[1] < 0.0:
             continue
         shorter = min(shorter, _add_ground(j, step, p, Y, room))
+        # On waves a place at which a flight has begun is no landing.
+        size = ROUNDING * size + room.flights[j, SUNK]
         for i in range(len(b)):
-            b[i] = ROUNDING * size - b[i]
+            b[i] = size - b[i]
         room.place[clusters + j] = first_below(b, room.halves)
         first = min(first, room.place[clusters + j])
     return first, shorter, forces
@@ -284,16 +291,21 @@ def _search_clusters(step, p, progress, room):
 
 
 @helper
+def least_depth(j, p, limits):
+    """Depth of node j [m] below which errors of the places are not measured relative to these."""
+    depth = 0.0
+    for i in range(p.rows.shape[1]):
+        depth = max(depth, abs(p.system.Ty[j, i]) * limits.floor[i])
+    return depth
+
+
+@helper
 def _search_nodes(first, forces, step, p, limits, progress, room):
     """Note where clusters that are open touch the ground; returns as :func:`_search_stops`."""
     s, b, Y, place = p.system, room.bound, progress.state, room.place
-    n, m = s.Tx.shape
     shorter = 1.0
-    for j in range(n):
+    for j in range(len(s.gap)):
         _along(s.Ty[j], 0, Y, room, b)
-        depth = 0.0
-        for i in range(m):
-            depth = max(depth, abs(s.Ty[j, i]) * limits.floor[i])
         for i in range(len(b)):
             b[i] = -b[i] - s.gap[j]
         low = pressed(smallest(b) + p.relief[0], j, s)
@@ -312,7 +324,7 @@ def _search_nodes(first, forces, step, p, limits, progress, room):
                 forces = True
             continue
         above = UNFELT * max(before, pressed(b[PARTS], j, s)) + pressed(
-            0.01 * limits.rtol * depth, j, s)
+            0.01 * limits.rtol * least_depth(j, p, limits), j, s)
         if max(low, high) <= above and p.relief[0] == p.relief[1] == 0.0:
             continue
         if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:

@@ -54,7 +54,8 @@ class NonsmoothProblem(NamedTuple):
     lowest and the highest ground and its shortest wave, infinite where it is level; ``steady`` is
     zero if the prescribed speed changes; ``derivative`` and ``change`` are the addresses of
     :data:`fecontact.integrate.nonsmooth.equations.compiled_derivative` and
-    :data:`fecontact.integrate.nonsmooth.rigid_stops.compiled_change`.
+    :data:`fecontact.integrate.nonsmooth.rigid_stops.compiled_change`, which are 0 in space; the
+    latter is 0 without rigid stops too.
     """
 
     system: Any

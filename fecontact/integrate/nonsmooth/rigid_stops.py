@@ -36,6 +36,7 @@ from fecontact.integrate.nonsmooth.contact_conditions import (
 )
 from fecontact.integrate.nonsmooth.equations import (
     derivative,
+    force_size,
     held_row,
     pushing_row,
     slipping_force,
@@ -52,6 +53,7 @@ from fecontact.integrate.nonsmooth.problem import (
     GAINED,
     GRIP,
     HELD,
+    IMPACTS,
     OPEN,
     PENETRATION,
     PROBLEM,
@@ -64,6 +66,7 @@ from fecontact.integrate.nonsmooth.problem import (
     WORKSPACE,
 )
 from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
+from fecontact.integrate.nonsmooth.steps.rates import set_prescribed
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
@@ -80,6 +83,8 @@ NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 _NEAR, _GAIN = 1e-9, 1e-10
 # Rounding of penetration rates relative to the largest slip velocity or rate.
 _RATE_ROUNDING = 1e-14
+# Corrections of the places of stops that close or open.
+_MOST_CORRECTIONS = 5
 
 CHANGE = f8(f8, Reference(PROBLEM), Reference(PROGRESS), Reference(ROOM), Reference(WORKSPACE), f8,
             f8, f8, vector)
@@ -104,6 +109,29 @@ def _push(count, first, p, w, Y):
     for a in range(count):
         for i in range(m):
             Y[first + i] += pushing_row(w.indices[a], i, p, w) * w.right[a]
+
+
+@routine
+def _place(t, p, progress, room, w, out):
+    """Move stops that are touched or part onto their ground, by Newton's method.
+
+    The correction ends where it no longer halves the largest distance; w and ``out`` are those at
+    the end.
+    """
+    Y, status, closed = progress.state, progress.status, progress.closed
+    before = math.inf
+    for _ in range(_MOST_CORRECTIONS):
+        count, distance = 0, 0.0
+        for j in range(len(p.cluster)):
+            if room.touched[j] or room.parting[j]:
+                w.indices[count], w.right[count] = j, w.nodes[j, PENETRATION]
+                distance = max(distance, abs(w.nodes[j, PENETRATION]))
+                count += 1
+        if distance == 0.0 or distance > 0.5 * before:
+            break
+        _push(count, 0, p, w, Y)
+        derivative(t, Y, p, status, closed, w, out)
+        before = distance
 
 
 @routine
@@ -139,10 +167,24 @@ def _set_matrix(p, w, matrix):
 
 
 @routine
-def _conditions(touching, p, w):
+def _size(sizes, p, w):
+    """Largest size of the terms of a penetration or a slip from those of the modes, ``sizes``."""
+    m = len(sizes)
+    largest = 0.0
+    for a in range(len(p.cluster) + len(p.rows)):
+        total = 0.0
+        for i in range(m):
+            total += abs(held_row(a, i, p, w)) * sizes[i]
+        largest = max(largest, total)
+    return largest
+
+
+@routine
+def _conditions(touching, sizes, p, w):
     """Conditions of contact at the touching nodes, all of whose clusters may stick or slip.
 
-    Coefficients are those of the slip velocities in w; nothing is given yet.
+    Coefficients are those of the slip velocities in w; nothing is given yet. ``sizes`` (m,) are
+    those of the terms of modal velocities or accelerations.
     """
     n, k = len(p.cluster), len(p.rows)
     matrix, mode = np.empty((n + k, n + k)), np.zeros(k, np.int64)
@@ -157,7 +199,7 @@ def _conditions(touching, p, w):
                               slipping_force(j, CREEP, 1.0, grip, p.system))
             mode[c] = STICK
     return Conditions(matrix, np.zeros(n + k), np.zeros(n), sticking, slipping, p.cluster,
-                      touching, mode)
+                      touching, mode, _size(sizes, p, w))
 
 
 @routine
@@ -177,7 +219,7 @@ def _strike(t, touching, p, progress, w):
     s, Y = p.system, progress.state
     n, m = s.Tx.shape
     k = len(p.rows)
-    conditions, case = _conditions(touching, p, w), new_case(n, k)
+    conditions, case = _conditions(touching, np.abs(Y[m : 2 * m]), p, w), new_case(n, k)
     _omit_fixed(progress.status, conditions)
     given, x = conditions.given, np.zeros(n + k)
     # An impact knows one coefficient, whether its contact sticks or slips.
@@ -243,7 +285,11 @@ def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
     """
     n, k = len(p.cluster), len(p.rows)
     status, friction = progress.status, False
-    conditions = _conditions(resting, p, w)
+    sizes = np.empty(p.rows.shape[1])
+    set_prescribed(t, p.system, room)
+    for i in range(len(sizes)):
+        sizes[i] = force_size(i, progress.state, room.pushes, p.system)
+    conditions = _conditions(resting, sizes, p, w)
     _omit_fixed(status, conditions)
     ground = speed_rate(t, p)
     for j in range(n):
@@ -328,6 +374,8 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
 def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
     """Impact of the ``room.touched`` nodes, then which stops stay closed and what sticks.
 
+    An approach at a penetration rate within rounding is stopped, but is no impact;
+    ``room.touched`` tells afterwards which nodes had one.
     ``room.parting`` nodes were closed and lift off, ``room.released`` clusters begin to slip in the
     sense of their status, ``room.arrived`` ones have come to rest; HELD stops that rest close.
     After an impact, stops whose penetration rate is below ``slow``, or whose rebound is lower than
@@ -337,7 +385,7 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
     """
     out = borrowed(held_out)
     Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest
-    n, count = len(p.cluster), 0
+    n = len(p.cluster)
     touching = np.zeros(n, np.bool_)
     derivative(t, Y, p, status, closed, w, out)
     near = max(largest[SLIP_SIZE], largest[RATE_SIZE])
@@ -347,14 +395,17 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
         touching[j] = room.touched[j] or closed[j] or room.parting[j]
         if room.touched[j]:
             near = max(near, abs(w.nodes[j, RATE]))
-            w.indices[count], w.right[count] = j, w.nodes[j, PENETRATION]
-            count += 1
-    if count > 0:
-        _push(count, 0, p, w, Y)
-        derivative(t, Y, p, status, closed, w, out)
-        if not _strike(t, touching, p, progress, w):
-            return NO_IMPULSES
-    return _decide(t, touching, count > 0, slow, height, brief, _NEAR * near, p, progress, room, w,
+    _place(t, p, progress, room, w, out)
+    approached, struck = False, False
+    for j in range(n):
+        rate = w.nodes[j, RATE] if room.touched[j] else 0.0
+        approached = approached or rate > 0.0
+        room.touched[j] = rate > _RATE_ROUNDING * near
+        struck = struck or room.touched[j]
+        progress.counts[IMPACTS] += 1 if room.touched[j] else 0
+    if approached and not _strike(t, touching, p, progress, w):
+        return NO_IMPULSES
+    return _decide(t, touching, struck, slow, height, brief, _NEAR * near, p, progress, room, w,
                    out)
 
 

@@ -12,7 +12,12 @@ either sign; :func:`press` moves it to the side on which the normal law acts.
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.integrate.nonsmooth.equations import derivative, solve_small, speed_rate
+from fecontact.integrate.nonsmooth.equations import (
+    derivative,
+    place_size,
+    solve_small,
+    speed_rate,
+)
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, pressed
 from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, PENETRATION, RATE, SLOPE, STICK
 
@@ -86,10 +91,9 @@ def press(t, p, touched, w, Y):
         u, rate = w.nodes[j, PENETRATION], w.nodes[j, RATE]
         if not touched[j] or pressed(u, j, s) > 0.0:
             continue
-        size, stretch = abs(s.gap[j]) + max(abs(p.relief[0]), abs(p.relief[1])), 0.0
+        size, stretch = place_size(j, Y, p), 0.0
         for i in range(m):
             row = s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]
-            size += abs(s.Ty[j, i] * Y[i])
             stretch += row * row
         depth = ROUNDING * size + abs(rate) * _TIME_ROUNDING * (abs(t) + _TICKS * p.tick)
         for _ in range(_PRESSES):

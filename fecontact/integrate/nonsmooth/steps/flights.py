@@ -15,6 +15,7 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.bernstein import NOWHERE, first_below, from_nested, value
 from fecontact.integrate.nonsmooth.dop853 import DENSE, PARTS, SLOPES, STAGES, B
+from fecontact.integrate.nonsmooth.equations import force_size, place_size
 from fecontact.integrate.nonsmooth.problem import PENETRATION, RATE, RATE_SIZE
 
 # Columns of ``room.flights``: whether a flight has just begun, its height and the rate of that, and
@@ -50,9 +51,7 @@ def _acceleration_size(j, p, progress, room):
     s, Y = p.system, progress.state
     m, total = s.Ty.shape[1], 0.0
     for i in range(m):
-        size = abs(room.pushes[i]) + abs(room.slopes[0, m + i])
-        for k in range(m):
-            size += abs(s.stiffness[i, k] * Y[k]) + abs(s.damping[i, k] * Y[m + k])
+        size = force_size(i, Y, room.pushes, s) + abs(room.slopes[0, m + i])
         total += abs(s.Ty[j, i]) * size
     return total
 
@@ -123,9 +122,9 @@ def advance(part, step, p, progress, room):
         if room.flights[j, YOUNG] == 0.0:
             continue
         _rise(j, step, p, progress, room)
-        size = s.gap[j] + max(abs(p.relief[0]), abs(p.relief[1]))
+        size = place_size(j, Y, p)
         for i in range(p.rows.shape[1]):
-            size += abs(s.Ty[j, i]) * (abs(Y[i]) + abs(room.parts[0, i]))
+            size += abs(s.Ty[j, i] * room.parts[0, i])
         room.flights[j, HEIGHT] = max(value(room.heights, part, room.halves[0]), 0.0)
         room.flights[j, CLIMB] = value(room.along, part, room.halves[0])
         if room.flights[j, HEIGHT] > _CLEAR * size + _ABOVE * room.flights[j, SUNK]:

@@ -31,8 +31,8 @@ def nothing_given() -> np.ndarray:
 
 
 @helper
-def _set_given(t, s, room):
-    """Fill ``room.given``, and ``loads`` and ``pushes`` (m,) with modal forces: loads, and all."""
+def set_prescribed(t, s, room):
+    """Fill ``room.given``, and ``loads`` and ``pushes`` (m,) with modal forces of loads, of all."""
     given = room.given
     if given[WHEN] == t:
         return
@@ -61,7 +61,7 @@ def set_rates(t, Y, p, progress, w, room, out):
     """Fill out (2 m,) with q' and q'' at Y, and w with what acts, but for limits of stick."""
     s = p.system
     m = s.Tx.shape[1]
-    _set_given(t, s, room)
+    set_prescribed(t, s, room)
     acceleration = out[m : 2 * m]
     for i in range(m):
         out[i] = Y[m + i]
