@@ -35,6 +35,8 @@ from fecontact.system.powers import (
 
 # Resolution of 2 s - 1 where a force begins or ends.
 _RESOLVED = 1e-14
+# Looks at a normal force within a step, and golden sections about a minimum between them.
+_FORCE_LOOKS, _SECTIONS, _GOLDEN = 4, 16, 0.6180339887498949
 # Parts of what a gap or a slip velocity is the sum of that are its rounding.
 _NOISE = 1e-14
 
@@ -225,24 +227,65 @@ def _first_change(after, noise, c):
     return 2.0
 
 
-@helper
-def _presses(x, j, s, c):
-    """Whether node j has a normal force at x = 2 s - 1."""
+@routine
+def _normal_force(x, j, s, c):
+    """Normal force of node j at x = 2 s - 1."""
     u, v = -s.gap[j], 0.0
     for k in range(c.accelerations.shape[1]):
         u -= s.Ty[j, k] * value_at(c.places, k, x)
         v -= s.Ty[j, k] * value_at(c.rates, k, x)
-    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0] != 0.0
+    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+
+
+@helper
+def _presses(x, j, s, c):
+    """True if node j has a normal force at x = 2 s - 1."""
+    return _normal_force(x, j, s, c) != 0.0
+
+
+@routine
+def _without_force(high, j, s, c):
+    """First place x found up to ``high`` where node j, pressed at the start, has no force.
+
+    2 if the force lasts. Between looks the force is followed to its minima by golden sections.
+    """
+    width = (high + 1.0) / _FORCE_LOOKS
+    before, now = np.inf, abs(_normal_force(-1.0, j, s, c))
+    for look in range(1, _FORCE_LOOKS + 1):
+        x = high if look == _FORCE_LOOKS else -1.0 + look * width
+        after = abs(_normal_force(x, j, s, c))
+        if now < before and now <= after:
+            left, right = max(x - 2.0 * width, -1.0), x
+            for _ in range(_SECTIONS):
+                a, b = right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)
+                at_a, at_b = abs(_normal_force(a, j, s, c)), abs(_normal_force(b, j, s, c))
+                if at_a == 0.0:
+                    return a
+                if at_b == 0.0:
+                    return b
+                if at_a < at_b:
+                    right = b
+                else:
+                    left = a
+        if after == 0.0:
+            return x
+        before, now = now, after
+    return 2.0
 
 
 @routine
 def _release(high, j, s, c):
     """Part of the step up to x = ``high`` at which a normal force begins or ends, else 2.
 
-    It is there at the begin or at x = ``high``, and not at the other.
+    A force that is there at both ends may vanish in between; one that is at neither does not
+    begin, as its penetration would pass a level.
     """
     presses = _presses(-1.0, j, s, c)
-    if presses == _presses(high, j, s, c):
+    if presses:
+        high = _without_force(high, j, s, c)
+        if high > 1.0:
+            return 2.0
+    elif not _presses(high, j, s, c):
         return 2.0
     low = -1.0
     while high - low > _RESOLVED:

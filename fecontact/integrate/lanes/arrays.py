@@ -147,7 +147,11 @@ class LaneRoom(NamedTuple):
     places, speeds : (2 n, 8) arrays
         As in the progress, at a stage or at the end.
     forces : (n, FORCES, 8) array
-        At the end.
+        At a stage, of which only normal forces are known, or at the end.
+    inner : (2, 2 n, 8) array
+        Displacements and velocities of the nodes at a point within the step.
+    inner_forces : (n, FORCES, 8) array
+        Normal forces there.
     """
 
     stages: Array
@@ -166,10 +170,12 @@ class LaneRoom(NamedTuple):
     places: Array
     speeds: Array
     forces: Array
+    inner: Array
+    inner_forces: Array
 
 
 LANE_ROOM = types.NamedTuple(
-    [block] * 6 + [matrix] * 4 + [block] + [matrix] * 4 + [block], LaneRoom)
+    [block] * 6 + [matrix] * 4 + [block] + [matrix] * 4 + [block] * 3, LaneRoom)
 
 
 class LaneRuns(NamedTuple):
@@ -263,6 +269,6 @@ def lanes_for(
     room = LaneRoom(
         zeros(tableau.STAGES, 2 * m), square[0], square[1], square[2], square[3], square[4],
         state_room[0], state_room[1], state_room[2], state_room[3], zeros(3, 2 * m), zeros(m),
-        zeros(m), zeros(2 * n), zeros(2 * n), zeros(n, FORCES))
+        zeros(m), zeros(2 * n), zeros(2 * n), zeros(n, FORCES), zeros(2, 2 * n), zeros(n, FORCES))
     return Lanes(parameters, start, LaneSystem(*views[:counted], *laws),
                  LaneControl(*views[counted:]), progress, room)

@@ -57,22 +57,27 @@ def note_extremes(control, progress):
 
 @helper
 def state_error(control, progress, w):
-    """Error of the state at the end of a step as a multiple of what is allowed."""
+    """Error of the state at the end of a step, as a multiple of the allowed error."""
     m = len(progress.extremes)
-    difference = w.stages[STAGES - 1]
+    error, finite = modal_error(w.stages[STAGES - 1], control, progress, w), ~mask_of(0)
+    for k in range(2 * m):
+        finite = finite & (magnitude(read(w.after[k])) < np.inf)
+    return chosen(finite & (error < np.inf), error, np.inf)
+
+
+@helper
+def modal_error(difference, control, progress, w):
+    """Largest entry of a difference of modal states, as a multiple of the allowed error."""
+    m, error = len(progress.extremes), spread(0.0)
     per_speed = 1.0 / larger(read(progress.numbers[SPEED_SCALE]),
                              read(control.numbers[LEAST_SPEED]))
-    error, finite = spread(0.0), ~mask_of(0)
     for i in range(m):
-        after = read(w.after[i])
-        scale = larger(larger(read(progress.extremes[i]), magnitude(after)),
+        scale = larger(larger(read(progress.extremes[i]), magnitude(read(w.after[i]))),
                        read(control.displacement_scale[i]))
         error = larger(error, magnitude(read(difference[i])) / scale)
         error = larger(error, magnitude(read(difference[m + i])) * read(control.largest[i])
                        * per_speed)
-        finite = (finite & (magnitude(after) < np.inf)
-                  & (magnitude(read(w.after[m + i])) < np.inf))
-    return chosen(finite & (error < np.inf), error / read(control.numbers[RTOL]), np.inf)
+    return error / read(control.numbers[RTOL])
 
 
 @helper

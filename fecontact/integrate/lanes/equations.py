@@ -5,7 +5,15 @@ has no memory.
 """
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.lanes.vectors import bits, chosen, magnitude, read, spread, write
+from fecontact.core.lanes.vectors import (
+    bits,
+    chosen,
+    magnitude,
+    mask_of,
+    read,
+    spread,
+    write,
+)
 from fecontact.integrate.lanes.arrays import BY_FORCE, BY_PLACE, BY_RATE, BY_SLIP, FORCE
 from fecontact.laws.lanes import node_lanes_at, signal_lanes_at
 
@@ -79,8 +87,8 @@ def _push(j, F, R, s, rate):
 
 
 @helper
-def set_rate(y, speed, s, load, places, speeds, rate):
-    """Fill ``rate`` (2 m, 8) with y'; ``speed`` is that of the ground."""
+def set_rate(y, speed, s, load, places, speeds, forces, rate):
+    """Fill ``rate`` (2 m, 8) with y', and normal forces; ``speed`` is that of the ground."""
     n = s.Tx.shape[0]
     project(s, y, places, speeds)
     _accelerate(y, s, load, rate)
@@ -89,6 +97,7 @@ def set_rate(y, speed, s, load, places, speeds, rate):
         F = node_lanes_at(s.normal[j])(-read(places[n + j]) - read(s.gap[j]),
                                        -read(speeds[n + j]), s.normal_parameters[j])[0]
         R = node_lanes_at(s.friction[j])(slip, magnitude(F), s.friction_parameters[j])[0]
+        write(forces[j, FORCE], F)
         _push(j, F, R, s, rate)
 
 
@@ -111,6 +120,20 @@ def set_rate_and_forces(y, speed, s, load, places, speeds, forces, rate):
         write(forces[j, BY_SLIP], chosen(closed, by_slip, 0.0))
         write(forces[j, BY_FORCE], chosen(F >= 0.0, by_force, -by_force))
         _push(j, F, R, s, rate)
+
+
+@helper
+def _sign_of(force):
+    return chosen(force > 0.0, 1.0, chosen(force < 0.0, -1.0, 0.0))
+
+
+@helper
+def switches(forces, before):
+    """Mask of the lanes in which a normal force has another sign than before."""
+    some = mask_of(0)
+    for j in range(len(forces)):
+        some = some | ~(_sign_of(read(forces[j, FORCE])) == _sign_of(read(before[j, FORCE])))
+    return some
 
 
 @helper

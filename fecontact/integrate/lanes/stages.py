@@ -5,8 +5,9 @@ size of the modes as in :mod:`fecontact.integrate.rodas5p.stage_solver`.
 """
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.lanes.vectors import chosen, magnitude, read, spread, write
+from fecontact.core.lanes.vectors import chosen, magnitude, mask_of, read, spread, write
 from fecontact.integrate.lanes import equations
+from fecontact.integrate.rodas5p.error_control import DEFECT_POINTS, DEFECT_WEIGHTS
 from fecontact.integrate.rodas5p.tableau import DENSE, GAMMA, NODES, STAGES, TIME, A, C
 
 
@@ -99,7 +100,11 @@ def _combine(i, per_h, state, w):
 
 @routine
 def step(t, h, target, s, progress, w):
-    """A step from times t to ``target``, of lengths h: its stages and its end ``w.after``."""
+    """A step from times t to ``target``, of lengths h: its stages and its end ``w.after``.
+
+    Returns the speed of the ground at the end, and a mask of the lanes in which a normal force has
+    another sign at a stage than at the start.
+    """
     size = len(progress.state)
     G = 1.0 / (h * GAMMA)
     per_G, per_h = h * GAMMA, 1.0 / h
@@ -107,6 +112,7 @@ def step(t, h, target, s, progress, w):
     equations.set_derivatives(s, progress.forces, w.by_place, w.by_speed)
     equations.set_time_rate(t, t + 1e-4 * h, speed, s, progress.forces, w.time_rate)
     _set_solver(G, w)
+    switched = mask_of(0)
     for i in range(STAGES):
         if i == 0:
             for k in range(size):
@@ -118,13 +124,14 @@ def step(t, h, target, s, progress, w):
                 if s.steady == 0:
                     speed = equations.ground_speed(now, s)
             _combine(i, per_h, progress.state, w)
-            equations.set_rate(w.stage, speed, s, w.load, w.places, w.speeds, w.base)
+            equations.set_rate(w.stage, speed, s, w.load, w.places, w.speeds, w.forces, w.base)
+            switched = switched | equations.switches(w.forces, progress.forces)
             for k in range(size):
                 write(w.right[k], read(w.right[k]) + read(w.base[k]))
         _solve(i, TIME[i] * h, per_G, w)
     for k in range(size):
         write(w.after[k], read(w.stage[k]) + read(w.stages[STAGES - 1, k]))
-    return speed
+    return speed, switched
 
 
 @helper
@@ -136,3 +143,35 @@ def set_dense(w):
             for j in range(STAGES):
                 total += DENSE[row, j] * read(w.stages[j, k])
             write(w.dense[row, k], total)
+
+
+@routine
+def set_defect(t, h, s, progress, w):
+    """Fill ``w.stages[0]`` with the filtered defect of the interpolant.
+
+    See :func:`fecontact.integrate.rodas5p.error_control.defect_error`. What is known of the end of
+    the step stays, but for ``w.load``.
+    """
+    m, speed, rate = len(w.work), read(progress.ground), w.stages[1]
+    for k in range(m):
+        write(w.right[m + k], read(w.after[m + k]) - read(progress.state[m + k]))
+    for point in range(len(DEFECT_POINTS)):
+        part = DEFECT_POINTS[point]
+        now, weight = t + part * h, DEFECT_WEIGHTS[point] * h
+        for k in range(2 * m):
+            write(w.stage[k], (1.0 - part) * read(progress.state[k]) + part * (
+                read(w.after[k]) + (1.0 - part) * (read(w.dense[0, k]) + part * (
+                    read(w.dense[1, k]) + part * read(w.dense[2, k])))))
+        equations.set_given(now, s, w.load)
+        if s.steady == 0:
+            speed = equations.ground_speed(now, s)
+        equations.set_rate(w.stage, speed, s, w.load, w.inner[0], w.inner[1], w.inner_forces, rate)
+        for k in range(m, 2 * m):
+            write(w.right[k], read(w.right[k]) - weight * read(rate[k]))
+    G = 1.0 / (h * GAMMA)
+    for row in range(m):
+        total = spread(0.0)
+        for k in range(m):
+            total += read(w.inverse[row, k]) * read(w.right[m + k])
+        write(w.stages[0, row], total)
+        write(w.stages[0, m + row], G * total)

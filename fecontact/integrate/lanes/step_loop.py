@@ -44,6 +44,7 @@ from fecontact.integrate.lanes.arrays import (
     WAITING,
 )
 from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p.driver import SWITCH_PART as _SWITCH_PART
 from fecontact.integrate.rodas5p.state import Step
 from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
@@ -280,7 +281,7 @@ def _attempt(active, b, runs, problem, progress, room):
     checks.note_extremes(control, mine)
     target, caution = _aim(t, b)
     h = target - t
-    speed = stages.step(t, h, target, s, mine, w)
+    speed, switched = stages.step(t, h, target, s, mine, w)
     equations.set_rate_and_forces(w.after, speed, s, w.load, w.places, w.speeds, w.forces, w.base)
     error = checks.state_error(control, mine, w)
     error = chosen(error <= 1.0, checks.slip_error(error, speed, s, control, w), error)
@@ -299,7 +300,12 @@ def _attempt(active, b, runs, problem, progress, room):
                                                 w.right[1, lane], b, problem, progress, room)
         part = read(w.stage[0])
         missed = part < 1.0
-    good = passed & ~missed
+    switched = (switched | equations.switches(w.forces, mine.forces)) & passed & ~missed
+    if bits(switched) != 0:
+        stages.set_defect(t, h, s, mine, w)
+        found = checks.modal_error(w.stages[0], control, mine, w) / _SWITCH_PART
+        error = chosen(switched, checks.larger(error, found), error)
+    good = passed & ~missed & (error <= 1.0)
     outputs = bits(good & (read(numbers[NEXT_OUTPUT]) <= target))
     complete = 0
     if outputs != 0:

@@ -54,6 +54,9 @@ from fecontact.system.powers import DRIVE, NODE_POWERS, POWER_COUNT
 # Slip velocities are resolved to this part of their distance from stick. Where friction falls
 # with slip velocity, what is left undetermined there decides when a contact breaks away.
 SLIP_PART = 0.01
+# Part of the tolerance allowed for a step in which a normal force begins or ends. Its estimate is
+# the error of the result; that of other steps is the larger error of the embedded solution.
+SWITCH_PART = 0.1
 # Slip velocities, in widths of the smoothing, at which slip is about to turn into stick.
 _SLOW = 20.0
 # Derivatives of the motion may be in error by so many times the tolerance in a step, of their size
@@ -258,7 +261,8 @@ def control_for(
         largest=largest, untouched=untouched,
         breaks=breaks(system, times)[1],
         levels=_levels(system), ground=_ground_bounds(system, times),
-        rtol=float(rtol), slip_part=SLIP_PART, longest=longest_step(system, times, max_step),
+        rtol=float(rtol), slip_part=SLIP_PART, switch_part=SWITCH_PART,
+        longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), unfelt=first_unfelt.address,
         sliders=attend.address if counts.any() else 0, slider_counts=counts)

@@ -6,10 +6,10 @@ import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.near_nodes import extend_near
-from fecontact.integrate.rodas5p import dynamics, tableau
+from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
-from fecontact.integrate.shared_nodes.tasks import POWERS, SLIP_ERROR, share_at
+from fecontact.integrate.rodas5p.state import ENERGY, RATES, SPEED_SCALE, WORST_NODE
+from fecontact.integrate.shared_nodes.tasks import POWERS, SLIP_ERROR, STAGE, share_at
 from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
@@ -17,22 +17,108 @@ from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, 
 
 @routine
 def state_error(control, progress, room):
-    """Error of a step as a multiple of what is allowed, of modes and internal variables."""
+    """Error of the modes in a step, as a multiple of the allowed error."""
+    error = modal_error(room.stages[tableau.STAGES - 1], control, progress, room)
+    # Comparisons with NaN are false: make sure that it is not lost.
+    for k in range(len(room.after)):
+        if not abs(room.after[k]) < np.inf:
+            error = np.inf
+    return error
+
+
+@helper
+def modal_error(difference, control, progress, room):
+    """Largest entry of a difference of modal states, as a multiple of the allowed error."""
     m = len(control.largest)
-    difference = room.stages[tableau.STAGES - 1]
     speed_scale = max(progress.numbers[SPEED_SCALE], control.speed_scale)
     error = 0.0
     for i in range(m):
         scale = max(max(progress.extremes[i], abs(room.after[i])), control.displacement_scale[i])
         error = max(error, abs(difference[i]) / scale)
         error = max(error, abs(difference[m + i]) * control.largest[i] / speed_scale)
-    for k in range(len(control.memory_scale)):
-        error = max(error, abs(difference[2 * m + k]) / control.memory_scale[k])
-    # Comparisons with NaN are false: make sure that it is not lost.
-    for k in range(len(difference)):
-        if not abs(room.after[k]) < np.inf:
-            error = np.inf
     return error / control.rtol
+
+
+@routine
+def memory_error(error, problem, progress, room):
+    """The larger of the error and the errors of internal variables at nodes in contact.
+
+    Forces do not depend on the internal variables of nodes that are open at the end of the step.
+    These fade within 1e-7 s: their rates jump at lift-off, and small tolerances of them would
+    need steps of rounding size.
+    """
+    control = problem.control
+    m, n = len(control.largest), len(problem.system.gap)
+    states, difference = len(control.memory_scale) // n, room.stages[tableau.STAGES - 1]
+    for j in range(n):
+        if room.nodes[2, n + j] != 0.0:
+            for k in range(j * states, (j + 1) * states):
+                error = max(error, abs(difference[2 * m + k]) / (
+                    control.memory_scale[k] * control.rtol))
+    return error
+
+
+@helper
+def sign_of(force):
+    """1, 0 or -1."""
+    return 1 if force > 0.0 else (-1 if force < 0.0 else 0)
+
+
+@routine
+def set_signs(forces, signs):
+    """Fill ``signs`` (n,) with the signs of normal forces (n,)."""
+    for j in range(len(signs)):
+        signs[j] = sign_of(forces[j])
+
+
+@routine
+def switches(places, nodes, forces, signs):
+    """True if one of so many normal forces has another sign than at the start of the step."""
+    n, some = len(signs), False
+    for at in range(places):
+        some |= sign_of(forces[n + at]) != signs[nodes[at]]
+    return some
+
+
+@helper
+def set_stage_rate(problem, progress, room):
+    """Fill ``room.base`` with the rates of ``room.stage``, by ``room.given``, ``room.load``."""
+    extend_near(room.stage, problem, progress, room)
+    if shares(room):
+        share_at(room.team.share)(STAGE, 0.0, problem, progress, room)
+    else:
+        dynamics.set_rate(room.stage, problem.system, room.near, room.given, room.load, room.nodes,
+                          room.scratch, room.base)
+
+
+@routine
+def defect_error(step, G, problem, progress, room):
+    """Error of a step by the defect of its interpolant, as a multiple of the allowed error.
+
+    The defect is v_1 - v_0 less the integral of the accelerations v' along the interpolant. A
+    filter (I - h gamma J)^-1 damps its stiff part, as in error estimates of implicit Runge-Kutta
+    methods. Unlike the difference of the embedded solutions, the defect holds for steps in which a
+    normal force begins or ends.
+
+    ``room.nodes``, ``room.given`` and ``room.load`` are overwritten.
+    """
+    s, right = problem.system, room.right
+    m = len(problem.control.largest)
+    for k in range(len(right)):
+        right[k] = 0.0
+    for point in range(len(DEFECT_POINTS)):
+        part, weight = DEFECT_POINTS[point], DEFECT_WEIGHTS[point] * step.h
+        tableau.interpolated(part, progress.state, room.after, room.dense, room.stage)
+        dynamics.set_given(min(step.t + part * step.h, step.latest), s, room.given, room.load)
+        set_stage_rate(problem, progress, room)
+        for k in range(m, 2 * m):
+            right[k] -= weight * room.base[k]
+    for k in range(m, 2 * m):
+        right[k] = G * (right[k] + room.after[k] - progress.state[k])
+    progress.counts[RATES] += len(DEFECT_POINTS)
+    stage_solver.solve_stage(G, s, problem.blocks, progress.gradients, room.reduced, right,
+                             room.nodes, room.base)
+    return modal_error(room.base, problem.control, progress, room) / problem.control.switch_part
 
 
 @routine
@@ -102,6 +188,10 @@ def set_scale(control, progress, room):
         room.right[2 * m + k] = control.memory_scale[k]
 
 
+# Gauss's rule of two points on each quarter of a step.
+DEFECT_POINTS = np.array([0.125 + 0.25 * quarter + side * 0.125 / np.sqrt(3.0)
+                          for quarter in range(4) for side in (-1.0, 1.0)])
+DEFECT_WEIGHTS = np.full(8, 0.125)
 # Gauss-Lobatto points: both ends and two inside; exact for powers of degree five.
 _INSIDE = 0.5 - 0.5 / np.sqrt(5.0)
 _POINTS = np.array([0.0, _INSIDE, 1.0 - _INSIDE, 1.0])

@@ -58,9 +58,10 @@ class Control(NamedTuple):
     ground : (5,) array
         Lowest and highest place of the ground, its steepest slope, its largest speed and
         acceleration, as :mod:`fecontact.integrate.courses` names them.
-    rtol, slip_part, longest, speed_scale, energy_scale : float
+    rtol, slip_part, switch_part, longest, speed_scale, energy_scale : float
         Relative tolerance, part of the distance from stick to which slip velocities are resolved,
-        longest step [s], velocity and energy below which errors count as if they were this large.
+        part of the tolerance allowed where normal forces begin or end within a step, longest
+        step [s], velocity and energy below which errors count as if they were this large.
     work : int
         Whether to integrate the powers.
     unfelt : int
@@ -85,6 +86,7 @@ class Control(NamedTuple):
     ground: Array
     rtol: float
     slip_part: float
+    switch_part: float
     longest: float
     speed_scale: float
     energy_scale: float
@@ -95,7 +97,7 @@ class Control(NamedTuple):
 
 
 CONTROL = types.NamedTuple(
-    [vector] * 8 + [matrix, matrix, vector] + [f8] * 5 + [i8] * 3 + [integers], Control)
+    [vector] * 8 + [matrix, matrix, vector] + [f8] * 6 + [i8] * 3 + [integers], Control)
 
 
 class Problem(NamedTuple):
@@ -154,6 +156,8 @@ class Progress(NamedTuple):
         Work so far and powers: those of POWERS, p of them, then those of each node.
     gradients : Gradients
         Derivatives of the node forces.
+    signs : (n,) integer array
+        Signs of the normal forces: 1, 0 or -1.
     """
 
     numbers: Array
@@ -164,10 +168,12 @@ class Progress(NamedTuple):
     work: Array
     power: Array
     gradients: motion.Gradients
+    signs: Integers
 
 
 PROGRESS = types.NamedTuple(
-    [vector, integers, vector, vector, vector, vector, vector, motion.GRADIENTS], Progress)
+    [vector, integers, vector, vector, vector, vector, vector, motion.GRADIENTS, integers],
+    Progress)
 
 
 class Output(NamedTuple):
@@ -282,4 +288,5 @@ def progress_for(
     return Progress(
         numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
         np.zeros(modes), np.zeros(powers), np.zeros(powers),
-        gradients_for(nodes, (size - 2 * modes) // max(nodes, 1), dimension))
+        gradients_for(nodes, (size - 2 * modes) // max(nodes, 1), dimension),
+        np.zeros(nodes, dtype=np.int64))

@@ -7,13 +7,18 @@ from fecontact.core.compiled import helper, i8, kernel, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.course_bounds import doubtful, restless
 from fecontact.integrate.courses import keep_ends, set_courses, set_ends
-from fecontact.integrate.near_nodes import choose_near, extend_near, set_end
+from fecontact.integrate.near_nodes import choose_near, set_end
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
+    defect_error,
+    memory_error,
     set_creeps,
     set_scale,
+    set_signs,
+    set_stage_rate,
     slip_error,
     state_error,
+    switches,
     work_error,
     work_until,
 )
@@ -54,7 +59,7 @@ from fecontact.integrate.rodas5p.variational import (
     propagate_at,
     write_columns,
 )
-from fecontact.integrate.shared_nodes.tasks import JACOBIAN, STAGE, TIME_RATE, share_at
+from fecontact.integrate.shared_nodes.tasks import JACOBIAN, TIME_RATE, share_at
 from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
@@ -74,6 +79,8 @@ def _start(t, problem, progress, room, output, watch):
     dynamics.set_given(after, s, room.given, room.load)
     dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
                                     room.nodes, progress.gradients, progress.rate)
+    n = len(s.gap)
+    set_signs(room.nodes[2, n : 2 * n], progress.signs)
     if control.work:
         set_powers(after, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
                    progress.power[POWER_COUNT:])
@@ -144,8 +151,11 @@ def _linearise(step, after_t, problem, progress, room):
 
 @routine
 def _stages(step, G, problem, progress, room):
-    """All stages of a step, and its end in ``room.after``."""
-    s, blocks = problem.system, problem.blocks
+    """Compute all stages of a step, and its end ``room.after``.
+
+    Returns True if a normal force has another sign at a stage than at the start.
+    """
+    s, blocks, switched = problem.system, problem.blocks, False
     size = len(progress.state)
     m = len(room.load)
     last, rise = step.t, 1.0 / step.h
@@ -160,12 +170,8 @@ def _stages(step, G, problem, progress, room):
             if now != last:
                 dynamics.set_given(now, s, room.given, room.load)
                 last = now
-            extend_near(room.stage, problem, progress, room)
-            if shares(room):
-                share_at(room.team.share)(STAGE, 0.0, problem, progress, room)
-            else:
-                dynamics.set_rate(room.stage, s, room.near, room.given, room.load, room.nodes,
-                                  room.scratch, room.base)
+            set_stage_rate(problem, progress, room)
+            switched |= switches(room.near.used[0], room.near.nodes, room.nodes[2], progress.signs)
             for k in range(size):
                 room.right[k] += room.base[k]
         factor = tableau.TIME[i] * step.h
@@ -177,13 +183,16 @@ def _stages(step, G, problem, progress, room):
     for k in range(size):
         room.after[k] = room.stage[k] + room.stages[tableau.STAGES - 1, k]
     progress.counts[RATES] += tableau.STAGES
+    return switched
 
 
 @routine
-def _attempt(step, new, end, problem, progress, room):
-    """Compute a step; ``new`` if it is the first attempt from where it begins."""
+def _attempt(step, G, new, end, problem, progress, room):
+    """Compute a step; ``new`` if it is the first attempt from where it begins.
+
+    Returns True if a normal force has another sign at a stage than at the start.
+    """
     s = problem.system
-    G = 1.0 / (step.h * tableau.GAMMA)
     memory = len(progress.state) > 2 * len(problem.control.largest)
     if new:
         _linearise(step, np.nextafter(step.t, end), problem, progress, room)
@@ -195,7 +204,7 @@ def _attempt(step, new, end, problem, progress, room):
         else:
             stage_solver.assemble(s, room.near, progress.gradients, room.reduced)
     stage_solver.factorise_step(G, problem.blocks, room.reduced)
-    _stages(step, G, problem, progress, room)
+    return _stages(step, G, problem, progress, room)
 
 
 @routine
@@ -204,13 +213,24 @@ def _error_at_end(step, end, problem, progress, room):
 
     Where the state is within its tolerance, its rates and gradients are evaluated too.
     """
-    s, control = problem.system, problem.control
-    error = state_error(control, progress, room)
+    error = state_error(problem.control, progress, room)
     if error <= 1.0:
         if step.at_break:
-            dynamics.set_given(np.nextafter(step.target, end), s, room.given, room.load)
+            dynamics.set_given(np.nextafter(step.target, end), problem.system, room.given,
+                               room.load)
         set_end(problem, progress, room)
-        error = slip_error(error, problem, progress, room)
+        error = memory_error(slip_error(error, problem, progress, room), problem, progress, room)
+    return error
+
+
+@routine
+def _switch_error(step, G, end, problem, progress, room):
+    """Error of a step in which a normal force begins or ends; what is known of the end stays."""
+    error = defect_error(step, G, problem, progress, room)
+    if error <= 1.0:
+        last = np.nextafter(step.target, end) if step.at_break else min(step.target, step.latest)
+        dynamics.set_given(last, problem.system, room.given, room.load)
+        set_end(problem, progress, room)
     return error
 
 
@@ -321,9 +341,11 @@ def _go_on(step, problem, progress, room, output):
     for k in range(len(progress.state)):
         progress.state[k] = room.after[k]
         progress.rate[k] = room.rate_after[k]
+    n = len(problem.system.gap)
+    set_signs(room.nodes[2, n : 2 * n], progress.signs)
     # Those of the other nodes are zero.
     dynamics.copy_gradients(room.gradients_after, progress.gradients, room.near)
-    keep_ends(len(problem.system.gap), room)
+    keep_ends(n, room)
     progress.counts[STEPS] += 1
 
 
@@ -332,6 +354,7 @@ def advance_by(problem, progress, room, output, vary, watch, most):
     """As :func:`advance`, by references."""
     s, control, numbers, counts = (problem.system, problem.control, progress.numbers,
                                    progress.counts)
+    n, blocks = len(s.gap), problem.blocks
     t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
     smallest = 1e-14 * max(abs(output.times[0]), abs(end))
     varies = len(vary.variation.columns) > 0
@@ -351,7 +374,8 @@ def advance_by(problem, progress, room, output, vary, watch, most):
             moved = dynamics.motion_given(room.given)
             choose_near(h, problem, progress, room)
         step = _aim(t, h, exactly, smallest, moved, end, problem, progress, room)
-        _attempt(step, new, end, problem, progress, room)
+        G = 1.0 / (step.h * tableau.GAMMA)
+        switched = _attempt(step, G, new, end, problem, progress, room)
         new = False
 
         error, part = _error_at_end(step, end, problem, progress, room), 1.0
@@ -360,7 +384,9 @@ def advance_by(problem, progress, room, output, vary, watch, most):
             part = _unfelt_part(step, again, smallest, problem, progress, room)
             if part < 1.0:
                 again += 1
-            elif control.work:
+            elif switched or switches(n, blocks.nodes, room.nodes[2], progress.signs):
+                error = max(error, _switch_error(step, G, end, problem, progress, room))
+            if part == 1.0 and error <= 1.0 and control.work:
                 error = max(error, work_error(step, problem, progress, room))
         if error <= 1.0 and part == 1.0 and control.sliders != 0:
             part = attend_at(control.sliders)(SWITCH, step, problem, progress, room, vary, t,
