@@ -1,0 +1,80 @@
+"""Errors of steps in which a normal force begins or ends, or friction forgets its memory."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from systems import mass_in_y
+
+from fecontact import Load, ensemble, simulate
+from fecontact.integrate import Rodas5P
+from fecontact.integrate.trajectory import Status
+from fecontact.laws import Frictionless, LinearContact
+
+FOLDER = Path(__file__).parents[2] / "benchmarks"
+STEPS = Rodas5P(series="never", collocation="never")
+GRAVITY = 9.81
+# Error over the height of the drop.
+BOUNCES = 5e-4
+
+
+@pytest.fixture
+def systems(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    import random_systems
+
+    return random_systems
+
+
+def bouncing(w):
+    """A unit mass over a spring without mass or damping."""
+    return mass_in_y(normal=LinearContact(w**2, 0.0), friction=Frictionless(), load=Load(GRAVITY))
+
+
+def height(t, w, drop):
+    """Height of the mass: parabolas in flight, vibration about the static deflection in contact."""
+    v = np.sqrt(2.0 * GRAVITY * drop)
+    flight = 2.0 * v / GRAVITY
+    contact = 2.0 / w * (np.pi - np.arctan(v * w / GRAVITY))
+    since = (t - 0.5 * flight) % (flight + contact)
+    pressed = since < contact
+    deflection = GRAVITY / w**2 * (1.0 - np.cos(w * since)) + v / w * np.sin(w * since)
+    free = since - contact
+    return np.where(pressed, -deflection, v * free - 0.5 * GRAVITY * free**2)
+
+
+def bounces(drop, count=20):
+    return np.linspace(0.0, count * 2.0 * np.sqrt(2.0 * drop / GRAVITY), 401)
+
+
+STARTS = [(w, drop) for w in (300.0, 1000.0, 3000.0) for drop in (1e-3, 3e-3, 1e-2)]
+
+
+def test_bounces_of_a_mass():
+    """Twenty impacts: each may change the energy by a few parts in a million."""
+    for w, drop in STARTS:
+        times = bounces(drop)
+        run = simulate(bouncing(w), times[-1], initial=[drop, 0.0], outputs=times, solver=STEPS)
+        assert run.states[:, 0] == pytest.approx(height(times, w, drop), abs=BOUNCES * drop)
+
+
+def test_bounces_side_by_side():
+    """SIMD lanes take the steps of single runs."""
+    for w, drop in STARTS[::4]:
+        times = bounces(drop)
+        alone = simulate(bouncing(w), times[-1], initial=[drop, 0.0], outputs=times, solver=STEPS)
+        runs = ensemble(bouncing(w), times, initial=[[drop, 0.0]] * 3)
+        for states, steps in zip(runs.states, runs.steps, strict=True):
+            assert states[:, 0] == pytest.approx(height(times, w, drop), abs=BOUNCES * drop)
+            assert steps == pytest.approx(alone.statistics["steps"], rel=0.02)
+
+
+@pytest.mark.parametrize("number", [54, 55, 83])
+def test_memory_after_lift_off(systems, number):
+    """Internal variables fade within 1e-7 s once a contact has opened."""
+    case = systems.random_case(number)
+    times = np.append(np.linspace(0.0, 0.01, 41), 1.5)
+    run = systems.fc.simulate(case.system, 1.5, initial=case.state, outputs=times, rtol=1e-8)
+    assert run.status is Status.FINISHED
+    wanted = systems.reference(case, times[:-1])
+    assert systems.distance(case, run.states[:-1], wanted) < 1e-6
