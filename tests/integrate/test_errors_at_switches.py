@@ -63,7 +63,7 @@ def test_bounces_side_by_side():
     for w, drop in STARTS[::4]:
         times = bounces(drop)
         alone = simulate(bouncing(w), times[-1], initial=[drop, 0.0], outputs=times, solver=STEPS)
-        runs = ensemble(bouncing(w), times, initial=[[drop, 0.0]] * 3)
+        runs = ensemble(bouncing(w), times, initial=[[drop, 0.0]] * 3, solver=STEPS)
         for states, steps in zip(runs.states, runs.steps, strict=True):
             assert states[:, 0] == pytest.approx(height(times, w, drop), abs=BOUNCES * drop)
             assert steps == pytest.approx(alone.statistics["steps"], rel=0.02)
