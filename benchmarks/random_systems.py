@@ -522,7 +522,9 @@ def random_friction(name: str, rng: np.random.Generator, n: int) -> tuple[Any, i
     slope, fall = 10.0 ** rng.uniform(3.0, 4.7), 10.0 ** rng.uniform(-3.0, -1.0)
     stiffness, slide = 10.0 ** rng.uniform(5.0, 6.5), 10.0 ** rng.uniform(-5.5, -4.5)
     exponent = float(rng.choice([1.0, 1.5, 2.0, 3.0]))
-    springs = {"jenkins": {}, "iwan": {"elements": 3}, "four-parameter-iwan": {"elements": 3}}
+    springs: dict[str, dict[str, Any]] = {
+        "jenkins": {}, "iwan": {"elements": 3},
+        "four-parameter-iwan": {"chi": -0.5, "beta": 0.1, "elements": 3}}
     if name == "exponential":
         law = laws.ExponentialFriction(high, low, 1.0 / fall, slope)
         return law, EXP, [high, low, 1.0 / fall, slope]

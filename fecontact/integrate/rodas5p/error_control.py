@@ -49,7 +49,7 @@ def memory_error(error, problem, progress, room):
     """
     control = problem.control
     m, n = len(control.largest), len(problem.system.gap)
-    states, difference = len(control.memory_scale) // n, room.stages[tableau.STAGES - 1]
+    states, difference = len(control.memory_scale) // max(n, 1), room.stages[tableau.STAGES - 1]
     for j in range(n):
         if room.nodes[2, n + j] != 0.0:
             for k in range(j * states, (j + 1) * states):
