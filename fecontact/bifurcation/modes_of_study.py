@@ -63,7 +63,7 @@ def follow_mode(
     preload : LoadHistory, optional
         Whose end elements that never slide keep.
     """
-    observe, method = observed_point(system, wanted), wanted.method()
+    observe, method = observed_point(system, wanted), wanted.harmonic_balance()
     parts = not method.refines
     mode = _whole_parts(earlier) if earlier is not None and parts else None
     while True:

@@ -10,13 +10,14 @@ from fecontact.core.errors import InputError, require_finite, require_positive
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.problem import ContinuationOptions
     from fecontact.bifurcation.harmonic.method import HarmonicBalance
+    from fecontact.bifurcation.orbit_methods import Method
 
 _FREQUENCY = "angular_frequency"
 
 
 @dataclass(frozen=True)
 class ResponseSettings:
-    """``[response]``: frequency responses by harmonic balance.
+    """``[response]``: frequency responses, by default by harmonic balance.
 
     See :func:`fecontact.bifurcation.frequency_response`; harmonics, samples, preload and what is
     observed also hold for nonlinear modes.
@@ -36,6 +37,14 @@ class ResponseSettings:
     levels : table of one list, optional
         Another parameter and its values, a response for each:
         ``levels = { "drive.amplitude_x" = [1e-5, 2e-5] }``.
+    method : 'harmonic balance', 'collocation' or 'shooting'
+        How orbits are found: as Fourier series, by collocation on an adaptive mesh, or with the
+        compiled integrator, for steep friction and impacts. Keys of harmonics and samples,
+        tolerances and stability are for harmonic balance, and so are nonlinear modes.
+    intervals : int
+        For collocation: mesh intervals of an orbit.
+    segments : int
+        For shooting: pieces of an orbit that are run for themselves; more for unstable orbits.
     harmonics : int
         Harmonics of the period of the excitation.
     samples : int, optional
@@ -70,6 +79,9 @@ class ResponseSettings:
     bounds_hz: tuple[float, float] | None = None
     start: float | None = None
     levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    method: Literal["harmonic balance", "collocation", "shooting"] = "harmonic balance"
+    intervals: int = 50
+    segments: int = 4
     harmonics: int = 9
     samples: int | None = None
     tolerance: float | None = None
@@ -98,7 +110,7 @@ class ResponseSettings:
                              f"bounds by the key 'bounds'.")
         self._check_levels()
         self._check_bounds()
-        _ = self.method()
+        _ = self.harmonic_balance(), self.orbit_method()
 
     def _check_levels(self) -> None:
         if len(self.levels) > 1:
@@ -161,8 +173,18 @@ class ResponseSettings:
         """The parameter of the levels."""
         return next(iter(self.levels), None)
 
-    def method(self) -> "HarmonicBalance":
-        """Harmonic balance as it is asked for."""
+    def orbit_method(self) -> "Method":
+        """Method by which responses are followed."""
+        from fecontact.bifurcation.orbit_methods import Collocation, Shooting
+
+        if self.method == "collocation":
+            return Collocation(intervals=self.intervals)
+        if self.method == "shooting":
+            return Shooting(segments=self.segments)
+        return self.harmonic_balance()
+
+    def harmonic_balance(self) -> "HarmonicBalance":
+        """Harmonic balance with the numbers of the section, for modes too."""
         from fecontact.bifurcation.harmonic.method import HarmonicBalance
 
         return HarmonicBalance(self.harmonics, self.samples, self.tolerance,

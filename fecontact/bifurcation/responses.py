@@ -93,7 +93,7 @@ def follow_responses(
                 found = frequency_response(
                     system, wanted.checked_bounds, wanted.parameter, observe=observe,
                     levels=None if wanted.level_name is None else {wanted.level_name: [value]},
-                    method=wanted.method(), options=options,
+                    method=wanted.orbit_method(), options=options,
                     start=None if wanted.start is None else wanted.first, preload=preload)
         except KeyboardInterrupt:
             if result.response is None:

@@ -74,7 +74,7 @@ def response_csv(response: FrequencyResponse, usable_hz: float = math.inf) -> st
                 repr(float(values["observed_amplitude"])),
                 repr(float(values["observed_minimum"])), repr(float(values["observed_maximum"])),
                 repr(float(first[place])), repr(float(phase[place])), third[place],
-                repr(float(values["truncation_error"])),
+                (repr(float(values["truncation_error"])) if "truncation_error" in values else ""),
                 "" if math.isnan(point.parameter_error) else repr(point.parameter_error),
                 int(1.0 / float(values["period"]) > usable_hz)])
     return csv_text(rows)

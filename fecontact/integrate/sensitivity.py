@@ -402,7 +402,8 @@ def _slip_limit(
     the difference would not approximate the derivative.
     """
     try:
-        shift = np.abs(_passing(system_at(value + move)) - _passing(system_at(value))).max()
+        shift = np.abs(_passing(system_at(value + move)) - _passing(system_at(value))).max(
+            initial=0.0)
     except InputError:
         return 1.0
     scales = [law.velocity_scale for _, _, law in system.law_groups("friction")]

@@ -15,7 +15,7 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
 # Samples a period of what is observed, and harmonics of it that are stored.
-_SAMPLES, _HARMONICS = 512, 15
+OBSERVED_SAMPLES, OBSERVED_HARMONICS = 512, 15
 OBSERVED = ("observed_minimum", "observed_maximum", "observed_amplitude", "observed_harmonics")
 
 
@@ -66,9 +66,9 @@ def observed_of_orbits(
     observes = moved[..., :m] @ row[:m] + moved[..., m:] @ row[2 * m : m + layout.harmonic]
     if m and row[m : 2 * m].any():
         observes = observes + differentiated(moved[..., :m]) @ row[m : 2 * m] / periods
-    low, high = peaks(observes.T @ uniform_basis(_SAMPLES, H).T)
-    harmonics = np.zeros((K, max(H, _HARMONICS) + 1), dtype=complex)
+    low, high = peaks(observes.T @ uniform_basis(OBSERVED_SAMPLES, H).T)
+    harmonics = np.zeros((K, max(H, OBSERVED_HARMONICS) + 1), dtype=complex)
     harmonics[:, 0] = observes[0]
     harmonics[:, 1 : H + 1] = (observes[1::2] - 1j * observes[2::2]).T
     return dict(zip(OBSERVED, (low.tolist(), high.tolist(), ((high - low) / 2.0).tolist(),
-                               harmonics[:, : _HARMONICS + 1]), strict=True))
+                               harmonics[:, : OBSERVED_HARMONICS + 1]), strict=True))

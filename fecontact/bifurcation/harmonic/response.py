@@ -1,16 +1,18 @@
 """Nonlinear frequency responses: branches of forced orbits at several levels."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import (
     UNRESOLVED,
     UNRESOLVED_MEANING,
+    details_of,
+    special_point,
 )
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
@@ -25,12 +27,22 @@ from fecontact.bifurcation.fields.contact_field import (
 )
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
+from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.observed import observed_of_orbits, observed_row
+from fecontact.bifurcation.harmonic.observed import (
+    OBSERVED,
+    OBSERVED_HARMONICS,
+    OBSERVED_SAMPLES,
+    observed_of_orbits,
+    observed_row,
+)
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.stalled import stall_reason
+from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
+from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.from_run import periodic_motion
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -128,14 +140,15 @@ def frequency_response(
     system: ContactSystem | VectorField, bounds: tuple[float, float],
     parameter: str | None = None, *, levels: Mapping[str, ArrayLike] | None = None,
     observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
-    method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
+    method: Method | None = None, options: ContinuationOptions | None = None,
     start: float | None = None, preload: LoadHistory | RestState | Array | None = None,
 ) -> FrequencyResponse:
-    """Nonlinear frequency responses by harmonic balance, with stability and special points.
+    """Nonlinear frequency responses by any orbit method, with stability and special points.
 
     A branch starts at one end from rest: the first step of Newton's method is the linear response.
     Where that does not converge, the level is raised to its value along a branch, the other end is
-    tried, and last the motion to which a run settles. Folds are followed around.
+    tried, and last the motion to which a run settles. Folds are followed around. Collocation and
+    shooting start from the orbit that harmonic balance finds in this way, or from a run.
 
     Parameters
     ----------
@@ -150,8 +163,9 @@ def frequency_response(
         Another parameter and its values, a branch for each: ``{"drive.amplitude_x": [1.0, 2.0]}``.
     observe : (point, component) or (d,) sequence
         Displacement that is observed; a row of the states of a vector field, by default its first.
-    method : HarmonicBalance, optional
-        Harmonics, samples, tolerance.
+    method : HarmonicBalance, Collocation or Shooting, optional
+        By default harmonic balance. Shooting is for contact systems alone; it suits steep friction
+        and impacts, whose orbits need many harmonics, and each point takes several runs.
     options : ContinuationOptions, optional
         Steps, tolerances; by default up to 2000 points, largest_step 0.03.
     start : float, optional
@@ -167,7 +181,8 @@ def frequency_response(
         which no orbit is found to start from.
     """
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
-    require_kind("frequency_response", (HarmonicBalance, type(None)), method=method)
+    require_kind("frequency_response", (HarmonicBalance, Collocation, Shooting, type(None)),
+                 method=method)
     held = preloaded(system, preload)
     chosen = options_of(
         options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
@@ -187,10 +202,15 @@ def frequency_response(
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:
-            branch = branch_of_response(
-                field, given, field.index(name), level_name, first, method or HarmonicBalance(),
-                chosen, held, both=low < first < high, row=row,
-                further=_told(observed, level_name, float(value)))
+            further = _told(observed, level_name, float(value))
+            both = low < first < high
+            if method is None or isinstance(method, HarmonicBalance):
+                branch = branch_of_response(
+                    field, given, field.index(name), level_name, first, method or HarmonicBalance(),
+                    chosen, held, both=both, row=row, further=further)
+            else:
+                branch = _by_orbit_method(field, given, field.index(name), level_name, first,
+                                          method, chosen, held, row, further, both=both)
         except KeyboardInterrupt:
             if not found:
                 raise
@@ -237,10 +257,30 @@ def branch_of_response(
 
     ``row`` (d,) is what is observed, if anything, ``further`` are attributes of the branch.
     """
-    ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
-    told: FecontactError = AnalysisError("No orbit was found to start from.")
     if row is not None:
         _require_observable(layout_of(field), row)
+    begin, problem, u = _started(field, values, free, level_name, first, method, options, held,
+                                 both=both)
+    if row is not None:
+        problem = replace(problem, row=row)
+    branch = branches.follow(problem, u, None, method, options, further,
+                             direction=_inwards(begin, options), both=both)
+    message = stall_reason(field, branch)
+    return branch if message == branch.message else replace(branch, message=message)
+
+
+def _inwards(begin: float, options: ContinuationOptions) -> float:
+    """Direction of a branch that begins at a value of the parameter."""
+    return 1.0 if begin < options.bounds[1] else -1.0
+
+
+def _started(
+    field: VectorField, values: Array, free: int, level_name: str | None, first: float,
+    method: HarmonicBalance, options: ContinuationOptions, held: Array | None, *, both: bool,
+) -> tuple[float, HarmonicProblem, Array]:
+    """Value of the parameter, problem and unknowns of the orbit from which a branch starts."""
+    ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
+    told: FecontactError = AnalysisError("No orbit was found to start from.")
     for begin in ends:
         values = values.copy()
         values[free] = begin
@@ -255,18 +295,69 @@ def branch_of_response(
                 field, values, free, method, options, held))
         for attempt in attempts:
             try:
-                problem, u = attempt()
+                return begin, *attempt()
             except FecontactError as error:
                 told = error
-                continue
-            if row is not None:
-                problem = replace(problem, row=row)
-            direction = 1.0 if begin < options.bounds[1] else -1.0
-            branch = branches.follow(problem, u, None, method, options, further,
-                                     direction=direction, both=both)
-            message = stall_reason(field, branch)
-            return branch if message == branch.message else replace(branch, message=message)
     raise told
+
+
+def _by_orbit_method(
+    field: VectorField, values: Array, free: int, level_name: str | None, first: float,
+    method: Collocation | Shooting, options: ContinuationOptions, held: Array | None, row: Array,
+    further: Mapping[str, Any], *, both: bool,
+) -> Branch:
+    """The branch at one level by collocation or shooting, from the orbit of harmonic balance.
+
+    Where harmonic balance finds none, it starts from the motion to which a run settles.
+    """
+    _require_observable(layout_of(field), row)
+    name, begin = list(field.parameters)[free], first
+    try:
+        begin, problem, u = _started(field, values, free, level_name, first,
+                                     HarmonicBalance(stability=None), options, held, both=both)
+        found = problem.linearise(u)
+        states = np.vstack([found.states, found.states[:1]])
+        motion = PeriodicMotion(np.linspace(0.0, 1.0, len(states)) * found.period, states,
+                                found.period)
+    except FecontactError:
+        if not isinstance(field, ContactField):
+            raise
+        there = values.copy()
+        there[free] = begin
+        motion = periodic_motion(field.system(there), longest_period=field.forcing_period(there))
+    at = values.copy()
+    at[free] = begin
+    try:
+        branch = orbit_branch(field, replace(motion, parameter_values=at), name, method=method,
+                              options=options, direction=_inwards(begin, options), both=both)
+    except AnalysisError as error:
+        if not layout_of(field).memory:
+            raise
+        raise AnalysisError(f"{error} Friction elements that never slide keep any deflection, so "
+                            f"that their orbits are not isolated: follow them by "
+                            f"HarmonicBalance(), or start where they slide.") from error
+    seen = [_observed_of(point.orbit(field, OBSERVED_SAMPLES), row) for point in branch.points]
+    return _with_values(branch, seen, further)
+
+
+def _observed_of(motion: PeriodicMotion, row: Array) -> dict[str, Any]:
+    """What is stored of the observed quantity of an orbit in samples."""
+    low, high = peaks((motion.evenly() @ row)[None])
+    return dict(zip(OBSERVED, (
+        float(low[0]), float(high[0]), float(high[0] - low[0]) / 2.0,
+        motion.harmonics(OBSERVED_HARMONICS, observe=row)), strict=True))
+
+
+def _with_values(
+    branch: Branch, seen: Sequence[Mapping[str, Any]], further: Mapping[str, Any]
+) -> Branch:
+    """The branch with more values at its points and further attributes."""
+    attributes = {**branch.attributes, **further}
+    header = BranchHeader(branch.parameter_name, attributes)
+    points = [special_point(point.u, point.tangent, {**point.values, **values}, point.kind,
+                            details_of(point), header)
+              for point, values in zip(branch.points, seen, strict=True)]
+    return replace(branch, points=tuple(points), attributes=attributes)
 
 
 def _problem(

@@ -10,14 +10,17 @@ import numpy as np
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.core.checks import as_floats, as_texts
 from fecontact.core.errors import InputError, require_positive, shown
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import RODAS5P, SetValued, Solver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.powers import BRISTLES, FRICTION, NODE_POWERS, POWERS, powers
 
+# Distance of samples that coincide, in periods.
+_COINCIDE = 1e-9
 # Relative tolerance of the runs that sample an orbit by shooting.
 _RTOL = 1e-7
 # Histories of trajectories, and what they count from their start.
@@ -94,11 +97,106 @@ class PeriodicMotion(Summarised):
             *([("periods of the excitation", f"{self.periods}")] if self.periods > 1 else []),
             ("samples", f"{len(self.times)}"), ("range", listed(ranges, 4))]
 
+    def harmonics(
+        self, count: int = 10, *, field: VectorField | None = None,
+        observe: tuple[str | int, str] | ArrayLike | None = None,
+    ) -> ComplexArray:
+        r"""Fourier coefficients of the states, or of one quantity, over the last period.
+
+        :math:`x(t) = \sum_{k=0}^{count} \mathrm{Re}(X_k e^{i k \omega t})` with
+        :math:`\omega = 2 \pi / T`: X_0 is the mean, :math:`|X_k|` an amplitude in the unit of x,
+        and :math:`a_k = \mathrm{Re} X_k`, :math:`b_k = -\mathrm{Im} X_k` are the coefficients of
+        the cosine and the sine. T is the period of the motion, of orbits of several excitation
+        periods a multiple of that of the excitation. Times count from zero as those of the
+        excitation do. Samples at equal distances give the coefficients to rounding where the
+        motion is smooth and has no harmonics above half their number.
+
+        Parameters
+        ----------
+        count : int
+            Highest harmonic, below half the number of samples in the period.
+        field : VectorField, optional
+            That of the motion; needed for displacements of points.
+        observe : (point, component) or (d,) sequence, optional
+            A displacement of a contact system, such as ('B', 'x'), by its field, or a row of the
+            states; by default all states.
+
+        Returns
+        -------
+        (count + 1, d) or (count + 1,) complex array
+            Of the states, or of what is observed [m, or rad for rotations].
+
+        Raises
+        ------
+        InputError
+            If the motion does not know its period or does not cover it, for too many harmonics,
+            or a point without field.
+        """
+        states = self.states
+        if observe is not None:
+            states = states @ _observed_row(self.states.shape[1], field, observe)
+        times, moved = _last_period(self, states)
+        most = (len(times) - 1) // 2
+        if not (isinstance(count, int | np.integer) and 0 <= count <= most):
+            raise InputError(f"harmonics: count = {count!r} must be a whole number from 0 to "
+                             f"{most}, half the {len(times)} samples in the period; take more "
+                             f"samples, point.orbit(field, samples={4 * len(times)}).")
+        assert self.period is not None
+        waves = np.exp(-2.0j * np.pi / self.period * np.outer(np.arange(count + 1), times))
+        found = waves @ moved * (2.0 / len(times))
+        found[0] *= 0.5
+        return np.asarray(found)
+
+    def evenly(self) -> Array:
+        """States (N, d) at equal distances over the last period, without its end."""
+        return _last_period(self, self.states)[1]
+
     @property
     def amplitudes(self) -> Array:
         """Half the range (d,) of each state, at least 1e-3 of the largest."""
         found = np.ptp(self.states, axis=0) / 2.0
         return np.asarray(np.maximum(found, 1e-3 * found.max()))
+
+
+def _observed_row(
+    states: int, field: VectorField | None, observe: tuple[str | int, str] | ArrayLike
+) -> Array:
+    """Row (d,) of what is observed."""
+    from fecontact.bifurcation.harmonic.observed import observed_row
+
+    if field is not None:
+        return observed_row(field, observe)[0]
+    if isinstance(observe, tuple) and any(isinstance(one, str) for one in observe):
+        raise InputError(f"harmonics: observe = {observe!r} is a point of a contact system; give "
+                         f"its field too.")
+    row = as_floats(observe, "observe")
+    if row.shape != (states,):
+        raise InputError(f"harmonics: observe must hold {states} numbers, one for each state.")
+    return row
+
+
+def _last_period(motion: PeriodicMotion, values: Array) -> tuple[Array, Array]:
+    """Times (N,) at equal distances over the last period, without its end, and values there.
+
+    Values of other samples are interpolated by cubic splines.
+    """
+    if motion.period is None:
+        raise InputError("harmonics: the motion does not know its period; give it, "
+                         "PeriodicMotion(times, states, period).")
+    period, end = motion.period, float(motion.times[-1])
+    times, first = np.unique(motion.times, return_index=True)
+    kept = times >= end - period * (1.0 + _COINCIDE)
+    if end - period < times[0] - _COINCIDE * period:
+        raise InputError(f"harmonics: the motion covers {end - times[0]:.6g} s, less than its "
+                         f"period of {period:.6g} s; run it longer.")
+    count = max(int(np.count_nonzero(kept)) - 1, 2)
+    wanted: Array = end - period + period / count * np.arange(count, dtype=np.float64)
+    known = times[kept][:-1]
+    if len(known) == count and np.abs(known - wanted).max() <= _COINCIDE * period:
+        return known, np.asarray(values[first[kept][:-1]])
+    from scipy.interpolate import CubicSpline
+
+    return wanted, np.asarray(CubicSpline(times, values[first])(wanted))
 
 
 def nodes_on_mesh(u: Array, mesh: Array, states: int) -> tuple[Array, int]:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -30,6 +30,8 @@ def response(
     levels: Annotated[str | None, Parameter(
         help="Another parameter and its values, `drive.amplitude_x=1e-5,2e-5`; a response for "
         "each.")] = None,
+    method: Annotated[Literal["harmonic balance", "collocation", "shooting"] | None, Parameter(
+        help="How orbits are found; overrides `[response]`.")] = None,
     harmonics: Annotated[int | None, Parameter(
         help="Harmonics; overrides `[response]`.")] = None,
     samples: Annotated[int | None, Parameter(
@@ -41,7 +43,7 @@ def response(
     resume: Annotated[bool, Parameter(
         negative=(), help="Go on with an interrupted response.")] = False,
 ) -> int:
-    """Steady vibration over the frequency of the excitation, by harmonic balance.
+    """Steady vibration over the frequency of the excitation.
 
     The section [response] of the study gives range, levels and harmonics. Writes the responses
     (NAME-response.h5, NAME-response.csv), a picture of amplitude and phase, and a page whose
@@ -56,8 +58,8 @@ def response(
 
     described = read_study(study, set_)
     with located(f"{described.title}: [response]:", "ResponseSettings"):
-        wanted = _wanted(described.response, parameter, hz, bounds, levels, harmonics, samples,
-                         tolerance)
+        wanted = _wanted(described.response, parameter, hz, bounds, levels, method, harmonics,
+                         samples, tolerance)
     with located(f"{described.title}:"):
         _ = wanted.checked_bounds
     described = replace(described, response=wanted)
@@ -108,12 +110,13 @@ def response(
 
 def _wanted(
     given: "ResponseSettings", parameter: str | None, hz: tuple[float, float] | None,
-    bounds: tuple[float, float] | None, levels: str | None, harmonics: int | None,
-    samples: int | None, tolerance: float | None,
+    bounds: tuple[float, float] | None, levels: str | None, method: str | None,
+    harmonics: int | None, samples: int | None, tolerance: float | None,
 ) -> "ResponseSettings":
     """The section [response] with the options of the command line."""
     changes: dict[str, object] = {name: value for name, value in (
-        ("parameter", parameter), ("harmonics", harmonics), ("samples", samples),
+        ("parameter", parameter), ("method", method), ("harmonics", harmonics),
+        ("samples", samples),
         ("tolerance", tolerance)) if value is not None}
     if hz is not None and bounds is not None:
         raise InputError("--hz and --bounds mean the same; give one of them.")

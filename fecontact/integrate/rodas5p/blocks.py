@@ -131,13 +131,13 @@ def _blocks(
     m, n = len(shapes), nodes[-1][1]
     tangents = shapes.shape[1] // max(n, 1)
     # Without contact nodes no mode moves any; kernels step by the length of ``nodes``.
-    moved = (moved != 0.0) & (n > 0)
-    parts = [(*modes[a], *nodes[b]) for b, a in np.argwhere(moved)]
+    moves = np.logical_and(moved, n > 0)
+    parts = [(*modes[a], *nodes[b]) for b, a in np.argwhere(moves)]
     position, starts, reach = _elimination(modes, coupled)
-    most = int(moved.sum(axis=1).max())
+    most = int(moves.sum(axis=1).max())
     spans = np.zeros((n, most, 2), dtype=np.int64)
     for b, (first, last) in enumerate(nodes):
-        for place, a in enumerate(np.flatnonzero(moved[b])):
+        for place, a in enumerate(np.flatnonzero(moves[b])):
             spans[first:last, place] = modes[a]
     return Blocks(
         nodes=np.arange(max(n, 1)), used=np.array([n]), shapes=shapes,
@@ -149,7 +149,7 @@ def _blocks(
         coupled=_table([(*modes[a], *modes[c], starts[a], starts[c])
                         for a, c in np.argwhere(coupled)], 6),
         pairs=_table([(*modes[a], *answered, *columns) for b in range(len(nodes))
-                      for a in np.flatnonzero(moved[b]) for c in np.flatnonzero(moved[b])
+                      for a in np.flatnonzero(moves[b]) for c in np.flatnonzero(moves[b])
                       for answered in _each(modes[c], m, 2)
                       for columns in _each(nodes[b], n, tangents, n <= FEW)], 6),
         position=position, reach=reach)

@@ -75,10 +75,13 @@ def report_response(
 
     def texts(point: BranchPoint) -> list[str]:
         size = quantity(float(point.values["observed_amplitude"]), unit, 5)
-        error = float(point.values["truncation_error"])
-        return [*point_texts(point, usable_hz), size, f"{error:.1e}"]
+        error = [f"{float(point.values['truncation_error']):.1e}"] if balanced else []
+        return [*point_texts(point, usable_hz), size, *error]
 
-    shown = replace(shown, columns=(*COLUMNS, "amplitude", "truncation error"), texts=texts)
+    # Truncation is the error of harmonic balance alone.
+    balanced = all(branch.points[0].by_harmonics for branch in response.branches)
+    shown = replace(shown, columns=(*COLUMNS, "amplitude", *["truncation error"] * balanced),
+                    texts=texts)
     return write_diagrams(path, path.stem if title is None else title, named, diagrams, shown,
                           study)
 
