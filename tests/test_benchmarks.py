@@ -35,7 +35,7 @@ BENCHMARKS = {
     "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
-HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems",
+HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems", "kept_runs",
            "nonsmooth_peer"}
 
 
