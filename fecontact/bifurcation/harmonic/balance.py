@@ -11,8 +11,7 @@ from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
-from fecontact.bifurcation.harmonic.memory import Kept, differences, march, solve_around
-from fecontact.bifurcation.harmonic.return_map import take_return_derivatives, take_return_sums
+from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
@@ -207,7 +206,7 @@ class Balance:
         x[:, m : 2 * m] = differences(x[:, :m]) / period
         z = np.empty((self.samples, layout.memory))
         if not march(self.times(period), x, self.field.arrays(self.parameters(u)), period,
-                     self.kept.rows, self.kept.at(x[:, :m]), z):
+                     self.kept.at(x[:, :m]), z):
             raise AnalysisError(UNREPEATED)
         x[:, first:] = z
         return x
@@ -360,33 +359,19 @@ class Linearised:
         problem, layout, x, T = self.problem, self.problem.layout, self.marched, self.period
         m, first = layout.displacements, layout.states - layout.memory
         H, b, c, N = problem.harmonics, layout.harmonic, layout.memory, problem.samples
-        assert isinstance(problem.field, ContactField)
-        rows, parameters = problem.kept.rows, problem.parameters(self.u)
-        # Variables of other nodes have no influence.
-        s, nodes = c // layout.nodes, np.arange(layout.nodes)
-        elements = np.repeat(rows.reshape(layout.nodes, -1).any(axis=1), s)
-        _, whole, P = problem.field.derivatives(self.times, x, parameters, (problem.free,))
-        if elements.any():
-            take_return_derivatives(self.times, x, problem.field.arrays(parameters), rows, whole)
-        J = whole[:, first:]
+        _, J, P = problem.field.derivatives(self.times, x, problem.parameters(self.u),
+                                            (problem.free,))
+        J = J[:, first:]
+        J[:, :, :m] += LEAK / T * problem.kept.rows
         values = problem.series.values
         speeds = differences(values) / T
         found = np.empty((N, c, 2 * H + 1, b))
         np.multiply(values[:, None, :, None], J[:, :, None, layout.columns], out=found)
         found[..., :m] += speeds[:, None, :, None] * J[:, :, None, m : 2 * m]
-        # Limits act at the sample behind.
-        found[:, elements] = np.roll(found[:, elements], 1, axis=0)
-        changes = values - np.roll(values, 1, axis=0)
-        found[..., :m] += changes[:, None, :, None] * rows[:, None, :]
         common = np.empty((N, c, problem.common))
         common[:, :, -1] = P[:, first:, 0]
         if problem.autonomous:
-            slowed = self._slowed(J, x)
-            common[:, :, 0] = slowed + differences(x[:, first:]) / T**2
-            ground = self._return_sums(x, T, parameters, whole) - self._return_sums(
-                x, 0.0, parameters, whole)
-            common[:, elements, 0] = np.roll(slowed, 1, axis=0)[:, elements] + (
-                ground / T)[:, elements]
+            common[:, :, 0] = self._slowed(J, x) + differences(x[:, first:]) / T**2
         elif (ends := self._beside()) is not None:
             sides = []
             for end, period, _ in ends:
@@ -395,35 +380,12 @@ class Linearised:
                 rates = problem.field.rates(problem.times(period), moved, problem.parameters(end))
                 sides.append(rates[:, first:] - differences(moved[:, first:]) / period)
             common[:, :, -1] = (sides[0] - sides[1]) / (2.0 * ends[0][2])
-        if elements.any():
-            h = _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
-            sides = []
-            for sign in (1.0, -1.0):
-                end = self.u.copy()
-                end[-1] += sign * h
-                period = problem.period(end)
-                moved = problem.states(end, period, x[:, first:])
-                moved[:, m : 2 * m] = differences(moved[:, :m]) / period
-                sides.append(self._return_sums(moved, period, problem.parameters(end), whole))
-            common[:, elements, -1] = (sides[0] - sides[1])[:, elements] / (2.0 * h)
         right = np.concatenate([found.reshape(N, c, -1), common], axis=2)
-        starts = np.zeros((c, 2 * H + 1, b))
-        starts[..., :m] = values[0][None, :, None] * rows[:, None, :]
-        starts = np.concatenate([starts.reshape(c, -1), np.zeros((c, problem.common))], axis=1)
-        own = J[:, :, first:].reshape(N, layout.nodes, s, layout.nodes, s)
-        tangents = 2 if problem.field.system().basis.dimension == 3 else 1
-        solve_around(np.ascontiguousarray(np.moveaxis(own[:, nodes, :, nodes], 0, 1)), T, tangents,
-                     rows, starts, right)
+        # Variables of other nodes have no influence.
+        s, nodes = c // layout.nodes, np.arange(layout.nodes)
+        whole = J[:, :, first:].reshape(N, layout.nodes, s, layout.nodes, s)
+        solve_around(np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1)), T, right)
         return right
-
-    def _return_sums(self, x: Array, period: float, values: Array, J: Array) -> Array:
-        """See :func:`take_return_sums`; states x (N, d), derivatives J (N, d, d)."""
-        problem = self.problem
-        assert isinstance(problem.field, ContactField)
-        out = np.zeros((problem.samples, problem.layout.memory))
-        take_return_sums(problem.times(period), x, problem.field.arrays(values),
-                         problem.kept.rows, period, J, out)
-        return out
 
     def _coupled(self, z: Array) -> Array:
         """Change (n, columns) of the balance with a change (N, c, columns) of z."""

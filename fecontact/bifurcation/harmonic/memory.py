@@ -5,14 +5,12 @@ instead, by backward differences of second order, which damp what is stiff,
 
     (3 z_n - 4 z_(n-1) + z_(n-2)) N / (2 T) = g(q_n, q'_n, z_n) - e (z_n - s_n) / T,
 
-with velocities q' that are the same differences of the displacements. The leak e = 1e-6 determines
-the mean of a bristle that never slides, s = a (:class:`Kept`).
-
-Elastic Coulomb elements follow a return map instead (:mod:`return_map`). Their deflections repeat
-after one period in the plane. An element that never slides has the deflection x + a of one that has
-stuck since it was preloaded, a the part that it slid back then. One that slides a little gives up
-as much of a as it must. What is found repeats, so that its derivatives are those of these
-equations, cyclic and node by node.
+with velocities q' that are the same differences of the displacements: a spring that sticks follows
+its displacement exactly. Nothing but the leak e = 1e-6 determines the mean deflection of an element
+that never slides: s is the deflection x + a of an element that has stuck since it was preloaded, a
+the part that it slid back then (:class:`Kept`). One that slides a little gives up as much of a as
+it must. What is found repeats, so that its derivatives are those of these equations, cyclic and
+node by node.
 """
 
 from dataclasses import dataclass
@@ -20,11 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import types
 
-from fecontact.bifurcation.harmonic.return_map import (
-    has_elements,
-    march_elements,
-    solve_elements,
-)
 from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
 from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.references import borrowed
@@ -73,17 +66,15 @@ def differences(z: Array) -> Array:
     return found
 
 
-@kernel(types.void(_nodes, f8, i8, matrix, matrix, block))
-def solve_around(slopes, T, tangents, springs, starts, x):
+@kernel(types.void(_nodes, f8, block))
+def solve_around(slopes, T, x):
     """Replace right sides x (N, n s, columns) by the solutions z of D z / T - g_z z = x.
 
     ``slopes`` (N, n, s, s) holds the derivatives g_z of each of n nodes with s variables. The last
     two samples are guessed as zero first; what this leaves around the period is the solution of
-    2 s equations, since solutions of the homogeneous equations combine. Nodes with rows of
-    ``springs`` (n s, m) have elements of ``tangents`` variables, see
-    :func:`fecontact.bifurcation.harmonic.return_map.solve_elements`.
+    2 s equations, since solutions of the homogeneous equations combine.
     """
-    slopes, x, springs, starts = borrowed(slopes), borrowed(x), borrowed(springs), borrowed(starts)
+    slopes, x = borrowed(slopes), borrowed(x)
     N, n, s, _ = slopes.shape
     columns = x.shape[2]
     rate = N / T
@@ -93,9 +84,6 @@ def solve_around(slopes, T, tangents, springs, starts, x):
     ring, ring_pivots = np.empty((2 * s, 2 * s)), np.empty(2 * s, dtype=np.int64)
     given = np.empty((2 * s, columns))
     for node in range(n):
-        if has_elements(node, s, springs):
-            solve_elements(slopes, node, tangents, starts, x)
-            continue
         for place in range(N):
             for i in range(s):
                 for k in range(s):
@@ -169,18 +157,16 @@ def _keep_within(start, brackets):
                 start[entry] = 0.5 * (brackets[2, entry] + brackets[3, entry])
 
 
-@kernel(i8(vector, matrix, SYSTEM, f8, matrix, matrix, matrix))
-def march(t, y, s, T, springs, target, z):
+@kernel(i8(vector, matrix, SYSTEM, f8, matrix, matrix))
+def march(t, y, s, T, target, z):
     """Fill z (N, c) with the internal variables that repeat; c = n nodes times their number.
 
     t (N,) are the times of the samples and y (N, d) the states, with the differences of the
-    displacements as velocities; ``target`` (N, c) are the deflections to which they leak,
-    ``springs`` (c, m) the rows of elements. Rounds begin without deflection; after two of them,
-    Newton's method finds the start that repeats.
+    displacements as velocities; ``target`` (N, c) are the deflections to which they leak. Rounds
+    begin without deflection; after two of them, Newton's method finds the start that repeats.
     Returns 1 if every node has come to that, 0 if one has not.
     """
     t, y, s, z, target = borrowed(t), borrowed(y), borrowed(s), borrowed(z), borrowed(target)
-    springs = borrowed(springs)
     N, n = len(t), len(s.Tx)
     states = s.memory.max()
     length, width = force_room(states, in_space(s))
@@ -192,10 +178,6 @@ def march(t, y, s, T, springs, target, z):
     for j in range(n):
         k = s.memory[j]
         if k == 0:
-            continue
-        if has_elements(j, states, springs):
-            if not march_elements(j, t, y, s, T, target, z, force, rates):
-                done = 0
             continue
         a, pivots = np.empty((k, k)), np.empty(k, dtype=np.int64)
         ring, ring_pivots = np.empty((2 * k, 2 * k)), np.empty(2 * k, dtype=np.int64)

@@ -12,15 +12,9 @@ from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
 from fecontact.bifurcation.harmonic.compiled.plain_forces import combine, plain_forces, project
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
-from fecontact.bifurcation.harmonic.return_map import (
-    has_elements,
-    take_return_derivatives,
-    take_return_sums,
-)
 from fecontact.bifurcation.harmonic.series import fill_blocks
 from fecontact.core.compiled import helper, routine
 from fecontact.system.jacobian import batch_derivatives, batch_rates
-from fecontact.system.nodes import in_space
 
 # Relative steps of one-sided and of central differences in the parameter.
 _ONE_SIDED, _CENTRAL = 1e-6, 1e-5
@@ -145,7 +139,7 @@ def evaluate_at(u, derivatives, e):
         for n in range(len(room.t)):
             for i in range(c):
                 room.y[n, 2 * m + i] = 0.0
-        if march(room.t, room.y, e.contact, T, e.springs, room.target, room.z) == 0:
+        if march(room.t, room.y, e.contact, T, room.target, room.z) == 0:
             return 0.0
         for n in range(len(room.t)):
             for i in range(c):
@@ -254,10 +248,6 @@ def _by_parameter(u, T, e):
                 room.column[k * m + j] += (e.body[2, i, j] * place + e.body[3, i, j] * speed
                                            - rise * room.linear[1, i, j] * speed)
     rate = N / T
-    ground, still = np.zeros((N, c)), np.zeros((N, c))
-    if c > 0:
-        take_return_sums(room.t, room.y, e.contact, e.springs, T, room.J_marched, ground)
-        take_return_sums(room.t, room.y, e.contact, e.springs, 0.0, room.J_marched, still)
     for k in range(N):
         for i in range(c):
             total = (LEAK / T * (room.z[k, i] - room.target[k, i])
@@ -265,16 +255,11 @@ def _by_parameter(u, T, e):
                                + 0.5 * room.z[k - 2, i]))
             for j in range(m):
                 total -= room.J_marched[k, 2 * m + i, m + j] * room.y[k, m + j]
-            if has_elements(i // (c // e.nodes), c // e.nodes, e.springs):
-                # Change of slip by the ground, and limits at the sample before.
-                total = ground[k, i] - still[k, i]
-                for j in range(m):
-                    total -= room.J_marched[k - 1, 2 * m + i, m + j] * room.y[k - 1, m + j]
             room.followed[k, i, len(u) - 1] = rise * total
 
 
 @helper
-def _beside(u, T, central, e, followed):
+def _beside(u, central, e, followed):
     """Fill ``column``, and the last columns of ``followed``, by differences; z held."""
     room = e.room
     n, p = len(room.residual), u[len(u) - 1]
@@ -287,9 +272,6 @@ def _beside(u, T, central, e, followed):
     there = room.vectors[7]
     for k in range(n):
         there[k] = u[k]
-    sums, before = np.zeros((N, c)), np.zeros((N, c))
-    if c > 0 and not central:
-        take_return_sums(room.t, room.y, e.contact, e.springs, T, room.J_marched, before)
     for side in range(2 if central else 1):
         sign = 1.0 if side == 0 else -1.0
         there[n] = p + sign * h
@@ -305,7 +287,6 @@ def _beside(u, T, central, e, followed):
         if c > 0:
             _take_differences(T, e)
             batch_rates(room.t, room.y, e.contact, room.f_marched)
-            take_return_sums(room.t, room.y, e.contact, e.springs, T, room.J_marched, sums)
             rate = N / T
             for k in range(N):
                 for i in range(c):
@@ -313,33 +294,9 @@ def _beside(u, T, central, e, followed):
                            - LEAK / T * (room.z[k, i] - room.target[k, i])
                            - rate * (1.5 * room.z[k, i] - 2.0 * room.z[k - 1, i]
                                      + 0.5 * room.z[k - 2, i]))
-                    if has_elements(i // (c // e.nodes), c // e.nodes, e.springs):
-                        off = sums[k, i] - before[k, i]
                     followed[k, i, n] = (sign * off / width
                                          + (followed[k, i, n] if side > 0 else 0.0))
     take_parameter(p, e)
-
-
-@helper
-def _add_slip(s, starts, e):
-    """Make right sides of elements, s variables a node, of derivatives of their limits.
-
-    Limits act at the sample behind, and what slips adds to the deflections.
-    """
-    followed, values = e.room.followed, e.values
-    m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
-    for i in range(len(e.offsets)):
-        if not has_elements(i // s, s, e.springs):
-            continue
-        for q in range(L):
-            for j in range(m):
-                place, spring = q * m + j, e.springs[i, j]
-                last = followed[N - 1, i, place]
-                for k in range(N - 1, 0, -1):
-                    followed[k, i, place] = (followed[k - 1, i, place]
-                                             + spring * (values[k, q] - values[k - 1, q]))
-                followed[0, i, place] = last + spring * (values[0, q] - values[N - 1, q])
-                starts[i, place] = spring * values[0, q]
 
 
 @helper
@@ -354,7 +311,6 @@ def _add_memory(T, e):
     n, rate = L * m, N / T
     s = c // e.nodes
     followed, J = room.followed, room.J_marched
-    starts = np.zeros((c, n + 1))
     square = room.square.reshape((n, n))
     for k in range(N):
         for i in range(c):
@@ -366,10 +322,10 @@ def _add_memory(T, e):
                 speed = rate * (1.5 * e.values[k, q] - 2.0 * e.values[k - 1, q]
                                 + 0.5 * e.values[k - 2, q])
                 for j in range(m):
-                    followed[k, i, q * m + j] = (e.values[k, q] * J[k, 2 * m + i, j]
-                                                 + speed * J[k, 2 * m + i, m + j])
-    _add_slip(s, starts, e)
-    solve_around(room.slopes, T, 2 if in_space(e.contact) else 1, e.springs, starts, followed)
+                    followed[k, i, q * m + j] = (
+                        e.values[k, q] * (J[k, 2 * m + i, j] + LEAK / T * e.springs[i, j])
+                        + speed * J[k, 2 * m + i, m + j])
+    solve_around(room.slopes, T, followed)
     room.forces[:, :, :] = 0.0
     for k in range(N):
         for j in range(m):
@@ -410,11 +366,10 @@ def condense(u, T, central, e):
     if c > 0:
         batch_derivatives(room.t, room.y, e.contact, e.contact, 0.0, room.f_marched,
                           room.J_marched, np.empty((0, 0)))
-        take_return_derivatives(room.t, room.y, e.contact, e.springs, room.J_marched)
     if e.numbers[STEADY] != 0.0:
         _by_parameter(u, T, e)
     else:
-        _beside(u, T, central, e, room.followed)
+        _beside(u, central, e, room.followed)
     if c > 0:
         _add_memory(T, e)
     condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
