@@ -256,6 +256,6 @@ def test_an_orbit_whose_friction_does_not_repeat_has_an_infinite_error(monkeypat
 
 def test_study_files_have_the_same_key():
     settings = ResponseSettings(bounds=(1.0, 2.0), samples=40, sampling_tolerance=1e-3)
-    assert settings.method() == HarmonicBalance(9, 40, sampling_tolerance=1e-3)
-    assert settings.method().refines
-    assert not replace(settings, sampling_tolerance=None).method().refines
+    assert settings.harmonic_balance() == HarmonicBalance(9, 40, sampling_tolerance=1e-3)
+    assert settings.harmonic_balance().refines
+    assert not replace(settings, sampling_tolerance=None).harmonic_balance().refines

@@ -10,7 +10,6 @@ from cyclopts import Parameter
 
 from fecontact.cli.console import echo, echo_written, note, show
 from fecontact.cli.options import Changes, StudyFile
-from fecontact.core.checks import whole_number
 from fecontact.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -97,6 +96,8 @@ def _chosen(table: "SweepTable", cases: str) -> list[int]:
     """Numbers of the cases that ``failed``, are ``missing``, or are listed like ``3,17``."""
     if cases in ("failed", "missing"):
         return list(getattr(table, cases))
+    from fecontact.core.checks import whole_number
+
     numbers = [whole_number(part) for part in cases.split(",")]
     if any(number is None or not 0 <= number < len(table) for number in numbers):
         raise InputError(f"--cases {cases} must be 'failed', 'missing', or numbers of cases from 0 "
