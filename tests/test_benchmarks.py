@@ -35,8 +35,8 @@ BENCHMARKS = {
     "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
-HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems", "kept_runs",
-           "nonsmooth_peer"}
+HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems",
+           "kept_runs", "nonsmooth_peer"}
 
 
 def test_every_benchmark_is_here():
