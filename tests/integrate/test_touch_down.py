@@ -172,6 +172,7 @@ def accelerations(places, height, mu, inertia):
     return len(found)
 
 
+@pytest.mark.filterwarnings("ignore:.*friction_coefficient = .* is above 2")
 def test_a_paradox_has_no_acceleration_or_several():
     rng, counts = np.random.default_rng(5), []
     for _ in range(60):

@@ -280,7 +280,7 @@ def _started(
 ) -> tuple[float, HarmonicProblem, Array]:
     """Value of the parameter, problem and unknowns of the orbit from which a branch starts."""
     ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
-    told: FecontactError = AnalysisError("No orbit was found to start from.")
+    failure: FecontactError = AnalysisError("No orbit was found to start from.")
     for begin in ends:
         values = values.copy()
         values[free] = begin
@@ -297,8 +297,8 @@ def _started(
             try:
                 return begin, *attempt()
             except FecontactError as error:
-                told = error
-    raise told
+                failure = error
+    raise failure
 
 
 def _by_orbit_method(
@@ -341,7 +341,7 @@ def _by_orbit_method(
 
 
 def _observed_of(motion: PeriodicMotion, row: Array) -> dict[str, Any]:
-    """What is stored of the observed quantity of an orbit in samples."""
+    """Values of an observed quantity along an orbit, for its point."""
     low, high = peaks((motion.evenly() @ row)[None])
     return dict(zip(OBSERVED, (
         float(low[0]), float(high[0]), float(high[0] - low[0]) / 2.0,

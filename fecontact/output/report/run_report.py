@@ -102,16 +102,16 @@ def run_block(
     if scale is not None:
         require_scale("report", scale)
     payload = Payload()
-    found, told = _finite(run), [*notes(run), *run.limits_exceeded]
+    found, remarks = _finite(run), [*notes(run), *run.limits_exceeded]
     if message := alias_message(found):
-        told.append(f"In this run {message}")
+        remarks.append(f"In this run {message}")
     if len(found.time) < len(run.time):
-        told.append(f"Only the first {len(found.time)} of {len(run.time)} output times have a "
+        remarks.append(f"Only the first {len(found.time)} of {len(run.time)} output times have a "
                     f"motion of finite numbers.")
     system = found.system
     drawn = system.basis.mode_shapes is not None
     if not drawn:
-        told.append("The modal basis holds no shapes over the body, so that no body is drawn.")
+        remarks.append("The modal basis holds no shapes over the body, so that no body is drawn.")
     motion = Motion(found, np.arange(len(found.time))) if drawn else None
     charts, phases = chart_tables(found, points, payload)
     header: dict[str, Any] = {
@@ -119,7 +119,7 @@ def run_block(
         "title": title,
         "status": found.status.value,
         "good": found.status in (Status.FINISHED, Status.EVENT),
-        "notes": told,
+        "notes": remarks,
         "facts": [list(row) for row in _facts(run, found)],
         **_key_numbers(found, points),
         "system": [list(row) for row in system.summary()],
