@@ -226,6 +226,7 @@ def _written(folder, text):
     return path
 
 
+@pytest.mark.filterwarnings("ignore:.*no contact can close")
 def test_a_solid_that_starts_rigidly_flies_freely():
     study = fc.Study.from_toml(PAD).with_(**{"gap": 1.0, "simulation.t_end": 1e-5})
     system = study.system()
@@ -256,6 +257,7 @@ def test_wear_of_a_solid_is_that_of_archard():
         fc.integrate.wear_history(study.system(), history.law, 0.1, acceleration=1.0, blocks=1)
 
 
+@pytest.mark.filterwarnings("ignore:.*no contact can close")
 def test_summaries_of_solids_see_all_directions():
     from fecontact.analysis.run_facts import run_facts
     from fecontact.analysis.summaries import largest_displacement
@@ -440,6 +442,7 @@ def test_what_nothing_holds_is_named():
                 rf"There is no steady sliding: nothing holds the body {named}; give it a spring")
 
 
+@pytest.mark.filterwarnings("ignore:.*no contact can close")
 def test_summaries_of_one_point_see_all_directions():
     from fecontact.sweeps.summaries import functions_for, summarise
 
