@@ -63,8 +63,7 @@ def sweep(
         :class:`fecontact.study.Distribution`; by default those of ``[sweep.axes]``. ``cases``
         lists the cases themselves instead: ``sweep(study, cases=[{"ground.speed": 0.1}])``.
     executor : concurrent.futures.Executor, optional
-        Runs the batches: threads, the executor of a Dask client, of mpi4py.futures or executorlib;
-        by default processes on this machine.
+        Threads, or that of a Dask client, mpi4py.futures or executorlib; by default processes.
     folder : path, optional
         Where finished cases are kept; by default ``NAME-sweep`` among the results of the study.
     resume, overwrite : bool

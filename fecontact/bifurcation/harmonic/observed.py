@@ -1,48 +1,17 @@
 """What is observed of orbits by harmonic balance: range and harmonics of one displacement."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.series import differentiated, uniform_basis
-from fecontact.core.checks import as_floats
-from fecontact.core.errors import InputError
-from fecontact.core.types import Array, ArrayLike
-from fecontact.system.fields.vector_field import VectorField
+from fecontact.core.types import Array
 
 # Samples a period of what is observed, and harmonics of it that are stored.
 OBSERVED_SAMPLES, OBSERVED_HARMONICS = 512, 15
 OBSERVED = ("observed_minimum", "observed_maximum", "observed_amplitude", "observed_harmonics")
-
-
-def observed_row(
-    field: VectorField, observe: tuple[str | int, str] | ArrayLike
-) -> tuple[Array, str]:
-    """Row (d,) of the observed quantity, and its name.
-
-    Raises
-    ------
-    InputError
-        For a point that does not exist, a row of wrong size, or internal variables.
-    """
-    if isinstance(field, ContactField):
-        if not (isinstance(observe, Sequence) and len(observe) == 2
-                and isinstance(observe[1], str)):
-            raise InputError(f"observe = {observe!r} must be a point and a component, such as "
-                             f"('B', 'x').")
-        point, component = observe[0], observe[1]
-        return field.displacement_row(point, component), f"{point} {component}"
-    if isinstance(observe, tuple) and observe == ("B", "x"):
-        return np.eye(field.dimension)[0], field.state_names[0]
-    row = as_floats(observe, "observe")
-    if row.shape != (field.dimension,):
-        raise InputError(f"observe must hold {field.dimension} numbers, one for each state.")
-    states = np.flatnonzero(row)
-    return row, field.state_names[states[0]] if len(states) == 1 else "observed"
 
 
 def observed_values(

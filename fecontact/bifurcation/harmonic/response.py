@@ -25,6 +25,7 @@ from fecontact.bifurcation.fields.contact_field import (
     ContactField,
     field_between,
 )
+from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
 from fecontact.bifurcation.harmonic.estimates import peaks
@@ -35,7 +36,6 @@ from fecontact.bifurcation.harmonic.observed import (
     OBSERVED_HARMONICS,
     OBSERVED_SAMPLES,
     observed_of_orbits,
-    observed_row,
 )
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.stalled import stall_reason

@@ -15,10 +15,10 @@ from fecontact.bifurcation.continuation.problem import (
     options_of,
 )
 from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.observed import observed_row
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.nonlinear_modes.linear_start import (

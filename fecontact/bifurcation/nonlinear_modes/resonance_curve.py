@@ -11,11 +11,11 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, width_of
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.branches import attributes_of
 from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.observed import observed_row
 from fecontact.bifurcation.harmonic.response import (
     branch_of_response,
     observed_amplitudes,

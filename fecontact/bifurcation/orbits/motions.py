@@ -162,7 +162,7 @@ def _observed_row(
     states: int, field: VectorField | None, observe: tuple[str | int, str] | ArrayLike
 ) -> Array:
     """Row (d,) of what is observed."""
-    from fecontact.bifurcation.harmonic.observed import observed_row
+    from fecontact.bifurcation.fields.observed_row import observed_row
 
     if field is not None:
         return observed_row(field, observe)[0]

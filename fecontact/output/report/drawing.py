@@ -91,7 +91,7 @@ class DrawnContact:
     ----------
     faces : list of dict
         Title, label of the abscissa, first node, abscissae and tributary sizes of each face; in
-        space its ``plan``, a :class:`FacePlan`.
+        space its ``plan``, a :class:`~fecontact.output.plots.solids.plans.FacePlan`.
     axes : (n, d, d) array
         Unit vectors of each node: one tangent or two, then the normal.
     forces : (N, n, d) array
