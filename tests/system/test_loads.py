@@ -93,6 +93,7 @@ def test_a_harmonic_base_is_transmitted_as_by_the_closed_form(ratio):
 # Gravity ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore:.*no contact can close")
 def test_a_body_in_the_air_falls():
     system = beam(Load(gravity=(1.5, -G)), modes=5, damping=0.0)
     system = system.with_(gap=1.0)
