@@ -117,7 +117,7 @@ def test_handlers_are_as_before_afterwards():
         signal.signal(signal.SIGHUP, ignored)
     assert interrupted_code() == 130
     found = []
-    thread = threading.Thread(target=lambda: found.append(execute(["laws", "none"])))
+    thread = threading.Thread(target=lambda: found.append(execute(["laws", "nonsense"])))
     thread.start()
     thread.join()
     assert found == [1]
