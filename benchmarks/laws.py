@@ -8,6 +8,7 @@ Usage: python benchmarks/laws.py [--quick]
 
 import sys
 import time
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,15 @@ def microseconds(normal: NormalLaw, friction: FrictionLaw, repetitions: int = 30
     return 1e6 * best
 
 
+# What friction laws require.
+FRICTION = {
+    "static_coefficient": 0.8, "kinetic_coefficient": 0.55, "minimum_coefficient": 0.55,
+    "friction_coefficient": 0.55, "minimum_velocity": 1e-2, "stribeck_velocity": 1e-3,
+    "stribeck_exponent": 2.0, "decay": 1000.0, "factor": 0.14, "excess": 1.14,
+    "smoothing_slope": 100.0, "stiffness": 1e7, "presliding_stiffness": 1e5,
+    "bristle_stiffness": 1e5, "yield_displacement": 5e-6, "chi": -0.5, "beta": 0.1}
+
+
 def main(quick: bool = False) -> None:
     """Print the tables."""
     repetitions = 2 if quick else 30
@@ -66,8 +76,10 @@ def main(quick: bool = False) -> None:
         names = [*law_names()[kind], *([own] if kind is FrictionLaw else [])]
         costs = {}
         for name in names:
-            law: NodeLaw = law_class(kind, name, "")(**GIVEN.get(name, {})
-                                                     if kind is NormalLaw else {})
+            made = law_class(kind, name, "")
+            law: NodeLaw = made(**GIVEN.get(name, {}) if kind is NormalLaw else {
+                entry.name: FRICTION[entry.name] for entry in fields(made)
+                if entry.default is MISSING and entry.default_factory is MISSING})
             parts = (law, other) if kind is NormalLaw else (other, law)
             costs[Path(name).name] = microseconds(*parts, repetitions)  # type: ignore[arg-type]
             memory = getattr(law, "memory", 0)
