@@ -245,7 +245,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     figure({n: shown[n] for n in names[4:]}, folder / "irregular.png")
     side_by_side({"vertical": shown[names[2]], "leaning": shown[names[3]]}, folder / "leaning.png")
     plot_spectrogram(shown[names[1]], piece=1.0, highest_hz=60.0,
-                        path=folder / "spectrogram.png")
+                     path=folder / "spectrogram.png")
 
     block = soft_block()
     print(f"Soft block: {block.basis.contact_nodes} contact nodes, elastic modes from "

@@ -82,8 +82,8 @@ def key_numbers(
     Dominant frequency (largest peak of the velocity spectrum), amplitudes (half the range) of
     points in each direction, mean and peak of the total normal and friction forces, of several
     interfaces of each, mean power lost by friction. Without friction its numbers are left out.
-    Frequencies need even output times; without
-    them, and of points that do not move, they are left out.
+    Frequencies need even output times; without them, and of points that do not move, they are left
+    out.
 
     Parameters
     ----------

@@ -70,9 +70,10 @@ def report_sweep(
         "facts": [list(row) for row in table.summary()],
         "columns": columns,
         "start": [varied[0], varied[1] if len(varied) > 1 else first, first],
-        "told": "; ".join(f"{column['title']}: {', '.join(f'{k} {one}' for k, one in marked)}"
-                          for column, labels in zip(columns, names, strict=True)
-                          if labels and (marked := list(enumerate(labels)))),
+        "remarks": "; ".join(
+            f"{column['title']}: {', '.join(f'{k} {one}' for k, one in marked)}"
+            for column, labels in zip(columns, names, strict=True)
+            if labels and (marked := list(enumerate(labels)))),
         "headings": ["case", *table.parameters, *table.values, "failed because", "warning",
                      "run it alone"],
         "rows": [[*_row(table, case), "" if command is None else command(case)]

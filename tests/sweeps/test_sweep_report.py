@@ -30,7 +30,7 @@ def test_cases_are_those_of_the_table(tmp_path):
     assert speed["title"] == "log10 of ground speed [m/s]"
     np.testing.assert_allclose(speed["values"], [-3, -3, -2, -2, -1, -1], rtol=1e-12)
     assert law["values"] == [0, 1, 0, 1, 0, 1]
-    assert "0 exponential, 1 constant" in shown["told"]
+    assert "0 exponential, 1 constant" in shown["remarks"]
     assert amplitude["title"] == "amplitude x [µm]"
     np.testing.assert_allclose([amplitude["values"][k] for k in (0, 1, 2, 4)], [10, 20, 30, 50])
     assert amplitude["values"][3] is None

@@ -14,7 +14,7 @@ class Cases extends Chart {
       return select;
     });
     this.bar = new ColourBar();
-    this.node.append(this.bar.node, el("p.legend", {}, data.told));
+    this.node.append(this.bar.node, el("p.legend", {}, data.remarks));
   }
 
   draw() {
