@@ -77,10 +77,10 @@ def test_simulate_warns_once_before_the_run():
     assert len(caught) == 1
 
 
-@pytest.mark.parametrize("factor", [0.9, 1.1])
+@pytest.mark.parametrize("factor", [0.997, 1.003])
 def test_gaps_out_of_reach(factor):
     """A body in free fall: it reaches g T^2 / 2, and with a start at v0 another v0 T."""
-    T, g, v = 0.01, 9.81, 0.5
+    T, g, v = 0.01, 9.81, 0.005
     way = 0.5 * g * T**2 + v * T
     system = beam(load=gravity(0.0, -g), gap=factor * way)
     start = np.zeros(system.size)
