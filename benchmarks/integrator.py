@@ -1,9 +1,8 @@
 """Work and precision of time integrators: fecontact's own against scipy, numbalsoda and CVODE.
 
-Usage: python benchmarks/integrator.py [a b b2 c d e ...] [--quick] [--tight] [--inline-laws]
+Usage: python benchmarks/integrator.py [a b b2 c d e ...] [--quick] [--tight]
 With --quick the first part of each problem, at two tolerances, against odeint alone; with --tight
-errors from 1e-6 to 1e-9, against LSODA in its two forms. With --inline-laws steps of Rodas5P with
-the laws called and written out, a step of each in turns; for a, b, b2 and c.
+errors from 1e-6 to 1e-9, against LSODA in its two forms.
 
 Errors are relative to a reference that is kept in the temporary directory; it is run by the
 package's integrator at rtol = 1e-12, and its distance from LSODA at rtol = 1e-12 is printed. All
@@ -58,34 +57,6 @@ def own(problem: Problem) -> Prepared:
         return solve
 
     return prepare
-
-
-def inline_laws(problem: Problem, quick: bool) -> None:
-    """Print times of a step of Rodas5P with the laws called and written out, and their ratio."""
-    wanted = reference(problem)
-    for rtol in (1e-4, 1e-6):
-        for work in (False, True):
-            costs: dict[bool, list[float]] = {False: [], True: []}
-            errors = {}
-            for repeat in range(2 if quick else 15):
-                for inlined in (False, True) if repeat % 2 else (True, False):
-                    seconds, steps = 0.0, 0
-                    while seconds < (0.0 if quick else 0.05) or not steps:
-                        run = driver.start(problem.system, problem.state, problem.times, rtol=rtol,
-                                           work=work, series="never", collocation="never",
-                                           inline_laws=inlined)
-                        run.advance(0)
-                        begin, first = time.process_time(), run.attempts
-                        run.advance(10**9)
-                        seconds += time.process_time() - begin
-                        steps += run.attempts - first
-                    costs[inlined].append(seconds / steps)
-                    errors[inlined] = problem.error(run.states, wanted)
-            called, inlined_ = (np.array(costs[inlined]) for inlined in (False, True))
-            print(f"{problem.name:3s} rtol {rtol:7.1e} {'with' if work else 'without'} powers: "
-                  f"called {np.median(called) * 1e6:.3f} us a step, error {errors[False]:.1e}; "
-                  f"written out {np.median(inlined_) * 1e6:.3f} us, error {errors[True]:.1e}; "
-                  f"ratio {np.median(inlined_ / called):.2f}", flush=True)
 
 
 def prepared(solve: Callable[[float], Array]) -> Prepared:
@@ -171,16 +142,12 @@ def main() -> None:
         # Read when numpy is loaded.
         os.execve(sys.executable, [sys.executable, *sys.argv],
                   {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"})
-    names = [name for name in sys.argv[1:] if not name.startswith("-")] or (
-        ["a", "b", "b2", "c"] if "--inline-laws" in sys.argv else list(PROBLEMS))
+    names = [name for name in sys.argv[1:] if not name.startswith("-")] or list(PROBLEMS)
     quick, tight = "--quick" in sys.argv, "--tight" in sys.argv
     for name in names:
         problem = PROBLEMS[name]()
         problem = shortened(problem, QUICK_PART) if quick else problem
-        if "--inline-laws" in sys.argv:
-            inline_laws(problem, quick)
-        else:
-            measure(problem, quick, tight)
+        measure(problem, quick, tight)
 
 
 if __name__ == "__main__":

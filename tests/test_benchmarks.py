@@ -74,13 +74,3 @@ def test_integrator(problem, tmp_path, monkeypatch, capsys):
                             (r"fecontact +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4),
                             (r"odeint +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4)])
     assert left == set()
-
-
-def test_integrator_with_laws_written_out(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
-    printed, left = run_script("benchmarks/integrator.py", ("b", "--inline-laws"), tmp_path,
-                               monkeypatch, capsys)
-    check_numbers(printed, [(rf"^b .* 1.0e-06 {powers} .* {laws} .*?, error ([^;]+);", 0.0, 1e-4)
-                            for powers in ("with", "without")
-                            for laws in ("called", "written out")])
-    assert left == set()

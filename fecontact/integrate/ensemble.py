@@ -156,9 +156,6 @@ def ensemble(
     if isinstance(solver, Rodas5P) and solver.checkpoint is not None:
         raise InputError(f"solver = {solver!r}: runs of an ensemble keep no checkpoint; leave it "
                          f"out.")
-    if isinstance(solver, Rodas5P) and solver.inline_laws:
-        raise InputError(f"solver = {solver!r}: inline_laws is for single runs, those of small "
-                         f"systems in an ensemble go side by side; leave it out.")
     done, leave = [0], [False]
 
     series, collocation = (solver.series, solver.collocation) if isinstance(

@@ -260,9 +260,9 @@ def _depth_at_rest(system: ContactSystem, time: float) -> float:
 def require_rodas(solver: Solver) -> None:
     """Raise InputError unless a solver runs vector fields."""
     if (not isinstance(solver, Rodas5P) or solver.checkpoint is not None
-            or "always" in (solver.series, solver.collocation) or solver.inline_laws):
+            or "always" in (solver.series, solver.collocation)):
         raise InputError(f"solver = {solver!r}: vector fields are run by Rodas5P() without a "
-                         f"checkpoint, inline_laws, collocation = 'always' or series = 'always'.")
+                         f"checkpoint, collocation = 'always' or series = 'always'.")
 
 
 def require_max_step(max_step: Any) -> None:

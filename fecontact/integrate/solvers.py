@@ -94,11 +94,6 @@ class Rodas5P(Solver):
         default if ``rtol`` is 1e-7 or less, for plane systems of up to four modes and two nodes
         on flat ground, of laws without memory, without events; with derivatives or without. A run
         by series stays one.
-    inline_laws : bool
-        Whether the laws are written out in steps of Rodas5P instead of called, which takes 0.75 to
-        0.85 of the time: for plane systems of up to four modes and two nodes, of laws without
-        memory. It is compiled once for their laws, whatever the parameters, in about four seconds.
-        Results differ by rounding. Runs by series or by collocation stay as they are.
     checkpoint : path, optional
         File to which the run is saved every minute and on interruption. If it exists, the run is
         resumed from it with bit-for-bit the same results; it is removed at the end.
@@ -114,7 +109,7 @@ class Rodas5P(Solver):
     ------
     InputError
         If the checkpoint is not a path, or for other values; in a run, if series or collocation
-        are 'always' to be used, or laws to be written out, and cannot be.
+        are 'always' to be used, and cannot be.
 
     References
     ----------
@@ -125,7 +120,6 @@ class Rodas5P(Solver):
     keep_checkpoint: bool = False
     series: str = "auto"
     collocation: str = "auto"
-    inline_laws: bool = False
     workers: int | None = None
 
     locates_events: ClassVar[bool] = True
@@ -142,12 +136,7 @@ class Rodas5P(Solver):
                              "one of them out.")
         if self.checkpoint is not None:
             as_path(self.checkpoint, "a checkpoint")
-        require_kind("Rodas5P", bool, keep_checkpoint=self.keep_checkpoint,
-                     inline_laws=self.inline_laws)
-        for name in ("series", "collocation"):
-            if self.inline_laws and getattr(self, name) == "always":
-                raise InputError(f"Rodas5P: inline_laws = True is for steps without {name}, which "
-                                 f"is 'always' to be used; leave one of them out.")
+        require_kind("Rodas5P", bool, keep_checkpoint=self.keep_checkpoint)
         if self.workers is not None:
             as_count(self.workers, "Rodas5P: workers")
 
@@ -167,8 +156,7 @@ class Rodas5P(Solver):
         found = integrate(task.system, task.state, task.times, rtol=task.rtol,
                           max_step=task.max_step, progress=task.progress, checkpoint=path,
                           events=task.events, series=self.series,
-                          collocation=self.collocation, inline_laws=self.inline_laws,
-                          workers=self.workers)
+                          collocation=self.collocation, workers=self.workers)
         if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
             path.unlink(missing_ok=True)
         return found

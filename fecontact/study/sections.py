@@ -245,9 +245,6 @@ class SimulationSettings:
     collocation : str, optional
         For 'rodas5p': 'auto', 'always' or 'never'; whether steps are of order 9, which are longer
         where little error is allowed.
-    inline_laws : bool, optional
-        For 'rodas5p': whether the laws are written out in its steps, compiled once for them, which
-        takes less time for plane systems of few modes and nodes.
     workers : int, optional
         For 'rodas5p': threads that share the contact nodes of a step, where 256 or more may touch;
         by default as many as pay, in a sweep one.
@@ -276,7 +273,6 @@ class SimulationSettings:
     scheme: str | None = None
     series: str | None = None
     collocation: str | None = None
-    inline_laws: bool | None = None
     workers: int | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
@@ -308,7 +304,7 @@ class SimulationSettings:
             "tangential_restitution": self.tangential_restitution,
             "static_coefficient": self.static_coefficient, "scheme": self.scheme,
             "series": self.series, "collocation": self.collocation,
-            "inline_laws": self.inline_laws, "workers": self.workers})
+            "workers": self.workers})
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,6 @@ class Checkpoint:
                 mark.update(np.ascontiguousarray(item).tobytes())
         kind = b"steps" if run.collocation is None else b"collocation"
         mark.update(kind if run.series is None else b"series")
-        mark.update(b"" if run.with_laws is None else b"laws")
         return cls(path, run, mark.hexdigest())
 
     def read(self) -> None:

@@ -80,7 +80,6 @@ def start(
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
     collocation: str = "auto",
-    inline_laws: bool = False,
     workers: int = 1,
 ) -> Run:
     """A run from ``times[0]``, before its first step.
@@ -118,8 +117,6 @@ def start(
         Whether to expand the motion in power series; see :class:`fecontact.integrate.Rodas5P`.
     collocation : 'auto', 'always' or 'never'
         Whether to take steps by collocation; see there.
-    inline_laws : bool
-        Whether steps of Rodas5P are to have the laws written out; see there.
     workers : int
         Threads that share the contact nodes; results do not depend on it.
     """
@@ -143,12 +140,6 @@ def start(
     expanded = None if vary or collocation == "always" else chosen_series(
         system, state, times, rtol, max_step, events, work, series)
     collocated = None if expanded else chosen_collocation(system, rtol, events, collocation)
-    with_laws = None
-    if inline_laws and not (vary or expanded or collocated):
-        # Compiled for runs that need it only.
-        from fecontact.integrate.inlined_laws.step_loops import advance_with_laws
-
-        with_laws = advance_with_laws(system, problem)
     propagate, looser = 0, _LOOSER
     if vary and collocated:
         # Compiled for runs that need it only.
@@ -171,7 +162,7 @@ def start(
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate),
         watch_for(system, events, bool(vary)),
-        expanded, collocated, with_laws)
+        expanded, collocated)
 
 
 def again(run: Run, system: ContactSystem, state: Array) -> Run:
@@ -193,7 +184,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
         run.variation, run.watch,
         None if run.series is None else from_state(run.series, system, state),
         None if run.collocation is None else collocation_for(
-            system.basis.modes, system.basis.contact_nodes, control.rtol), run.with_laws)
+            system.basis.modes, system.basis.contact_nodes, control.rtol))
 
 
 def _team(modes: int, nodes: int, helpers: int) -> Team:
@@ -358,13 +349,12 @@ def integrate(
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
     collocation: str = "auto",
-    inline_laws: bool = False,
     workers: int | None = None,
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
     run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series,
-                collocation=collocation, inline_laws=inline_laws,
+                collocation=collocation,
                 workers=workers_for(system.basis.contact_nodes, workers))
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:

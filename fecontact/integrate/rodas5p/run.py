@@ -45,9 +45,6 @@ class Run:
         Tables of a system whose motion is expanded in power series; else None.
     collocation : Collocation or None
         What steps by collocation hand on, and their room; None for steps of Rodas5P.
-    with_laws : callable or None
-        The step loop in which the laws of the system are written out; None for one that calls
-        them.
     """
 
     problem: Problem
@@ -58,7 +55,6 @@ class Run:
     watch: Watch
     series: Series | None = None
     collocation: Collocation | None = None
-    with_laws: Callable[..., int] | None = None
     found: list[tuple[Array, Array]] = field(default_factory=list)
 
     @property
@@ -135,7 +131,7 @@ class Run:
             collocate = advance_by(self.problem)
             return lambda steps: collocate(self.problem, self.progress, self.room, self.output,
                                            self.collocation, self.variation, steps)
-        step = self.with_laws or advance_for(self.problem, self.variation)
+        step = advance_for(self.problem, self.variation)
         return lambda steps: step(self.problem, self.progress, self.room, self.output,
                                   self.variation, self.watch, steps)
 

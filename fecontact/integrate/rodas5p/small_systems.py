@@ -13,7 +13,6 @@ import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.references import constants
-from fecontact.integrate.inlined_laws.kernels import intermediate
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, step_loop
 from fecontact.integrate.rodas5p.blocks import BLOCKS, one_block
 from fecontact.integrate.rodas5p.variational import (
@@ -97,14 +96,13 @@ def compiled_address(signature: Any, function: Any, known: str) -> int:
 
 
 def compile_step_loops(last_first: bool = False) -> None:
-    """Compile the step loops of all sizes and keep what those with laws written out begin with.
+    """Compile the step loops of all sizes.
 
     This takes a fraction of the time while the step loop itself has just been compiled in this
     process. Two processes in opposite order share the work.
     """
     for size in reversed(SIZES) if last_first else SIZES:
         _advance(*size)
-    intermediate(step_loop.advance, step_loop.ADVANCE)
 
 
 def compile_usual() -> None:
