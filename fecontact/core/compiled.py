@@ -8,34 +8,30 @@ the kernel from Python spends no time on converting function objects.
 import dis
 import hashlib
 import inspect
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from numbers import Number
 from pathlib import Path
 from types import CodeType
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.core import sigutils
 from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.datamodel.models import PrimitiveModel
 from numba.core.errors import NumbaError
+from numba.core.registry import CPUDispatcher
+from numba.core.typing import Signature
 from numba.extending import intrinsic, lower_builtin, register_model
 
 from fecontact.core.errors import InputError
-from fecontact.core.kernel_parts import kernel_compiler, part
-
-f8 = types.float64
-i8 = types.int64
-vector = types.Array(f8, 1, "C")
-matrix = types.Array(f8, 2, "C")
-block = types.Array(f8, 3, "C")
-integers = types.Array(i8, 1, "C")
-
+from fecontact.core.kernel_parts import BorrowingCompiler, kernel_compiler, part
+from fecontact.core.records import signature_of
 
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
 
@@ -168,33 +164,82 @@ def _stamp(compiled: Any, function: Any, module: str = "", variant: str = "") ->
     stored: Any = getattr(compiled, "_cache", None)
     if isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
         mark = f".{hashlib.sha256(variant.encode()).hexdigest()[:16]}" if variant else ""
-        stored._cache_file = _StoredCode(stored.cache_path, stored._impl.filename_base + mark,
+        # Without the number of the line, which says nothing of what is compiled.
+        name = re.sub(r"-\d+(?=\.py)", "", stored._impl.filename_base)
+        stored._cache_file = _StoredCode(stored.cache_path, name + mark,
                                          (source_digest(function), module))
 
 
-def kernel(
-    signature: Any, *, constants: str = "", **options: Any,
-) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a function for one signature and keep the result on disk.
+class _Kernel(CPUDispatcher):
+    """A function for Python, compiled for one signature when it is first called.
 
-    Floating-point sums may be reordered (so that they vectorise), but NaN and infinity keep
-    their meaning. The stored code is renewed when the function changes, or anything that it is
-    compiled from, see :func:`source_digest`. With ``constants`` of
-    :func:`fecontact.core.references.constants` it serves for tuples with these values only.
+    Compiled functions that call it get the function itself as a part of theirs, see
+    :func:`routine`, with references to records.
     """
 
-    def compile_(function: Callable[..., Any]) -> Any:
-        settings: dict[str, Any] = {
-            "cache": True, "error_model": "numpy",
-            "fastmath": _FASTMATH, "pipeline_class": kernel_compiler(constants), **options,
-        }
-        dispatcher = njit(**settings)(function)
-        _stamp(dispatcher, dispatcher, variant=constants)
-        dispatcher.compile(signature)
-        dispatcher.disable_compile()
-        return dispatcher
+    given: Any = None
 
-    return compile_
+    @cached_property
+    def signature(self) -> Any:
+        """Arguments and result, as numba's types."""
+        return self.given or signature_of(self.py_func, by_reference=False)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return types.Dispatcher(self._inner)
+
+    @cached_property
+    def _inner(self) -> Any:
+        return routine(self.py_func)
+
+    def ready(self) -> Any:
+        """Itself, compiled."""
+        if not self.overloads:
+            self.compile(self.signature)
+            self.disable_compile()
+        return self
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled function, which takes arguments as compiled code gives them."""
+        found = self.ready().overloads[self.signature.args]
+        return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
+
+    def _compile_for_args(self, *arguments: Any, **by_name: Any) -> Any:
+        if self.overloads:
+            return super()._compile_for_args(*arguments, **by_name)
+        return self.ready()
+
+
+# All kernels of the modules that have been imported.
+KERNELS: list[_Kernel] = []
+
+
+def kernel(
+    function: Callable[..., Any] | None = None, *, signature: Any = None, constants: str = "",
+    **options: Any,
+) -> Any:
+    """Compile a function for the types of its annotations, at its first call; kept on disk.
+
+    Records and arrays belong to the caller, so that the function has references to them. Sums may
+    be reordered (so that they vectorise), but NaN and infinity keep their meaning. The stored code
+    is renewed when the function changes, or anything that it is compiled from, see
+    :func:`source_digest`. With ``constants`` of :func:`fecontact.core.references.constants` it
+    serves for records with these values only. ``signature`` says what annotations cannot.
+    """
+    if function is None:
+        return partial(kernel, signature=signature, constants=constants, **options)
+    function = getattr(function, "py_func", function)
+    settings: dict[str, Any] = {
+        "nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": _FASTMATH,
+        **options,
+    }
+    made = _Kernel(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
+    made.given = signature
+    made.enable_caching()
+    _stamp(made, made, variant=constants)
+    KERNELS.append(made)
+    return made
 
 
 def helper(function: Callable[..., Any]) -> Any:
@@ -246,7 +291,7 @@ class CompiledLaw:
                              f"parameters in __post_init__ of the law's class, and return a "
                              f"finite value everywhere.")
         law = CFunc(function, sigutils.normalize_signature(self._signature), {},
-                    {"error_model": "numpy"})
+                    {"error_model": "numpy"}, BorrowingCompiler)
         # Functions typed into a console have no file beside which they could be stored.
         if Path(inspect.getfile(function)).is_file():
             law.enable_caching()
@@ -261,9 +306,13 @@ class CompiledLaw:
         return law
 
 
-def compile_law(signature: Any, form: str, function: Callable[..., Any]) -> CompiledLaw:
-    """A scalar law for the given signature; ``form`` is that signature for people."""
-    return CompiledLaw(function, form, signature)
+def compile_law(contract: Any, form: str, function: Callable[..., Any]) -> CompiledLaw:
+    """A law of the types of ``contract``, a ``Callable[...]``; ``form`` is that for people."""
+    return CompiledLaw(function, form, _signature(contract))
+
+
+def _signature(contract: Any) -> Any:
+    return contract if isinstance(contract, Signature) else signature_of(contract)
 
 
 def _arguments(function: Callable[..., Any]) -> str:
@@ -322,12 +371,13 @@ def _call_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return builder.call(pointer, args[1:], attrs=attributes)
 
 
-def function_at(signature: Any, *, only_reads: bool = False) -> Any:
-    """A function for kernels that turns an address into a callable of this signature.
+def function_at(contract: Any, *, only_reads: bool = False) -> Any:
+    """A function for kernels that turns an address into a callable.
 
-    Functions that store nothing, ``only_reads``, leave what kernels have read as it was.
+    ``contract`` is its type, ``Callable[[...], ...]``. Functions that store nothing,
+    ``only_reads``, leave what kernels have read as it was.
     """
-    kind = _FunctionAt(signature, only_reads)
+    kind = _FunctionAt(_signature(contract), only_reads)
 
     @intrinsic
     def at(typingctx: Any, address: Any) -> Any:

@@ -9,9 +9,16 @@ from functools import cached_property
 from typing import Any
 
 from llvmlite.binding import Linkage, parse_assembly
+from numba.core import ir
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.ir_utils import build_definitions, mk_unique_var
 from numba.core.registry import CPUDispatcher
+from numba.core.untyped_passes import FixupArgs
+
+from fecontact.core.records import holds_arrays
+from fecontact.core.references import borrowed
 
 _NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -80,10 +87,50 @@ class _KernelLibrary(JITCodeLibrary):
                 function.name += ".inner"
 
 
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _Borrow(FunctionPass):
+    """Arrays and records that a kernel is given are borrowed from who calls it."""
+
+    _name = "borrow"
+
+    def __init__(self) -> None:
+        """Nothing to prepare."""
+
+    def run_pass(self, state: Any) -> bool:
+        """Put calls of :func:`borrowed` before the first use of arguments."""
+        blocks = state.func_ir.blocks
+        first = blocks[min(blocks)]
+        body = []
+        for step in first.body:
+            body.append(step)
+            if isinstance(step, ir.Assign) and isinstance(step.value, ir.Arg) and (
+                    holds_arrays(state.args[step.value.index])):
+                held = ir.Var(first.scope, mk_unique_var("held"), step.loc)
+                borrow = ir.Var(first.scope, mk_unique_var("borrow"), step.loc)
+                body += [
+                    ir.Assign(ir.Global("borrowed", borrowed, step.loc), borrow, step.loc),
+                    ir.Assign(ir.Expr.call(borrow, [held], (), step.loc), step.target, step.loc)]
+                step.target = held
+        first.body = body
+        state.func_ir._definitions = build_definitions(blocks)
+        return True
+
+
+class BorrowingCompiler(Compiler):
+    """A compiler of functions that borrow what they are given."""
+
+    def define_pipelines(self) -> Any:
+        """Numba's passes and that."""
+        passes, = super().define_pipelines()
+        passes.add_pass_after(_Borrow, FixupArgs)
+        passes.finalize()
+        return [passes]
+
+
 def kernel_compiler(constants: str) -> Any:
     """A compiler whose kernels have fixed values by :func:`fecontact.core.references.constants`."""
 
-    class KernelCompiler(Compiler):
+    class KernelCompiler(BorrowingCompiler):
         def define_pipelines(self) -> Any:
             state = self.state
             state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)

@@ -19,8 +19,18 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, i8, integers, kernel, matrix, vector
+from fecontact.core.compiled import kernel
 from fecontact.core.errors import MeshError
+from fecontact.core.records import (
+    Array4,
+    Block,
+    IntegerMatrix,
+    IntegerVector,
+    Matrix,
+    ShortBlock,
+    ShortVector,
+    Vector,
+)
 from fecontact.core.types import Array, Integers
 
 _index = types.Array(types.int32, 1, "C")
@@ -113,8 +123,11 @@ def pattern(dofs: Integers, size: int) -> tuple[Any, Any, Any]:
     return indptr.astype(np.int32), indices, slots
 
 
-@kernel(types.void(types.Array(i8, 2, "C"), integers, integers, integers, integers))
-def _row_lengths(dofs, starts, around, seen, indptr):
+@kernel
+def _row_lengths(
+    dofs: IntegerMatrix, starts: IntegerVector, around: IntegerVector, seen: IntegerVector,
+    indptr: IntegerVector,
+) -> None:
     """Fill indptr (N + 1,); the cells at node i are around[starts[i]:starts[i + 1]]."""
     total = 0
     for i in range(len(seen)):
@@ -127,9 +140,11 @@ def _row_lengths(dofs, starts, around, seen, indptr):
         indptr[i + 1] = total
 
 
-@kernel(types.void(types.Array(i8, 2, "C"), integers, integers, integers, integers, _index,
-                   _slots))
-def _rows(dofs, starts, around, seen, indptr, indices, slots):
+@kernel
+def _rows(
+    dofs: IntegerMatrix, starts: IntegerVector, around: IntegerVector, seen: IntegerVector,
+    indptr: IntegerVector, indices: ShortVector, slots: ShortBlock,
+) -> None:
     """Fill the column indices, and where each cell finds its entries."""
     width = dofs.shape[1]
     for i in range(len(seen)):
@@ -233,9 +248,11 @@ def _reference_integrals(element: Any) -> tuple[Array, Array]:
             np.einsum("q,qi,qj->ij", weights, values, values))
 
 
-@kernel(types.void(integers, block, vector, _reference, matrix, types.float64, types.float64,
-                   _slots, block, vector))
-def _add_affine(which, inverse, scale, gradients, masses, lateral, shear, slots, blocks, mass):
+@kernel
+def _add_affine(
+    which: IntegerVector, inverse: Block, scale: Vector, gradients: Array4, masses: Matrix,
+    lateral: float, shear: float, slots: ShortBlock, blocks: Block, mass: Vector,
+) -> None:
     """Add the affine cells ``which`` to the blocks of the stiffness and the entries of the mass."""
     width, dimension = slots.shape[1], blocks.shape[1]
     half, H = np.empty((3, 3)), np.empty((3, 3))
@@ -267,10 +284,12 @@ def _add_affine(which, inverse, scale, gradients, masses, lateral, shear, slots,
                             blocks[back, q, p] += entry
 
 
-@kernel(types.void(integers, matrix, types.Array(i8, 2, "C"), block, matrix, block, vector,
-                   types.float64, types.float64, _slots, block, vector))
-def _add_quadrature(which, nodes, corners, stretch, values, slopes, weights, lateral, shear, slots,
-                    blocks, mass):
+@kernel
+def _add_quadrature(
+    which: IntegerVector, nodes: Matrix, corners: IntegerMatrix, stretch: Block, values: Matrix,
+    slopes: Block, weights: Vector, lateral: float, shear: float, slots: ShortBlock, blocks: Block,
+    mass: Vector,
+) -> None:
     """Add the cells ``which`` by quadrature; ``stretch`` (q, g, 3) are slopes of their map."""
     width, dimension, points = slots.shape[1], blocks.shape[1], len(weights)
     J, I = np.empty((3, 3)), np.empty((3, 3))

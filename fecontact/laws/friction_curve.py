@@ -9,12 +9,12 @@ from functools import lru_cache
 from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
-from numba import types
 from scipy.optimize import brentq
 
 from fecontact.core.checks import as_floats
-from fecontact.core.compiled import CompiledLaw, f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import CompiledLaw, kernel
 from fecontact.core.errors import InputError
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at
 
@@ -43,8 +43,8 @@ _STEEP, _CREEP = 1e36, 1e-18
 _SEARCHED = np.geomspace(1e-6, 1e12, 4001)
 
 
-@kernel(types.void(i8, vector, f8, vector, matrix))
-def _sample(address, v, F, p, out):
+@kernel
+def _sample(address: int, v: Vector, F: float, p: Vector, out: Matrix) -> None:
     """Fill out (len(v), 2) with R/F and d(R/F)/dv."""
     for i in range(len(v)):
         R, slope, _ = friction_at(address)(v[i], F, p)

@@ -1,27 +1,27 @@
 """Vectorised evaluation of laws through their compiled functions."""
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at, memory_at, normal_at
 
 
-@kernel(types.void(i8, vector, vector, vector, matrix))
-def _normal(address, u, v, p, out):
+@kernel
+def _normal(address: int, u: Vector, v: Vector, p: Vector, out: Matrix) -> None:
     for k in range(len(u)):
         out[k, 0], out[k, 1], out[k, 2] = normal_at(address)(u[k], v[k], p)
 
 
-@kernel(types.void(i8, vector, vector, vector, matrix))
-def _friction(address, v, F, p, out):
+@kernel
+def _friction(address: int, v: Vector, F: Vector, p: Vector, out: Matrix) -> None:
     for k in range(len(v)):
         out[k, 0], out[k, 1], out[k, 2] = friction_at(address)(v[k], F[k], p)
 
 
-@kernel(types.void(i8, vector, vector, matrix, vector, block))
-def _memory(address, v, F, z, p, out):
+@kernel
+def _memory(address: int, v: Vector, F: Vector, z: Matrix, p: Vector, out: Block) -> None:
     for k in range(len(v)):
         memory_at(address)(v[k], F[k], z[k], p, out[k, 0], out[k, 1:])
 
@@ -83,8 +83,8 @@ def stored_energy(
     return energy.reshape(given.shape)
 
 
-@kernel(types.void(i8, matrix, matrix, f8, matrix))
-def _energy(address, penetration, p, scale, out):
+@kernel
+def _energy(address: int, penetration: Matrix, p: Matrix, scale: float, out: Matrix) -> None:
     """Fill out (N, n) from penetrations (N, n) and parameters (n, k)."""
     force = normal_at(address)
     for i in range(penetration.shape[0]):
@@ -104,8 +104,10 @@ def _energy(address, penetration, p, scale, out):
 _CYCLES, _STEPS = 6, 1000
 
 
-@kernel(types.void(i8, vector, f8, vector, vector, f8, vector))
-def _cycles(address, p, F, travel, z, step, work):
+@kernel
+def _cycles(
+    address: int, p: Vector, F: float, travel: Vector, z: Vector, step: float, work: Vector,
+) -> None:
     """Fill work with R v dt of every step: z by implicit Euler, forces at mid-step."""
     s = len(z)
     force, rates = np.empty(3 + s), np.empty((s, 3 + s))

@@ -48,26 +48,21 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from numba import types
-
 from fecontact.core.compiled import (
     CompiledLaw,
     compile_law,
-    f8,
     function_at,
-    i8,
-    matrix,
-    vector,
 )
 from fecontact.core.errors import InputError
+from fecontact.core.records import Matrix, Vector
 
-NORMAL = types.UniTuple(f8, 3)(f8, f8, vector)
-FRICTION = types.UniTuple(f8, 3)(f8, f8, vector)
-MEMORY = types.void(f8, f8, vector, vector, vector, matrix)
-PLANAR = types.void(i8, f8, f8, f8, vector, vector, vector, matrix)
-GROUND = types.UniTuple(f8, 3)(f8, vector)
-SURFACE = types.UniTuple(f8, 6)(f8, f8, vector)
-SIGNAL = types.UniTuple(f8, 2)(f8, vector)
+NORMAL = Callable[[float, float, Vector], tuple[float, float, float]]
+FRICTION = Callable[[float, float, Vector], tuple[float, float, float]]
+MEMORY = Callable[[float, float, Vector, Vector, Vector, Matrix], None]
+PLANAR = Callable[[int, float, float, float, Vector, Vector, Vector, Matrix], None]
+GROUND = Callable[[float, Vector], tuple[float, float, float]]
+SURFACE = Callable[[float, float, Vector], tuple[float, float, float, float, float, float]]
+SIGNAL = Callable[[float, Vector], tuple[float, float]]
 
 normal_at = function_at(NORMAL, only_reads=True)
 friction_at = function_at(FRICTION, only_reads=True)

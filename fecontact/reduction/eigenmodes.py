@@ -5,11 +5,11 @@ from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
-from numba import types
 
 from fecontact.core.checks import require_kind
-from fecontact.core.compiled import block, kernel, matrix, vector
+from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
+from fecontact.core.records import Block, IntegerMatrix, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.solid_motions import solid_rigid_modes, solid_strain_energies
@@ -270,8 +270,11 @@ def strain_energies(body: ElasticBody, shapes: Array) -> Array:
     return energies * body.thickness
 
 
-@kernel(types.void(block, matrix, types.Array(types.int64, 2, "C"), matrix, vector, vector))
-def _strain_energies(slopes, dx, nodes, shapes, elasticity, energies):
+@kernel
+def _strain_energies(
+    slopes: Block, dx: Matrix, nodes: IntegerMatrix, shapes: Matrix, elasticity: Vector,
+    energies: Vector,
+) -> None:
     """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions in x and y."""
     elements, points = dx.shape
     corners, modes = nodes.shape[1], len(energies)

@@ -1,9 +1,9 @@
 """Rigid modes of solids from their geometry and supports, and strain energies of their motions."""
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Array4, Block, IntegerMatrix, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
@@ -89,9 +89,11 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
     return energies
 
 
-@kernel(types.void(types.Array(types.float64, 4, "C"), matrix, types.Array(types.int64, 2, "C"),
-                   block, vector, vector))
-def _add_strain_energies(gradients, volume, nodes, fields, elasticity, energies):
+@kernel
+def _add_strain_energies(
+    gradients: Array4, volume: Matrix, nodes: IntegerMatrix, fields: Block, elasticity: Vector,
+    energies: Vector,
+) -> None:
     """Add the energies of some elements; gradients (e, q, k, 3) of their k shape functions."""
     elements, points = volume.shape
     corners, modes = nodes.shape[1], len(energies)

@@ -9,14 +9,13 @@ limit.
 from typing import Any
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, integers, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import ground_at
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
-    SYSTEM,
     SystemArrays,
     force_room,
     ground_motion,
@@ -82,8 +81,8 @@ def return_to_limits(t, y, s, counts, force, rates):
                 return_deflection(z, i, size, limit, s)
 
 
-@kernel(types.void(vector, matrix, SYSTEM, integers))
-def return_states(times, states, s, counts):
+@kernel
+def return_states(times: Vector, states: Matrix, s: SystemArrays, counts: IntegerVector) -> None:
     """Return all deflections of states (N, size) at N times to their limits."""
     count = s.memory.max()
     length, width = force_room(count, in_space(s))
@@ -92,8 +91,8 @@ def return_states(times, states, s, counts):
         return_to_limits(times[k], states[k], s, counts, force, rates)
 
 
-@kernel(types.void(types.float64, vector, SYSTEM, integers, matrix))
-def excesses(t, y, s, counts, out):
+@kernel
+def excesses(t: float, y: Vector, s: SystemArrays, counts: IntegerVector, out: Matrix) -> None:
     """Fill out (n, elements) with |z| less the limit of each element [m]; -inf where none is."""
     count = s.memory.max()
     length, width = force_room(count, in_space(s))
@@ -109,8 +108,8 @@ def excesses(t, y, s, counts, out):
                 out[j, i] = deflection_of(z, i, s) - limit_of(j, i, counts[j], pressing, s)
 
 
-@kernel(types.void(types.float64, vector, SYSTEM, integers, matrix))
-def stick_again(t, y, s, counts, ends):
+@kernel
+def stick_again(t: float, y: Vector, s: SystemArrays, counts: IntegerVector, ends: Matrix) -> None:
     """Return the elements to their limits for which ``ends`` (n, elements) is not zero."""
     count = s.memory.max()
     length, width = force_room(count, in_space(s))

@@ -3,15 +3,14 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
-    SYSTEM,
     SystemArrays,
     force_room,
     ground_motion,
@@ -22,8 +21,8 @@ from fecontact.system.nodes import (
 from fecontact.system.powers import storing_power
 
 
-@kernel(types.void(vector, matrix, SYSTEM, block))
-def bristle_history(times, states, s, out):
+@kernel
+def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) -> None:
     """Fill out (2, N, n): what the bristles store, and the power into it at constant force."""
     count = s.memory.max()
     length, width = force_room(count, in_space(s))
@@ -41,8 +40,8 @@ def bristle_history(times, states, s, out):
             out[1, i, j] = storing_power(j, F, z, rates, s)
 
 
-@kernel(types.void(f8, vector, SYSTEM))
-def _settle(t, y, s):
+@kernel
+def _settle(t: float, y: Vector, s: SystemArrays) -> None:
     """Bring z of each node to z' = 0 by implicit Euler steps of increasing length."""
     n = len(s.Tx)
     states = s.memory.max()

@@ -1,9 +1,9 @@
 """Compiled Jacobian of the reduced contact system; see :mod:`fecontact.system.kernels`."""
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, helper, kernel, matrix, routine, vector
+from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.system.kernels import (
     body_rates,
@@ -13,8 +13,8 @@ from fecontact.system.kernels import (
     rates_under,
 )
 from fecontact.system.nodes import (
-    SYSTEM,
     GroundMotion,
+    SystemArrays,
     force_room,
     ground_motion,
     in_space,
@@ -126,8 +126,8 @@ def _contact_gradients(t, y, s, gradients, active, out):
     return count
 
 
-@kernel(types.void(f8, vector, SYSTEM, matrix))
-def jacobian(t, y, s, out):
+@kernel
+def jacobian(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
     """Fill out (2 m + n s, 2 m + n s) with dy'/dy."""
     y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
@@ -159,8 +159,8 @@ def _fill_rates(t, x, s, load, force, rates, f):
         rates_under(load, moved, x[c], s, force, rates, f[c])
 
 
-@kernel(types.void(vector, matrix, SYSTEM, matrix))
-def batch_rates(t, x, s, f):
+@kernel
+def batch_rates(t: Vector, x: Matrix, s: SystemArrays, f: Matrix) -> None:
     """Fill f (N, 2 m + n s) with y' at times t (N,) and states x (N, 2 m + n s)."""
     states = s.memory.max()
     length, width = force_room(states, in_space(s))
@@ -270,8 +270,11 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                 _add_contact(j, F, T, T2, s, partial, gradient, out, A)
 
 
-@kernel(types.void(vector, matrix, SYSTEM, SYSTEM, f8, matrix, block, matrix))
-def batch_derivatives(t, x, s, r, h, f, J, P):
+@kernel
+def batch_derivatives(
+    t: Vector, x: Matrix, s: SystemArrays, r: SystemArrays, h: float, f: Matrix, J: Block,
+    P: Matrix,
+) -> None:
     """As :func:`batch_rates`, and fill J (N, d, d), d = 2 m + n s, with dy'/dy and P with dy'/dp.
 
     r holds the derivatives of all arrays to the parameter p, h is the step of differences in it,

@@ -20,13 +20,12 @@ for the second tangent has them last, so that the first ones are the same in the
 """
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 from fecontact.system.nodes import (
-    SYSTEM,
     SystemArrays,
     force_room,
     ground_motion,
@@ -135,8 +134,8 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
     return F, leaning(F, R, contact.slope, s), contact
 
 
-@kernel(types.void(f8, vector, SYSTEM, matrix))
-def contact_state(t, y, s, out):
+@kernel
+def contact_state(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
     """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node.
 
     In space (n, 8): with friction force and slip velocity along the second tangent.
@@ -243,8 +242,8 @@ def rates_under(load, moved, y, s, force, rates, out):
             out[2 * m + j * states + k] = rates[k, 0]
 
 
-@kernel(types.void(f8, vector, SYSTEM, vector))
-def right_hand_side(t, y, s, out):
+@kernel
+def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     """Fill out (2 m + n s,) with y'."""
     y, s = borrowed(y), borrowed(s)
     states = s.memory.max()
@@ -254,15 +253,17 @@ def right_hand_side(t, y, s, out):
     rates_under(load, moved, y, s, np.empty(length), np.empty((states, width)), out)
 
 
-@kernel(types.void(vector, matrix, SYSTEM, block))
-def contact_history(times, states, s, out):
+@kernel
+def contact_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) -> None:
     """Fill out (N, n, 6), in space (N, n, 8), with `contact_state` at N times."""
     for k in range(len(times)):
         contact_state(times[k], states[k], s, out[k])
 
 
-@kernel(types.void(integers, vector, vector, matrix, vector, vector))
-def normal_values(addresses, u, v, p, force, slope):
+@kernel
+def normal_values(
+    addresses: IntegerVector, u: Vector, v: Vector, p: Matrix, force: Vector, slope: Vector,
+) -> None:
     """Fill force and dF/du (k,) of the normal laws of k nodes at their penetrations and rates."""
     for j in range(len(u)):
         force[j], slope[j], _ = normal_at(addresses[j])(u[j], v[j], p[j])

@@ -6,10 +6,8 @@ Arrays of a contact system as its compiled functions see them; the equations are
 
 from typing import NamedTuple
 
-from numba import types
-
-from fecontact.core.compiled import block, f8, helper, i8, integers, matrix, vector
-from fecontact.core.types import Array, Integers
+from fecontact.core.compiled import helper
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.laws.signatures import ground_at, signal_at
 
 
@@ -28,40 +26,40 @@ class SystemArrays(NamedTuple):
     where that is 0 of ``profile`` along the unit vector ``wave_direction`` (2,).
     """
 
-    stiffness: Array
-    damping: Array
-    modal_damping: Array
-    constant_load: Array
-    drive_shapes: Array
-    drive_stiffness: Array
-    drive_damping: Array
-    load_shapes: Array
-    Tx: Array
-    Ty: Array
-    T2: Array
-    abscissa: Array
-    ordinate: Array
-    gap: Array
-    sliding: Array
-    sliding_across: Array
-    wave_direction: Array
-    sides: Array
-    bristle_stiffness: Array
-    normal_parameters: Array
-    friction_parameters: Array
-    profile_parameters: Array
-    friction_scale_parameters: Array
-    ground_motion_parameters: Array
-    second_motion_parameters: Array
-    drive_parameters: Array
-    load_parameters: Array
-    normal: Integers
-    friction: Integers
-    planar: Integers
-    memory: Integers
-    on_ground: Integers
-    drive: Integers
-    load: Integers
+    stiffness: Matrix
+    damping: Matrix
+    modal_damping: Matrix
+    constant_load: Vector
+    drive_shapes: Matrix
+    drive_stiffness: Vector
+    drive_damping: Vector
+    load_shapes: Matrix
+    Tx: Matrix
+    Ty: Matrix
+    T2: Matrix
+    abscissa: Vector
+    ordinate: Vector
+    gap: Vector
+    sliding: Vector
+    sliding_across: Matrix
+    wave_direction: Vector
+    sides: Matrix
+    bristle_stiffness: Block
+    normal_parameters: Matrix
+    friction_parameters: Matrix
+    profile_parameters: Vector
+    friction_scale_parameters: Vector
+    ground_motion_parameters: Vector
+    second_motion_parameters: Vector
+    drive_parameters: Matrix
+    load_parameters: Matrix
+    normal: IntegerVector
+    friction: IntegerVector
+    planar: IntegerVector
+    memory: IntegerVector
+    on_ground: IntegerVector
+    drive: IntegerVector
+    load: IntegerVector
     profile: int
     surface: int
     friction_scale: int
@@ -70,11 +68,6 @@ class SystemArrays(NamedTuple):
     leans: int
     space_node: int
 
-
-SYSTEM = types.NamedTuple(
-    [matrix, matrix, matrix, vector, matrix, vector, vector, matrix, matrix, matrix, matrix, vector,
-     vector, vector, vector, matrix, vector, matrix, block, matrix, matrix, vector, vector, vector,
-     vector, matrix, matrix, *[integers] * 7, *[i8] * 7], SystemArrays)
 
 # Entries that tell of a node in space: its NodeContact, F, and derivatives (4, 6).
 CONTACT_FIELDS, SPACE_ROWS, SPACE_COLUMNS = 11, 4, 6
@@ -90,9 +83,6 @@ class GroundMotion(NamedTuple):
     second_speed: float
 
 
-GROUND_MOTION = types.NamedUniTuple(f8, 4, GroundMotion)
-
-
 class NodeMotion(NamedTuple):
     """Displacements of a node along the ground, away from it and across, and their rates."""
 
@@ -102,9 +92,6 @@ class NodeMotion(NamedTuple):
     height_rate: float
     across: float
     across_rate: float
-
-
-NODE_MOTION = types.NamedUniTuple(f8, 6, NodeMotion)
 
 
 class NodeContact(NamedTuple):

@@ -3,14 +3,14 @@
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, helper, kernel, routine, vector
+from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.records import Vector
 from fecontact.core.references import borrowed
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system.kernels import friction_across, node_forces
 from fecontact.system.nodes import (
-    SYSTEM,
+    SystemArrays,
     force_room,
     ground_motion,
     in_space,
@@ -154,7 +154,9 @@ def set_powers(t, y, s, stick_speed, out, nodes):
                         force, rates, out, nodes)
 
 
-@kernel(types.void(f8, vector, SYSTEM, vector, vector, vector))
-def powers(t, y, s, stick_speed, out, nodes):
+@kernel
+def powers(
+    t: float, y: Vector, s: SystemArrays, stick_speed: Vector, out: Vector, nodes: Vector,
+) -> None:
     """As :func:`set_powers`."""
     set_powers(t, borrowed(y), borrowed(s), stick_speed, out, nodes)

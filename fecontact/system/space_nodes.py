@@ -6,18 +6,18 @@ for systems in space only. With slopes y_i of the ground along the tangents i = 
     u = y_R - y - g,    v_i = x_i' - V_i,    u' = y_1 v_1 + y_2 v_2 - y',    T_i = R_i + F y_i
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
-from numba import types
-
-from fecontact.core.compiled import compile_law, function_at, helper, i8, matrix, vector
+from fecontact.core.compiled import compile_law, function_at, helper
+from fecontact.core.records import Matrix, Vector
 from fecontact.laws.signatures import ground_at, normal_at, planar_at, surface_at
 from fecontact.system.nodes import (
     CONTACT_FIELDS,
-    GROUND_MOTION,
-    NODE_MOTION,
     SPACE_COLUMNS,
+    GroundMotion,
     NodeContact,
+    NodeMotion,
 )
 
 # Entries of a row of `SystemArrays.sides`.
@@ -37,9 +37,10 @@ class SpaceLaws(NamedTuple):
     scale: int
 
 
-_SPACE_NODE = types.void(
-    NODE_MOTION, GROUND_MOTION, types.NamedUniTuple(i8, 6, SpaceLaws), vector, vector, vector,
-    vector, vector, vector, vector, matrix)
+_SPACE_NODE = Callable[[
+    NodeMotion, GroundMotion, SpaceLaws, Vector, Vector, Vector, Vector, Vector, Vector, Vector,
+    Matrix,
+], None]
 space_node_at = function_at(_SPACE_NODE)
 
 

@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, helper, i8, integers, kernel, vector
-from fecontact.core.types import Array, Integers
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Block, IntegerVector, Vector
 
 EQUILIBRIUM, PERIODIC, APERIODIC = range(3)
 _BOX = 0.2  # part of their size by which boxes of the same aperiodic motion may differ
@@ -29,9 +28,9 @@ class Settled(NamedTuple):
         Whether the run is at rest, at its one point.
     """
 
-    points: Array
-    rows: Integers
-    still: Integers
+    points: Block
+    rows: IntegerVector
+    still: IntegerVector
 
 
 class Motions(NamedTuple):
@@ -46,14 +45,10 @@ class Motions(NamedTuple):
     number : (1,) integer array
     """
 
-    points: Array
-    rows: Integers
-    kind: Integers
-    number: Integers
-
-
-FOUND = types.NamedTuple([block, integers, integers], Settled)
-MOTIONS = types.NamedTuple([block, integers, integers, integers], Motions)
+    points: Block
+    rows: IntegerVector
+    kind: IntegerVector
+    number: IntegerVector
 
 
 @helper
@@ -140,8 +135,11 @@ def _keep(points, first, last, kind, p, motions):
     motions.rows[p], motions.kind[p] = last - first, kind
 
 
-@kernel(i8(i8, FOUND, vector, f8, integers, MOTIONS))
-def label_runs(first, found, scale, tolerance, label, motions):
+@kernel
+def label_runs(
+    first: int, found: Settled, scale: Vector, tolerance: float, label: IntegerVector,
+    motions: Motions,
+) -> int:
     """Label runs from ``first`` on, and add the motions that are new; the run reached.
 
     Runs that could not go on, or still settle, have label -1.

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Linearisation, Problem
-from fecontact.core.compiled import f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -23,20 +23,20 @@ def _product(weights, a, b):
     return total
 
 
-@kernel(f8(vector, vector, vector))
-def weighted_product(weights, a, b):
+@kernel
+def weighted_product(weights: Vector, a: Vector, b: Vector) -> float:
     """Sum w a b."""
     return _product(weights, a, b)
 
 
-@kernel(f8(vector, vector))
-def weighted_norm(weights, x):
+@kernel
+def weighted_norm(weights: Vector, x: Vector) -> float:
     """Square root of sum w x x."""
     return math.sqrt(_product(weights, x, x))
 
 
-@kernel(types.void(vector, vector, vector, vector, vector))
-def right_side(residual, row, u, guess, rhs):
+@kernel
+def right_side(residual: Vector, row: Vector, u: Vector, guess: Vector, rhs: Vector) -> None:
     """Fill rhs (N + 1,) with the negative residual (N,) and the negative row (u - guess)."""
     total = 0.0
     for k in range(len(u)):
@@ -46,8 +46,8 @@ def right_side(residual, row, u, guess, rhs):
     rhs[len(residual)] = -total
 
 
-@kernel(f8(vector, matrix, i8))
-def improve(weights, steps, count):
+@kernel
+def improve(weights: Vector, steps: Matrix, count: int) -> float:
     """Correct steps[count], made with the matrix of steps[0], by what those before it taught.
 
     Broyden's update of the matrix, applied as sums over the steps. Returns the step's length.

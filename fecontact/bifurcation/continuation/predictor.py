@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
-from fecontact.core.compiled import f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -63,8 +64,8 @@ def _shares(places, count, step, product, out):
         out[j] = total
 
 
-@kernel(i8(vector, matrix, f8, matrix))
-def _guesses(weights, trail, step, out):
+@kernel
+def _guesses(weights: Vector, trail: Matrix, step: float, out: Matrix) -> int:
     """Fill rows of out (4, n) with the guesses a step ahead; returns how many there are.
 
     ``trail`` (2 k, n) are u and tangent of the last point, of the one before it, and so on.

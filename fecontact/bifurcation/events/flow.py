@@ -13,9 +13,9 @@ change its sign.
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, helper, i8, integers, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import ERROR_3, ERROR_5, STAGES, A, B, C
 from fecontact.integrate.nonsmooth.equations import (
@@ -24,18 +24,18 @@ from fecontact.integrate.nonsmooth.equations import (
     pushing_row,
     slipping_force,
 )
-from fecontact.integrate.nonsmooth.event_search import ROOM
+from fecontact.integrate.nonsmooth.event_search import Room
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
     FORCE,
     GRIP,
     PENETRATION,
-    PROBLEM,
-    PROGRESS,
     RATE,
     SLIP,
     STICK,
-    WORKSPACE,
+    NonsmoothProblem,
+    Progress,
+    Workspace,
 )
 from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at
 from fecontact.integrate.nonsmooth.transitions import decide_clusters
@@ -144,10 +144,13 @@ def _error(h, sizes, rtol, slopes):
     return abs(h) * fifth * fifth / math.sqrt(fifth * fifth + 0.01 * third * third)
 
 
-@kernel(i8(PROBLEM, PROBLEM, PROBLEM, WORKSPACE, f8, f8, vector, f8, f8, vector, vector, integers,
-           integers, vector, vector, vector, matrix, matrix), nogil=True)
-def flow(held_p, held_above, held_below, held_w, change, tick, limits, begin, longest, times, start,
-         status, closed, sizes, full, rate, states, slopes):
+@kernel(nogil=True)
+def flow(
+    held_p: NonsmoothProblem, held_above: NonsmoothProblem, held_below: NonsmoothProblem,
+    held_w: Workspace, change: float, tick: float, limits: Vector, begin: float, longest: float,
+    times: Vector, start: Vector, status: IntegerVector, closed: IntegerVector, sizes: Vector,
+    full: Vector, rate: Vector, states: Matrix, slopes: Matrix,
+) -> int:
     """Fill ``states`` (N, d) at ``times`` (N,) after ``begin``, all of one sign and ascending in
     size; 1 if that fails, else 0.
 
@@ -230,9 +233,12 @@ def _pressed(j, p, w):
     return -law(-depth, max(-rate, 0.0), s.normal_parameters[j])[0]
 
 
-@kernel(types.void(PROBLEM, WORKSPACE, vector, matrix, integers, integers, vector, vector, matrix,
-                   matrix))
-def observe(held_p, held_w, times, states, status, closed, full, rate, margins, rates):
+@kernel
+def observe(
+    held_p: NonsmoothProblem, held_w: Workspace, times: Vector, states: Matrix,
+    status: IntegerVector, closed: IntegerVector, full: Vector, rate: Vector, margins: Matrix,
+    rates: Matrix,
+) -> None:
     """Fill what clusters and stops have left, (N, 2 k + n), and the rates (N, d), at states (N, d).
 
     Of a cluster c that slips the speed in its sense at 2 c and, on compliant contact, its normal
@@ -266,10 +272,12 @@ def observe(held_p, held_w, times, states, status, closed, full, rate, margins, 
                 margins[row, 2 * c + 1] = max(margins[row, 2 * c + 1], margins[row, place])
 
 
-@kernel(types.void(PROBLEM, WORKSPACE, f8, vector, integers, integers, vector, vector, matrix,
-                   matrix, vector, vector))
-def strike_rows(held_p, held_w, t, state, status, closed, full, rate, held, pushing, speeds,
-                coefficients):
+@kernel
+def strike_rows(
+    held_p: NonsmoothProblem, held_w: Workspace, t: float, state: Vector, status: IntegerVector,
+    closed: IntegerVector, full: Vector, rate: Vector, held: Matrix, pushing: Matrix,
+    speeds: Vector, coefficients: Vector,
+) -> None:
     """What an impact needs: rows held (n + k, m), pushing (n + k, m) of unit impulses, penetration
     rates and slip velocities (n + k,), and coefficients of friction (n,) at these.
     """
@@ -288,8 +296,11 @@ def strike_rows(held_p, held_w, t, state, status, closed, full, rate, held, push
         speeds[n + c] = w.slip[c]
 
 
-@kernel(f8(PROBLEM, WORKSPACE, PROGRESS, ROOM, f8, f8, f8))
-def decide(held_p, held_w, held_progress, held_room, t, near, slow):
+@kernel
+def decide(
+    held_p: NonsmoothProblem, held_w: Workspace, held_progress: Progress, held_room: Room,
+    t: float, near: float, slow: float,
+) -> float:
     """Change the contact state at a moment as a run does; NO_ACCELERATION or NO_IMPULSES where that
     is impossible, else the time of a flight.
 
@@ -305,8 +316,8 @@ def decide(held_p, held_w, held_progress, held_room, t, near, slow):
     return 0.0
 
 
-@kernel(types.void(PROBLEM, vector))
-def forces_of_touch(held_p, out):
+@kernel
+def forces_of_touch(held_p: NonsmoothProblem, out: Vector) -> None:
     """Fill out (n,) with the normal forces at first contact of dashpots, at a unit rate."""
     p = borrowed(held_p)
     for j in range(len(out)):
@@ -315,8 +326,8 @@ def forces_of_touch(held_p, out):
                   - law(_FIRST, 0.0, p.system.normal_parameters[j])[0])
 
 
-@kernel(types.void(PROBLEM, vector))
-def kinetic_coefficients(held_p, out):
+@kernel
+def kinetic_coefficients(held_p: NonsmoothProblem, out: Vector) -> None:
     """Fill out (n,) with the coefficients of friction at the begin of slip."""
     p = borrowed(held_p)
     for j in range(len(out)):

@@ -18,12 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import f8, helper, kernel
 from fecontact.core.dense_lu import factorise, solve, solve_rows
+from fecontact.core.records import Array4, Block, Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import SYSTEM, force_room, ground_motion, in_space, node_motion
+from fecontact.system.nodes import SystemArrays, force_room, ground_motion, in_space, node_motion
 
 _nodes = types.Array(f8, 4, "C")
 
@@ -66,8 +67,8 @@ def differences(z: Array) -> Array:
     return found
 
 
-@kernel(types.void(_nodes, f8, block))
-def solve_around(slopes, T, x):
+@kernel
+def solve_around(slopes: Array4, T: float, x: Block) -> None:
     """Replace right sides x (N, n s, columns) by the solutions z of D z / T - g_z z = x.
 
     ``slopes`` (N, n, s, s) holds the derivatives g_z of each of n nodes with s variables. The last
@@ -157,8 +158,8 @@ def _keep_within(start, brackets):
                 start[entry] = 0.5 * (brackets[2, entry] + brackets[3, entry])
 
 
-@kernel(i8(vector, matrix, SYSTEM, f8, matrix, matrix))
-def march(t, y, s, T, target, z):
+@kernel
+def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Matrix) -> int:
     """Fill z (N, c) with the internal variables that repeat; c = n nodes times their number.
 
     t (N,) are the times of the samples and y (N, d) the states, with the differences of the

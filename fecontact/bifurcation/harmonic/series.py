@@ -10,7 +10,8 @@ from functools import cache
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import f8, helper, i8, kernel, matrix
+from fecontact.core.compiled import f8, helper, kernel
+from fecontact.core.records import Array4, Matrix
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -140,8 +141,11 @@ def _fill(Cx, Sx, Cv, Sv, T, m, b, out):
                 out[row_s, i, row_c, i] -= turn
 
 
-@kernel(types.void(matrix, matrix, matrix, matrix, f8, i8, i8, _blocks))
-def fill_blocks(Cx, Sx, Cv, Sv, T, displacements, rows, out):
+@kernel
+def fill_blocks(
+    Cx: Matrix, Sx: Matrix, Cv: Matrix, Sv: Matrix, T: float, displacements: int, rows: int,
+    out: Array4,
+) -> None:
     """Fill out (2 H + 1, b, 2 H + 1, b) with the derivatives of the balance to coefficients.
 
     Cx, Sx (2 H + 1, b^2) are the cosine and sine coefficients k = 0..2 H, with the factor 2 / N for

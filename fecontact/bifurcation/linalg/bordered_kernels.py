@@ -7,16 +7,15 @@ of the border.
 """
 
 import numpy as np
-from numba import types
 
-from fecontact.bifurcation.linalg.condensation import FACTORS
+from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.linalg.lane_lu import (
     back_lanes,
     forward_lanes,
     forward_lanes_transposed,
     reduce_row_lanes,
 )
-from fecontact.core.compiled import f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import (
     backward,
     factorise,
@@ -26,6 +25,7 @@ from fecontact.core.dense_lu import (
 )
 from fecontact.core.dense_lu import solve as solve_dense
 from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.references import borrowed
 
 
@@ -55,8 +55,10 @@ def _take(given, first, group, groups, N, size, count, places, out):
                 out[c, lane] = 0.0
 
 
-@kernel(types.void(FACTORS, vector, vector, vector))
-def reduce_border(factors, given, weights, small):
+@kernel
+def reduce_border(
+    factors: CondensedFactors, given: Vector, weights: Vector, small: Vector,
+) -> None:
     """Reduce a border ``given`` (N m d + e,) to x_0, x_N and the common unknowns.
 
     Fills ``small`` (2 d + e,) and, over the pivot rows, ``weights``: the multiples of the reduced
@@ -121,8 +123,8 @@ def reduce_border(factors, given, weights, small):
         small[c] = whole[d + c]
 
 
-@kernel(types.void(FACTORS, vector, vector, vector))
-def reduce_side(factors, rhs, reduced, side):
+@kernel
+def reduce_side(factors: CondensedFactors, rhs: Vector, reduced: Vector, side: Vector) -> None:
     """Reduce the right-hand side of the collocation rows, the first N m d entries of ``rhs``.
 
     Fills ``reduced`` over the pivot rows and ``side`` (d,) for the rows of ``factors.end``.
@@ -173,8 +175,8 @@ def reduce_side(factors, rhs, reduced, side):
             side[i] = both[d + i]
 
 
-@kernel(types.void(FACTORS, vector, vector, vector))
-def original_rows(factors, reduced, end, out):
+@kernel
+def original_rows(factors: CondensedFactors, reduced: Vector, end: Vector, out: Vector) -> None:
     """Fill ``out`` (N m d,) with multiples of the collocation rows.
 
     Their sum is that of the pivot rows times ``reduced`` and of the rows of ``factors.end`` times
@@ -225,8 +227,11 @@ def original_rows(factors, reduced, end, out):
                     out[j * size + (order[i, lane] if inner else i)] = r[i, lane]
 
 
-@kernel(types.void(FACTORS, vector, vector, vector, vector, vector))
-def expand(factors, reduced, start, end, common, out):
+@kernel
+def expand(
+    factors: CondensedFactors, reduced: Vector, start: Vector, end: Vector, common: Vector,
+    out: Vector,
+) -> None:
     """Fill ``out`` (N m d,) with all nodes from x_0, x_N and the common unknowns."""
     factors, out, reduced = borrowed(factors), borrowed(out), borrowed(reduced)
     of_inner, of_chain, of_top = _parts(factors, reduced)
@@ -275,8 +280,11 @@ def expand(factors, reduced, start, end, common, out):
                     out[first + d + c] = known[c, lane]
 
 
-@kernel(types.void(FACTORS, vector, matrix, matrix, f8, vector))
-def solve(factors, rhs, weights, small, closing, out):
+@kernel
+def solve(
+    factors: CondensedFactors, rhs: Vector, weights: Matrix, small: Matrix, closing: float,
+    out: Vector,
+) -> None:
     """Fill ``out`` (N m d + e,) with the solution for a right-hand side of all rows.
 
     ``small`` (d + b, 2 d + e) are the reduced rows, those of ``factors.end`` first; ``weights``
@@ -308,8 +316,10 @@ def solve(factors, rhs, weights, small, closing, out):
     expand(factors, reduced, side[:d], end, side[d:], out[: N * size])
 
 
-@kernel(types.void(FACTORS, matrix, f8, f8, matrix))
-def solve_turned(factors, rhs, real, imaginary, out):
+@kernel
+def solve_turned(
+    factors: CondensedFactors, rhs: Matrix, real: float, imaginary: float, out: Matrix,
+) -> None:
     """Fill out (2, N m d) with the nodes for x(1) = (real + i imaginary) x(0), no common unknowns.
 
     Real parts stand in the first row and imaginary ones in the second, as in the right-hand sides

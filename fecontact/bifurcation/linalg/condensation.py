@@ -22,11 +22,12 @@ import numpy as np
 from numba import types
 
 from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
-from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import f8, helper, i8, kernel
 from fecontact.core.dense_lu import factorise
 from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
+from fecontact.core.records import Array4, Block, IntegerBlock, IntegerMatrix, Matrix, Vector
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 
 _pivots = types.Array(i8, 2, "C")
 _orders = types.Array(i8, 3, "C")
@@ -44,18 +45,14 @@ class CondensedFactors(NamedTuple):
     to be chained.
     """
 
-    inner: Array
-    inner_order: Integers
-    local: Array
-    chain: Array
-    chain_order: Integers
-    top: Array
-    top_pivots: Integers
-    end: Array
-
-
-FACTORS = types.NamedTuple([_groups, _orders, block, _groups, _orders, block, _pivots, matrix],
-                           CondensedFactors)
+    inner: Array4
+    inner_order: IntegerBlock
+    local: Block
+    chain: Array4
+    chain_order: IntegerBlock
+    top: Block
+    top_pivots: IntegerMatrix
+    end: Matrix
 
 
 def factors_for(intervals: int, points: int, states: int, common: int) -> CondensedFactors:
@@ -147,8 +144,8 @@ def _chain_segments(local, chain, order, end):
                 write(end[i, c], read(a[d + i, d + c]))
 
 
-@kernel(types.void(FACTORS))
-def chain_intervals(factors):
+@kernel
+def chain_intervals(factors: CondensedFactors) -> None:
     """Eliminate x_1, x_2, ... from the equations ``local`` of the intervals."""
     factors = borrowed(factors)
     top, end = factors.top, factors.end
@@ -178,8 +175,11 @@ def chain_intervals(factors):
                 end[i, c] = a[d + i, d + c]
 
 
-@kernel(types.void(block, matrix, block, vector, f8, matrix, matrix, i8, FACTORS))
-def condense(J, f, P, widths, T, values, slopes, with_period, factors):
+@kernel
+def condense(
+    J: Block, f: Matrix, P: Block, widths: Vector, T: float, values: Matrix, slopes: Matrix,
+    with_period: int, factors: CondensedFactors,
+) -> None:
     """Factorise the system of x' = T f on intervals.
 
     J (N m, d, d), f (N m, d) and P (N m, d, q) at the collocation points; values and slopes

@@ -12,11 +12,11 @@ unknowns. Eight intervals are solved at once, one in each SIMD lane.
 from functools import cache
 
 import numpy as np
-from numba import types
 
 from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
-from fecontact.core.compiled import block, f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -59,8 +59,10 @@ def _back(a, size, columns):
             c += 4
 
 
-@kernel(types.void(block, f8, vector, matrix, vector, block))
-def motion_transitions(J, h, points, A, b, out):
+@kernel
+def motion_transitions(
+    J: Block, h: float, points: Vector, A: Matrix, b: Vector, out: Block,
+) -> None:
     """Fill out (N, 2 m, 2 m) with the transition matrices of [q, q'] over N intervals of length h.
 
     J (N s, 2 m, 2 m) are the derivatives of [q', q''] at the collocation points, ``points`` (s,),

@@ -14,7 +14,8 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.transition_matrices import condense_products
-from fecontact.core.compiled import block, helper, kernel
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Block, ComplexVector
 from fecontact.core.types import Array
 
 _complex = types.complex128
@@ -182,8 +183,8 @@ def _plain_step(H, first, last, cosines, sines):
         _upward(H, k, cosines[k], sines[k])
 
 
-@kernel(types.boolean(block, _complex_vector))
-def product_eigenvalues(M, values):
+@kernel
+def product_eigenvalues(M: Block, values: ComplexVector) -> bool:
     """Fill the d eigenvalues of M[N - 1] ... M[0] (N, d, d), largest first; overwrites M.
 
     Returns whether the iteration converged.

@@ -3,16 +3,16 @@
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.bifurcation.linalg.condensation import FACTORS
-from fecontact.core.compiled import block, kernel
+from fecontact.bifurcation.linalg.condensation import CondensedFactors
+from fecontact.core.compiled import kernel
 from fecontact.core.dense_lu import factorise, solve_rows
+from fecontact.core.records import Block
 from fecontact.core.references import borrowed
 
 
-@kernel(types.void(FACTORS, block))
-def transitions(factors, out):
+@kernel
+def transitions(factors: CondensedFactors, out: Block) -> None:
     """Fill out (N, d, d) with the M_j of the condensed intervals, x_(j+1) = M_j x_j."""
     factors, out = borrowed(factors), borrowed(out)
     local = factors.local
@@ -27,8 +27,8 @@ def transitions(factors, out):
         solve_rows(a, pivots, out[j])
 
 
-@kernel(types.i8(block))
-def condense_products(M):
+@kernel
+def condense_products(M: Block) -> int:
     """Multiply neighbours of M (N, d, d) in place as long as no digits are lost.
 
     A product ends before the bound of its condition number exceeds 100. Returns the number of

@@ -5,10 +5,10 @@ slopes are (m, m + 1).
 """
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.references import borrowed
 
 # Smallest range of a state to which an error of it is related: in its scale (Newton's method leaves
@@ -20,8 +20,10 @@ _MOST_REACH = 2.0
 _CARRIED = 8.0
 
 
-@kernel(types.void(vector, vector, vector, vector, vector, vector))
-def fill_mesh(mesh, points, scales, widths, times, weights):
+@kernel
+def fill_mesh(
+    mesh: Vector, points: Vector, scales: Vector, widths: Vector, times: Vector, weights: Vector,
+) -> None:
     """Fill widths (N,), times (N m,) of the Gauss points, and weights of the inner product.
 
     The first d scales are those of the states, the others those of the last unknowns.
@@ -41,8 +43,10 @@ def fill_mesh(mesh, points, scales, widths, times, weights):
         weights[len(weights) - k] = 1.0 / scales[len(scales) - k] ** 2
 
 
-@kernel(types.void(matrix, vector, matrix, matrix, vector))
-def fill_phase_row(nodes, gauss_weights, values, slopes, row):
+@kernel
+def fill_phase_row(
+    nodes: Matrix, gauss_weights: Vector, values: Matrix, slopes: Matrix, row: Vector,
+) -> None:
     """Fill row with the nodes' weights (N m d,) in int <x, y'>, y with these nodes, then zeros."""
     nodes, row = borrowed(nodes), borrowed(row)
     values, slopes = borrowed(values), borrowed(slopes)
@@ -62,8 +66,8 @@ def fill_phase_row(nodes, gauss_weights, values, slopes, row):
                     row[node * d + i] += values[point, k] * rate
 
 
-@kernel(types.void(matrix, matrix, matrix, matrix, matrix))
-def at_points(nodes, values, slopes, x, rates):
+@kernel
+def at_points(nodes: Matrix, values: Matrix, slopes: Matrix, x: Matrix, rates: Matrix) -> None:
     """Fill x and rates (N k, d), values and interval-scaled slopes, from nodes (N m, d).
 
     Basis values and slopes (k, m + 1) are those at k points of an interval.
@@ -87,8 +91,10 @@ def at_points(nodes, values, slopes, x, rates):
                     rates[row, i] += slope * nodes[node, i]
 
 
-@kernel(types.void(matrix, matrix, vector, f8, vector, vector, vector))
-def fill_residual(slopes, f, widths, T, phase_row, u, out):
+@kernel
+def fill_residual(
+    slopes: Matrix, f: Matrix, widths: Vector, T: float, phase_row: Vector, u: Vector, out: Vector,
+) -> None:
     """Fill out with slopes - h T f (N m d,) and, where there is room, the phase condition."""
     slopes, f, out = borrowed(slopes), borrowed(f), borrowed(out)
     phase_row, u = borrowed(phase_row), borrowed(u)
@@ -106,8 +112,8 @@ def fill_residual(slopes, f, widths, T, phase_row, u, out):
         out[total * d] = phase
 
 
-@kernel(types.void(matrix, matrix, vector, matrix))
-def to_nodes(at_points, values, widths, out):
+@kernel
+def to_nodes(at_points: Matrix, values: Matrix, widths: Vector, out: Matrix) -> None:
     """Fill out (N m, d), the nodes' weights in sum_j h_j sum_c values_ck at_points_jc x_jk."""
     at_points, out = borrowed(at_points), borrowed(out)
     m = len(values)
@@ -125,8 +131,8 @@ def to_nodes(at_points, values, widths, out):
                     out[node, i] += weight * at_points[row, i]
 
 
-@kernel(f8(vector, matrix, matrix))
-def amplitude_along(weights, nodes, before):
+@kernel
+def amplitude_along(weights: Vector, nodes: Matrix, before: Matrix) -> float:
     """Amplitude of nodes (N m, d) about their mean along that of those before, in the latter."""
     weights, nodes, before = borrowed(weights), borrowed(nodes), borrowed(before)
     total, d = nodes.shape
@@ -153,8 +159,8 @@ def _power(x, m):
     return result
 
 
-@kernel(types.void(matrix, vector, vector))
-def fill_ranges(nodes, scales, sizes):
+@kernel
+def fill_ranges(nodes: Matrix, scales: Vector, sizes: Vector) -> None:
     """Fill sizes (d,) with the range of each state, to which its errors are related."""
     nodes, scales, sizes = borrowed(nodes), borrowed(scales), borrowed(sizes)
     most = 0.0
@@ -171,8 +177,11 @@ def fill_ranges(nodes, scales, sizes):
             sizes[i] = np.inf
 
 
-@kernel(types.void(matrix, matrix, vector, f8, matrix, vector, vector))
-def integrate_defect(slopes, f, widths, T, integrals, sizes, errors):
+@kernel
+def integrate_defect(
+    slopes: Matrix, f: Matrix, widths: Vector, T: float, integrals: Matrix, sizes: Vector,
+    errors: Vector,
+) -> None:
     """Fill errors (N,) with the largest |int (x' - h T f)| / size of all states.
 
     Infinite where rates are not finite.
@@ -196,8 +205,10 @@ def integrate_defect(slopes, f, widths, T, integrals, sizes, errors):
                     errors[j] = value if value < np.inf else np.inf
 
 
-@kernel(types.void(vector, matrix, vector, vector, vector))
-def fill_smooth_errors(widths, nodes, top, sizes, errors):
+@kernel
+def fill_smooth_errors(
+    widths: Vector, nodes: Matrix, top: Vector, sizes: Vector, errors: Vector,
+) -> None:
     """Fill errors (N,) with the largest h^(m+1) |x^(m+1)| / size of all states.
 
     The derivative is the larger one of those between an interval and its neighbours, each from the
@@ -227,8 +238,11 @@ def fill_smooth_errors(widths, nodes, top, sizes, errors):
             errors[after] = max(errors[after], rate * _power(other, m + 1))
 
 
-@kernel(types.void(matrix, matrix, block, vector, f8, matrix, matrix, vector, matrix, matrix))
-def fill_carried(slopes, f, J, widths, T, values, ends, weights, integrals, side):
+@kernel
+def fill_carried(
+    slopes: Matrix, f: Matrix, J: Block, widths: Vector, T: float, values: Matrix, ends: Matrix,
+    weights: Vector, integrals: Matrix, side: Matrix,
+) -> None:
     """Fill side (N m, d), right-hand sides of the collocation rows for errors at ends of intervals.
 
     Slopes and rates (2 N m, d) at the Gauss points of halves; J (N m, d, d) at those of intervals,

@@ -14,8 +14,9 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions
-from fecontact.core.compiled import i8, kernel, vector
+from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError, ModelWarning
+from fecontact.core.records import ComplexVector, Vector
 from fecontact.core.types import Array
 
 # Smallest and largest uncertainty of the distance of a multiplier from the unit circle.
@@ -184,8 +185,8 @@ _RESOLVED = 10.0
 _complex_vector = types.Array(types.complex128, 1, "C")
 
 
-@kernel(types.void(_complex_vector, i8, vector))
-def multiplier_tests(mu, trivial, out):
+@kernel
+def multiplier_tests(mu: ComplexVector, trivial: int, out: Vector) -> None:
     """Fill out (3,) with the products of mu + 1, mu - 1 and, over pairs, mu_i mu_k - 1, scaled.
 
     The multiplier ``trivial`` is excluded unless it is negative. The products change sign where a

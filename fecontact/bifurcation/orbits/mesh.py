@@ -9,10 +9,10 @@ from functools import cache
 from math import factorial
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import InputError
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
@@ -111,8 +111,8 @@ def _combined(nodes, j, weights, out):
             out[i] += weights[k] * nodes[node, i]
 
 
-@kernel(types.void(vector, matrix, vector, matrix))
-def _interpolate(mesh, nodes, times, out):
+@kernel
+def _interpolate(mesh: Vector, nodes: Matrix, times: Vector, out: Matrix) -> None:
     """Fill out (k, d); the times need not be in order."""
     mesh, nodes, times, out = borrowed(mesh), borrowed(nodes), borrowed(times), borrowed(out)
     m = len(nodes) // (len(mesh) - 1)
@@ -149,8 +149,8 @@ def _fill_other_mesh(mesh, renewed, given, weights, scales, out):
             out[index, renewed_total * d + k] = given[index, total * d + k]
 
 
-@kernel(types.void(vector, vector, i8, matrix, matrix))
-def carry_over(mesh, renewed, m, given, out):
+@kernel
+def carry_over(mesh: Vector, renewed: Vector, m: int, given: Matrix, out: Matrix) -> None:
     """Fill out (k, N' m d + e) with k periodic solutions (k, N m d + e) on another mesh.
 
     The last e entries, which are not nodes, are copied.
@@ -165,8 +165,10 @@ def interpolate(mesh: Array, nodes: Array, times: Array) -> Array:
     return result
 
 
-@kernel(types.void(vector, vector, matrix, matrix, vector))
-def compare_halves(mesh, weights, nodes, before, out):
+@kernel
+def compare_halves(
+    mesh: Vector, weights: Vector, nodes: Matrix, before: Matrix, out: Vector,
+) -> None:
     """Fill out (3,) with weighted sums: products of both differences, squares of those before, and
     squares of the nodes before about their mean.
 
@@ -201,8 +203,8 @@ def compare_halves(mesh, weights, nodes, before, out):
             out[2] += weight * (before[row, i] - mean[i]) ** 2
 
 
-@kernel(types.void(matrix, matrix, vector, vector))
-def _extremes(nodes, fine, low, high):
+@kernel
+def _extremes(nodes: Matrix, fine: Matrix, low: Vector, high: Vector) -> None:
     """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k points."""
     nodes, fine = borrowed(nodes), borrowed(fine)
     total, d = nodes.shape
@@ -286,8 +288,8 @@ def _monitor(mesh, nodes, top, share):
         share[j] = mean * (mesh[j + 1] - mesh[j])
 
 
-@kernel(types.void(vector, matrix, vector, vector))
-def _equidistribute(mesh, nodes, top, renewed):
+@kernel
+def _equidistribute(mesh: Vector, nodes: Matrix, top: Vector, renewed: Vector) -> None:
     """Fill a mesh, see :func:`equidistributed`."""
     mesh, nodes, top, renewed = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(renewed)
     N, intervals = len(mesh) - 1, len(renewed) - 1

@@ -1,11 +1,11 @@
 """The step loop by collocation: few long steps, each of which ends where forces switch."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, routine
+from fecontact.core.compiled import helper, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.collocation.columns import propagate_at
 from fecontact.integrate.collocation.courses import (
@@ -17,7 +17,7 @@ from fecontact.integrate.collocation.courses import (
     value_at,
     work_error,
 )
-from fecontact.integrate.collocation.room import BEGINS, COLLOCATION, ITERATIONS
+from fecontact.integrate.collocation.room import BEGINS, ITERATIONS, Collocation
 from fecontact.integrate.collocation.stages import foretell, solve_stages
 from fecontact.integrate.collocation.tableau import (
     ERROR_POWER,
@@ -49,10 +49,12 @@ from fecontact.integrate.rodas5p.step_loop import (
     RUNNING,
     add_jump,
 )
-from fecontact.integrate.rodas5p.variational import VARY, begin_anew, keep, write_columns
+from fecontact.integrate.rodas5p.variational import Vary, begin_anew, keep, write_columns
 from fecontact.system.nodes import ground_motion
 
-ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, COLLOCATION, VARY, i8)
+ADVANCE = Callable[[
+    state.Problem, state.Progress, state.Room, state.Output, Collocation, Vary, int,
+], int]
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.85, 0.1, 2.0
 _POWER = -1.0 / ERROR_POWER

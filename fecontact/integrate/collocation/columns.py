@@ -15,13 +15,14 @@ switch, so that columns are as accurate as the motion. What their course misses 
 which it has through the accelerations at its begin too, is their error.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
-from fecontact.core.compiled import f8, function_at, helper, routine
+from fecontact.core.compiled import function_at, helper, routine
 from fecontact.core.dense_lu import backward, factorise, forward
-from fecontact.core.references import Reference
 from fecontact.integrate.collocation.courses import look
-from fecontact.integrate.collocation.room import COLLOCATION
+from fecontact.integrate.collocation.room import Collocation
 from fecontact.integrate.collocation.stages import (
     move_back,
     place_scale,
@@ -45,7 +46,7 @@ from fecontact.integrate.collocation.tableau import (
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
-from fecontact.integrate.rodas5p.variational import VARY, add_matrices
+from fecontact.integrate.rodas5p.variational import Vary, add_matrices
 from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
@@ -59,8 +60,10 @@ from fecontact.system.nodes import (
 # A change of a force at once by more than this part of it is a jump.
 _JUMP = 1e-3
 
-PROPAGATE = f8(f8, f8, f8, f8, f8, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
-               Reference(run_arrays.ROOM), Reference(COLLOCATION), Reference(VARY))
+PROPAGATE = Callable[[
+    float, float, float, float, float, run_arrays.Problem, run_arrays.Progress, run_arrays.Room,
+    Collocation, Vary,
+], float]
 propagate_at = function_at(PROPAGATE)
 
 

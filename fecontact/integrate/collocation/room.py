@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, integers, matrix, vector
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.integrate import bernstein
 from fecontact.integrate.collocation.tableau import (
     PLACE_TERMS,
@@ -65,34 +63,29 @@ class Collocation(NamedTuple):
     """
 
     tolerance: float
-    flags: Integers
-    accelerations: Array
-    before: Array
-    matrix: Array
-    right: Array
-    pivots: Integers
-    small: Array
-    small_right: Array
-    small_pivots: Integers
-    given: Array
-    load: Array
-    speeds: Array
-    y: Array
-    after: Array
-    rate: Array
-    places: Array
-    rates: Array
-    powers: Array
-    work: Array
-    looked: Array
-    line: Array
-    halves: Array
-    found: Array
-
-
-COLLOCATION = types.NamedTuple(
-    [f8, integers, matrix, matrix, matrix, vector, integers, matrix, vector, integers, matrix,
-     matrix, *[vector] * 4, *[matrix] * 4, vector, matrix, matrix, vector], Collocation)
+    flags: IntegerVector
+    accelerations: Matrix
+    before: Matrix
+    matrix: Matrix
+    right: Vector
+    pivots: IntegerVector
+    small: Matrix
+    small_right: Vector
+    small_pivots: IntegerVector
+    given: Matrix
+    load: Matrix
+    speeds: Vector
+    y: Vector
+    after: Vector
+    rate: Vector
+    places: Matrix
+    rates: Matrix
+    powers: Matrix
+    work: Matrix
+    looked: Vector
+    line: Matrix
+    halves: Matrix
+    found: Vector
 
 
 def collocation_for(modes: int, nodes: int, rtol: float) -> Collocation:

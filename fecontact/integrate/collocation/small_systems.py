@@ -13,11 +13,11 @@ from fecontact.core.compiled import kernel
 from fecontact.core.references import constants
 from fecontact.integrate.collocation.advance import ADVANCE, advance
 from fecontact.integrate.collocation.columns import PROPAGATE, propagate
-from fecontact.integrate.collocation.room import COLLOCATION, collocation_for
+from fecontact.integrate.collocation.room import Collocation, collocation_for
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.integrate.rodas5p.small_systems import compiled_address
 from fecontact.integrate.rodas5p.state import Problem
-from fecontact.integrate.rodas5p.variational import VARIATION
+from fecontact.integrate.rodas5p.variational import Variation
 
 
 def advance_for(problem: Problem) -> Any:
@@ -47,13 +47,13 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all small systems of a size, for each type of tuples."""
     values = {**small_systems.fixed_values(modes, nodes), **_of_room(modes, nodes)}
     # Of any number of columns, or none.
-    del values[VARIATION]
+    del values[Variation]
     return values
 
 
 def _of_room(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     room = collocation_for(modes, nodes, 1.0)._asdict()
-    return {COLLOCATION: {
+    return {Collocation: {
         name: value.shape for name, value in room.items() if isinstance(value, np.ndarray)}}
 
 

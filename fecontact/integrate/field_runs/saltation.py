@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.reference.scipy import largest_motions
@@ -55,8 +55,8 @@ class Passage:
         return np.asarray(columns + self.jump[:, None] * ahead)
 
 
-@kernel(types.void(i8, vector, vector, matrix, vector))
-def _fill_forces(law, u, v, p, out):
+@kernel
+def _fill_forces(law: int, u: Vector, v: Vector, p: Matrix, out: Vector) -> None:
     """Fill out (n,) with F of nodes at penetrations u and rates v."""
     for j in range(len(u)):
         out[j] = normal_at(law)(u[j], v[j], p[j])[0]

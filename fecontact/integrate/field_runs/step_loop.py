@@ -4,20 +4,21 @@ The Jacobian J = df/dx of each step is the field's own; df/dt is a one-sided dif
 order over a ten thousandth of the step.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, i8, integers, kernel, matrix, routine, vector
+from fecontact.core.compiled import kernel, routine
 from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array, Integers
-from fecontact.integrate.field_runs.variational import VARIED, propagate, steepest
+from fecontact.core.types import Array
+from fecontact.integrate.field_runs.variational import Varied, propagate, steepest
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.event_kernels import (
     FOUND,
-    WATCH,
+    Watch,
     event_at,
     first_stop,
     full,
@@ -40,7 +41,7 @@ from fecontact.integrate.rodas5p.step_loop import (
     RUNNING,
     STOPPED,
 )
-from fecontact.system.fields.one_place import FIELD, derive_at, evaluate_at
+from fecontact.system.fields.one_place import FieldKernel, derive_at, evaluate_at
 
 # Entries of Progress.counts; those of Progress.numbers are those of `step_length`.
 OUTPUTS, STEPS, REJECTIONS, RATES, STARTED = range(5)
@@ -70,38 +71,38 @@ class Progress(NamedTuple):
         Jacobian at the state.
     """
 
-    numbers: Array
-    counts: Integers
-    state: Array
-    rate: Array
-    sizes: Array
-    J: Array
+    numbers: Vector
+    counts: IntegerVector
+    state: Vector
+    rate: Vector
+    sizes: Vector
+    J: Matrix
 
 
 class Room(NamedTuple):
     """Room for a step: its end, stages, factors, and what events are sought with."""
 
-    after: Array
-    rate_after: Array
-    J_after: Array
-    stages: Array
-    stage: Array
-    right: Array
-    base: Array
-    time_rate: Array
-    factors: Array
-    pivots: Integers
-    dense: Array
-    inner: Array
-    bound: Array
-    halves: Array
+    after: Vector
+    rate_after: Vector
+    J_after: Matrix
+    stages: Matrix
+    stage: Vector
+    right: Vector
+    base: Vector
+    time_rate: Vector
+    factors: Matrix
+    pivots: IntegerVector
+    dense: Matrix
+    inner: Matrix
+    bound: Matrix
+    halves: Matrix
 
 
 class Output(NamedTuple):
     """Output times (N,), states (N, d), error allowed in a step, longest step."""
 
-    times: Array
-    states: Array
+    times: Vector
+    states: Matrix
     rtol: float
     longest: float
 
@@ -116,11 +117,7 @@ class _View(NamedTuple):
     y: Array
 
 
-PROGRESS = types.NamedTuple([vector, integers, vector, vector, vector, matrix], Progress)
-ROOM = types.NamedTuple([vector, vector, matrix, matrix, vector, vector, vector, vector, matrix,
-                         integers, matrix, matrix, matrix, matrix], Room)
-OUTPUT = types.NamedTuple([vector, matrix, f8, f8], Output)
-ADVANCE = types.i8(FIELD, PROGRESS, ROOM, OUTPUT, VARIED, WATCH, i8)
+ADVANCE = Callable[[FieldKernel, Progress, Room, Output, Varied, Watch, int], int]
 
 
 @routine
@@ -252,8 +249,11 @@ def _go_on(step, progress, room):
     progress.counts[STEPS] += 1
 
 
-@kernel(ADVANCE, nogil=True)
-def advance(field, progress, room, output, varied, watch, most):
+@kernel(nogil=True)
+def advance(
+    field: FieldKernel, progress: Progress, room: Room, output: Output, varied: Varied,
+    watch: Watch, most: int,
+) -> int:
     """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
 
     Fills the states of the output times passed, and notes events in ``watch``; when that is full

@@ -15,11 +15,10 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., secti
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, helper, integers, matrix, routine, vector
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve_rows
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.integrate.rodas5p import tableau
 from fecontact.system.fields.one_place import derive_at
 
@@ -53,19 +52,15 @@ class Varied(NamedTuple):
         A state of the step, and its rates.
     """
 
-    columns: Array
-    transitions: Array
-    J: Array
-    slopes: Array
-    factors: Array
-    increments: Array
-    pivots: Integers
-    x: Array
-    f: Array
-
-
-VARIED = types.NamedTuple(
-    [matrix, block, block, block, matrix, matrix, integers, vector, vector], Varied)
+    columns: Matrix
+    transitions: Block
+    J: Block
+    slopes: Block
+    factors: Matrix
+    increments: Matrix
+    pivots: IntegerVector
+    x: Vector
+    f: Vector
 
 
 def varied_for(states: int, outputs: int) -> Varied:

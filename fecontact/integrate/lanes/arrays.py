@@ -11,9 +11,10 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import block, f8, i8, integers, matrix
+from fecontact.core.compiled import f8, i8
 from fecontact.core.lanes.vectors import WIDTH
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import Block, IntegerMatrix, IntegerVector, Matrix, Vector
+from fecontact.core.types import Array
 from fecontact.integrate.rodas5p import tableau
 
 _block4 = types.Array(f8, 4, "C")
@@ -38,33 +39,28 @@ class LaneSystem(NamedTuple):
     of the ground is constant.
     """
 
-    stiffness: Array
-    damping: Array
-    constant_load: Array
-    drive_shapes: Array
-    drive_stiffness: Array
-    drive_damping: Array
-    load_shapes: Array
-    Tx: Array
-    Ty: Array
-    gap: Array
-    sliding: Array
-    normal_parameters: Array
-    friction_parameters: Array
-    ground_motion_parameters: Array
-    drive_parameters: Array
-    load_parameters: Array
-    normal: Integers
-    friction: Integers
-    drive: Integers
-    load: Integers
+    stiffness: Block
+    damping: Block
+    constant_load: Matrix
+    drive_shapes: Block
+    drive_stiffness: Matrix
+    drive_damping: Matrix
+    load_shapes: Block
+    Tx: Block
+    Ty: Block
+    gap: Matrix
+    sliding: Matrix
+    normal_parameters: Block
+    friction_parameters: Block
+    ground_motion_parameters: Matrix
+    drive_parameters: Block
+    load_parameters: Block
+    normal: IntegerVector
+    friction: IntegerVector
+    drive: IntegerVector
+    load: IntegerVector
     ground_motion: int
     steady: int
-
-
-LANE_SYSTEM = types.NamedTuple(
-    [block, block, matrix, block, matrix, matrix, block, block, block, matrix, matrix, block,
-     block, matrix, block, block, *[integers] * 4, i8, i8], LaneSystem)
 
 
 class LaneControl(NamedTuple):
@@ -74,16 +70,13 @@ class LaneControl(NamedTuple):
     count as if it were that large, and the largest acceleration of the ground.
     """
 
-    displacement_scale: Array
-    slip_scale: Array
-    slow: Array
-    depth: Array
-    largest: Array
-    levels: Array
-    numbers: Array
-
-
-LANE_CONTROL = types.NamedTuple([matrix] * 5 + [block, matrix], LaneControl)
+    displacement_scale: Matrix
+    slip_scale: Matrix
+    slow: Matrix
+    depth: Matrix
+    largest: Matrix
+    levels: Block
+    numbers: Matrix
 
 
 class LaneProgress(NamedTuple):
@@ -111,26 +104,21 @@ class LaneProgress(NamedTuple):
         Lanes, one bit each, whose rates and forces are not known yet.
     """
 
-    numbers: Array
-    state: Array
-    extremes: Array
-    rate: Array
-    forces: Array
-    places: Array
-    speeds: Array
-    ground: Array
-    counts: Integers
-    runs: Integers
-    rows: Integers
-    fresh: Integers
+    numbers: Matrix
+    state: Matrix
+    extremes: Matrix
+    rate: Matrix
+    forces: Block
+    places: Matrix
+    speeds: Matrix
+    ground: Vector
+    counts: IntegerMatrix
+    runs: IntegerVector
+    rows: IntegerVector
+    fresh: IntegerVector
 
 
 _table = types.Array(i8, 2, "C")
-LANE_PROGRESS = types.NamedTuple(
-    [matrix] * 4 + [block, matrix, matrix, types.Array(f8, 1, "C"), _table, integers, integers,
-                    integers], LaneProgress)
-
-
 class LaneRoom(NamedTuple):
     """Room for one step of all lanes.
 
@@ -154,28 +142,24 @@ class LaneRoom(NamedTuple):
         Normal forces there.
     """
 
-    stages: Array
-    by_place: Array
-    by_speed: Array
-    work: Array
-    inverse: Array
-    answers: Array
-    stage: Array
-    right: Array
-    after: Array
-    base: Array
-    dense: Array
-    load: Array
-    time_rate: Array
-    places: Array
-    speeds: Array
-    forces: Array
-    inner: Array
-    inner_forces: Array
-
-
-LANE_ROOM = types.NamedTuple(
-    [block] * 6 + [matrix] * 4 + [block] + [matrix] * 4 + [block] * 3, LaneRoom)
+    stages: Block
+    by_place: Block
+    by_speed: Block
+    work: Block
+    inverse: Block
+    answers: Block
+    stage: Matrix
+    right: Matrix
+    after: Matrix
+    base: Matrix
+    dense: Block
+    load: Matrix
+    time_rate: Matrix
+    places: Matrix
+    speeds: Matrix
+    forces: Block
+    inner: Block
+    inner_forces: Block
 
 
 class LaneRuns(NamedTuple):
@@ -197,22 +181,18 @@ class LaneRuns(NamedTuple):
         How many of the queue have been taken, its length, and whether more may follow; attempts.
     """
 
-    parameters: Array
-    starts: Array
-    times: Array
-    states: Array
-    follows: Integers
-    ends: Integers
-    queue: Integers
-    counts: Integers
+    parameters: Matrix
+    starts: Matrix
+    times: Matrix
+    states: Block
+    follows: IntegerVector
+    ends: IntegerMatrix
+    queue: IntegerVector
+    counts: IntegerVector
 
 
 TAKEN, WAITING, OPEN, ATTEMPTS = range(4)
 STATUS, OUTPUTS, STEPS, REJECTIONS = range(4)
-LANE_RUNS = types.NamedTuple(
-    [matrix, matrix, matrix, block, integers, _table, integers, integers], LaneRuns)
-
-
 def _views(table: Array, shapes: Sequence[tuple[int, ...]]) -> list[Array]:
     """Parts of a table (rows, 8), of given shapes without the lanes."""
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
@@ -233,16 +213,12 @@ def _progress_shapes(modes: int) -> list[tuple[int, ...]]:
 class Lanes(NamedTuple):
     """Eight lanes of one worker: tables, and their parts by name."""
 
-    parameters: Array
-    start: Array
+    parameters: Matrix
+    start: Matrix
     system: LaneSystem
     control: LaneControl
     progress: LaneProgress
     room: LaneRoom
-
-
-LANES = types.NamedTuple(
-    [matrix, matrix, LANE_SYSTEM, LANE_CONTROL, LANE_PROGRESS, LANE_ROOM], Lanes)
 
 
 def lanes_for(

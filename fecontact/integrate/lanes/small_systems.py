@@ -41,16 +41,16 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     laws = [np.zeros(count, dtype=np.int64) for count in (n, n, 2, 0)]
     lanes = arrays.lanes_for(_filled(shapes), _filled(limits), [*laws, 0, 0], m, n)
     return {
-        arrays.LANE_SYSTEM: {
+        arrays.LaneSystem: {
             **{name: (*shape, WIDTH)
                for name, shape in zip(arrays.LaneSystem._fields, shapes, strict=False)},
             "normal": (n,), "friction": (n,), "drive": (2,)},
-        arrays.LANE_CONTROL: {
+        arrays.LaneControl: {
             name: (*shape, WIDTH)
             for name, shape in zip(arrays.LaneControl._fields, limits, strict=True)},
-        arrays.LANE_PROGRESS: _shapes(lanes.progress),
-        arrays.LANE_ROOM: _shapes(lanes.room),
-        arrays.LANE_RUNS: {"states": (None, None, 2 * m)},
+        arrays.LaneProgress: _shapes(lanes.progress),
+        arrays.LaneRoom: _shapes(lanes.room),
+        arrays.LaneRuns: {"states": (None, None, 2 * m)},
         **small_systems.fixed_values(m, n),
     }
 

@@ -5,9 +5,11 @@ its own. A lane whose run has ended takes the next one that waits. No lane has a
 another one computes, so that results do not depend on which runs are side by side.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
-from fecontact.core.compiled import helper, i8, routine
+from fecontact.core.compiled import helper, routine
 from fecontact.core.lanes.functions import reciprocal_fifth_root
 from fecontact.core.lanes.vectors import (
     WIDTH,
@@ -50,8 +52,9 @@ from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FI
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.system.nodes import GroundMotion
 
-ADVANCE = i8(arrays.LANES, arrays.LANE_RUNS, run_arrays.PROBLEM, run_arrays.PROGRESS,
-             run_arrays.ROOM, i8)
+ADVANCE = Callable[[
+    arrays.Lanes, arrays.LaneRuns, run_arrays.Problem, run_arrays.Progress, run_arrays.Room, int,
+], int]
 # How a call returned: so many attempts were made, lanes are free that more runs may take, or all
 # runs have ended.
 GOES_ON, HUNGRY, DONE = range(3)

@@ -12,11 +12,12 @@ slips is proportional to these. The state of these kernels is Y = [q, q', work, 
 node].
 """
 
-from numba import types
+from collections.abc import Callable
 
-from fecontact.core.compiled import compile_law, f8, function_at, helper, integers, vector
+from fecontact.core.compiled import compile_law, function_at, helper
 from fecontact.core.dense_lu import factorise, solve
-from fecontact.core.references import Reference, borrowed
+from fecontact.core.records import IntegerVector, Vector
+from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
     CURVED,
@@ -26,12 +27,12 @@ from fecontact.integrate.nonsmooth.problem import (
     LIMIT,
     PENETRATION,
     PRESSING,
-    PROBLEM,
     RATE,
     SLIP,
     SLOPE,
     STICK,
-    WORKSPACE,
+    NonsmoothProblem,
+    Workspace,
 )
 from fecontact.laws.signatures import friction_at, normal_at, signal_at
 from fecontact.system.kernels import body_acceleration, given_at
@@ -47,8 +48,9 @@ from fecontact.system.powers import (
 )
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
-DERIVATIVE = types.void(f8, vector, Reference(PROBLEM), integers, integers, Reference(WORKSPACE),
-                        vector)
+DERIVATIVE = Callable[[
+    float, Vector, NonsmoothProblem, IntegerVector, IntegerVector, Workspace, Vector,
+], None]
 _derivative_at = function_at(DERIVATIVE)
 
 

@@ -6,16 +6,16 @@ step's interpolation to the last digits, and repeated with the shorter length.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative, place_size
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
-from fecontact.integrate.nonsmooth.event_search import ROOM, ROUNDING, first_changes, least_depth
+from fecontact.integrate.nonsmooth.event_search import ROUNDING, Room, first_changes, least_depth
 from fecontact.integrate.nonsmooth.problem import (
     DEPTH_SIZE,
     DIVERGED,
@@ -26,14 +26,10 @@ from fecontact.integrate.nonsmooth.problem import (
     HELD,
     LAST_ERROR,
     LENGTH,
-    LIMITS,
     OPEN,
-    OUTPUT,
     OUTPUTS,
     PARADOX,
     PENETRATION,
-    PROBLEM,
-    PROGRESS,
     RATE,
     RATE_SIZE,
     REJECTED,
@@ -46,8 +42,12 @@ from fecontact.integrate.nonsmooth.problem import (
     STUCK,
     TIME,
     UNSOLVED,
-    WORKSPACE,
+    Limits,
+    NonsmoothProblem,
+    Output,
+    Progress,
     Step,
+    Workspace,
 )
 from fecontact.integrate.nonsmooth.rigid_stops import (
     NO_ACCELERATION,
@@ -59,7 +59,7 @@ from fecontact.integrate.nonsmooth.steps.flights import YOUNG, advance
 from fecontact.integrate.nonsmooth.steps.rates import set_rates, set_slips, share
 from fecontact.integrate.nonsmooth.steps.releases import holding, set_left
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
-from fecontact.integrate.rodas5p.event_kernels import WATCH
+from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.system.powers import DRIVE, drive_jump
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
@@ -310,12 +310,14 @@ def _stop_within(step, part, p, progress, output, w, room):
     progress.clock[TIME] = reached
 
 
-RUN = types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, WATCH, i8)
+RUN = Callable[[NonsmoothProblem, Limits, Progress, Output, Workspace, Room, Watch, int], int]
 
 
-@kernel(RUN, nogil=True)
-def run_events(held_p, held_limits, held_progress, held_output, held_w, held_room, held_watch,
-               most):
+@kernel(nogil=True)
+def run_events(
+    held_p: NonsmoothProblem, held_limits: Limits, held_progress: Progress, held_output: Output,
+    held_w: Workspace, held_room: Room, held_watch: Watch, most: int,
+) -> int:
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
 
     The rows of ``output`` are filled as ``progress.counts`` says. Ends early where the table of

@@ -8,14 +8,22 @@ whose changes of sign are found however close.
 
 # Compiled functions: their types are those of their signatures for numba.
 
-from fecontact.core.compiled import compile_law, f8, function_at, helper, i8, routine
-from fecontact.core.references import Reference
+from collections.abc import Callable
+
+from fecontact.core.compiled import compile_law, function_at, helper, routine
 from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
 from fecontact.integrate.courses import MOST
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
 from fecontact.integrate.nonsmooth.equations import derivative
-from fecontact.integrate.nonsmooth.event_search import ROOM
-from fecontact.integrate.nonsmooth.problem import FORCE, PROBLEM, PROGRESS, STEP, STICK, WORKSPACE
+from fecontact.integrate.nonsmooth.event_search import Room
+from fecontact.integrate.nonsmooth.problem import (
+    FORCE,
+    STICK,
+    NonsmoothProblem,
+    Progress,
+    Step,
+    Workspace,
+)
 from fecontact.integrate.rodas5p.event_kernels import (
     FIRST_OWN,
     FOUND,
@@ -26,15 +34,14 @@ from fecontact.integrate.rodas5p.event_kernels import (
     SLIPPING,
     STICKING,
     TOUCH_DOWN,
-    WATCH,
+    Watch,
     event_at,
 )
 from fecontact.integrate.rodas5p.event_kernels import STICK as STICK_BEGINS
 
 # What is noted: the state at the start, a step or a part of it, a change of contact.
 BEGIN, WITHIN, CHANGED = range(3)
-NOTE = f8(STEP, f8, i8, Reference(PROBLEM), Reference(PROGRESS), Reference(WORKSPACE),
-          Reference(ROOM), Reference(WATCH))
+NOTE = Callable[[Step, float, int, NonsmoothProblem, Progress, Workspace, Room, Watch], float]
 note_at = function_at(NOTE)
 
 _LOOKS, _HALVINGS = 16, 44

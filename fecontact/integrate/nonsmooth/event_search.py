@@ -14,10 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
-from fecontact.core.compiled import helper, matrix, routine, vector
-from fecontact.core.types import Array
+from fecontact.core.compiled import helper, routine
+from fecontact.core.records import FlagVector, Matrix, Vector
 from fecontact.integrate.bernstein import (
     DEPTH,
     FINEST,
@@ -92,41 +91,37 @@ class Room(NamedTuple):
         the acceleration and the height of one of them over the step.
     """
 
-    slopes: Array
-    parts: Array
-    new: Array
-    state: Array
-    rate: Array
-    place: Array
-    nested: Array
-    bound: Array
-    along: Array
-    values: Array
-    halves: Array
-    left: Array
-    scale: Array
-    ends: Array
-    waiting: Array
-    past: NDArray[np.bool_]
-    fresh: NDArray[np.bool_]
-    released: NDArray[np.bool_]
-    arrived: NDArray[np.bool_]
-    held: NDArray[np.bool_]
-    touched: NDArray[np.bool_]
-    parting: NDArray[np.bool_]
-    given: Array
-    loads: Array
-    pushes: Array
-    flights: Array
-    pull: Array
-    heights: Array
+    slopes: Matrix
+    parts: Matrix
+    new: Vector
+    state: Vector
+    rate: Vector
+    place: Vector
+    nested: Vector
+    bound: Vector
+    along: Vector
+    values: Vector
+    halves: Matrix
+    left: Matrix
+    scale: Vector
+    ends: Matrix
+    waiting: Matrix
+    past: FlagVector
+    fresh: FlagVector
+    released: FlagVector
+    arrived: FlagVector
+    held: FlagVector
+    touched: FlagVector
+    parting: FlagVector
+    given: Vector
+    loads: Vector
+    pushes: Vector
+    flights: Matrix
+    pull: Vector
+    heights: Vector
 
 
 _flags = types.Array(types.boolean, 1, "C")
-ROOM = types.NamedTuple([matrix] * 2 + [vector] * 8 + [matrix] * 2 + [vector, matrix, matrix]
-                        + [_flags] * 7 + [vector] * 3 + [matrix] + [vector] * 2, Room)
-
-
 def room_for(problem: NonsmoothProblem, size: int) -> Room:
     """Room for a problem whose state is of this size."""
     n, (k, m) = len(problem.cluster), problem.rows.shape

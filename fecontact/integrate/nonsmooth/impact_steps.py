@@ -36,9 +36,8 @@ Mechanics and Engineering 177 (1999).
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel, routine
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.dense_lu import solve
 from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.equations import stick_limit
@@ -50,22 +49,22 @@ from fecontact.integrate.nonsmooth.problem import (
     GOING_ON,
     IMPACTS,
     LENGTH,
-    LIMITS,
-    OUTPUT,
     OUTPUTS,
-    PROBLEM,
-    PROGRESS,
     REJECTED,
     STARTED,
     STEPS,
     STUCK,
     TIME,
     UNSOLVED,
+    Limits,
+    NonsmoothProblem,
+    Output,
+    Progress,
     Step,
 )
 from fecontact.integrate.nonsmooth.space_contact import contact_of, scale_of
 from fecontact.integrate.nonsmooth.space_impulses import (
-    IMPACT_ROOM,
+    ImpactRoom,
     find_impulses,
     put_on_ground,
     set_matrix,
@@ -297,8 +296,11 @@ def _fastest(p, room):
     return fastest
 
 
-@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, IMPACT_ROOM, i8), nogil=True)
-def run_impact_steps(held_p, held_limits, held_progress, held_output, held_room, most):
+@kernel(nogil=True)
+def run_impact_steps(
+    held_p: NonsmoothProblem, held_limits: Limits, held_progress: Progress, held_output: Output,
+    held_room: ImpactRoom, most: int,
+) -> int:
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended."""
     p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
     output, room = borrowed(held_output), borrowed(held_room)

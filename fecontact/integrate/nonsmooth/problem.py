@@ -1,14 +1,13 @@
 """What the kernels of set-valued contact share: the problem, room to work in, names of columns."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import f8, i8, integers, matrix, vector
-from fecontact.core.types import Array, Integers
-from fecontact.system.nodes import SYSTEM
+from fecontact.core.records import IntegerVector, Matrix, Vector
+from fecontact.core.types import Array
+from fecontact.system.nodes import SystemArrays
 from fecontact.system.powers import POWER_COUNT
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
@@ -58,24 +57,20 @@ class NonsmoothProblem(NamedTuple):
     latter is 0 without rigid stops too.
     """
 
-    system: Any
-    static: Array
-    cluster: Integers
-    rows: Array
-    sliding: Array
+    system: SystemArrays
+    static: Vector
+    cluster: IntegerVector
+    rows: Matrix
+    sliding: Vector
     tick: float
     rigid: int
-    restitution: Array
-    tangential: Array
+    restitution: Vector
+    tangential: Vector
     poisson: int
-    relief: Array
+    relief: Vector
     steady: int
     derivative: int
     change: int
-
-
-PROBLEM = types.NamedTuple([SYSTEM, vector, integers, matrix, vector, f8, i8, vector, vector, i8,
-                            vector, i8, i8, i8], NonsmoothProblem)
 
 
 class Limits(NamedTuple):
@@ -85,13 +80,10 @@ class Limits(NamedTuple):
     the error is not measured relative to the state; ``longest`` is the longest step.
     """
 
-    stops: Array
-    floor: Array
+    stops: Vector
+    floor: Vector
     rtol: float
     longest: float
-
-
-LIMITS = types.NamedTuple([vector, vector, f8, f8], Limits)
 
 
 class Progress(NamedTuple):
@@ -102,17 +94,13 @@ class Progress(NamedTuple):
     of implicit steps, in space (2 n,) along the first tangents and then along the second ones.
     """
 
-    clock: Array
-    counts: Integers
-    state: Array
-    status: Integers
-    closed: Integers
-    largest: Array
-    carried: Array
-
-
-PROGRESS = types.NamedTuple([vector, integers, vector, integers, integers, vector, vector],
-                            Progress)
+    clock: Vector
+    counts: IntegerVector
+    state: Vector
+    status: IntegerVector
+    closed: IntegerVector
+    largest: Vector
+    carried: Vector
 
 
 class Output(NamedTuple):
@@ -121,13 +109,10 @@ class Output(NamedTuple):
     In space friction (N, 2 n), as in `Progress`.
     """
 
-    times: Array
-    states: Array
-    friction: Array
-    normal: Array
-
-
-OUTPUT = types.NamedTuple([vector, matrix, matrix, matrix], Output)
+    times: Vector
+    states: Matrix
+    friction: Matrix
+    normal: Matrix
 
 
 class Step(NamedTuple):
@@ -138,26 +123,19 @@ class Step(NamedTuple):
     latest: float
 
 
-STEP = types.NamedUniTuple(f8, 3, Step)
-
-
 class Workspace(NamedTuple):
     """Results per node and per cluster of the last evaluation, and room for small systems."""
 
-    nodes: Array
-    friction: Array
-    total: Array
-    limit: Array
-    pressing: Array
-    slip: Array
-    matrix: Array
-    right: Array
-    indices: Integers
-    pivots: Integers
-
-
-WORKSPACE = types.NamedTuple([matrix, vector, vector, vector, vector, vector, matrix, vector,
-                              integers, integers], Workspace)
+    nodes: Matrix
+    friction: Vector
+    total: Vector
+    limit: Vector
+    pressing: Vector
+    slip: Vector
+    matrix: Matrix
+    right: Vector
+    indices: IntegerVector
+    pivots: IntegerVector
 
 
 def tangents(problem: NonsmoothProblem) -> int:

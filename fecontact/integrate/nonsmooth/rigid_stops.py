@@ -23,11 +23,13 @@ Lectures 302 (1988). F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral
 # Compiled functions: their types are those of their signatures for numba.
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from fecontact.core.compiled import compile_law, f8, function_at, routine, vector
-from fecontact.core.references import Reference, borrowed
+from fecontact.core.compiled import compile_law, function_at, routine
+from fecontact.core.records import Vector
+from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.contact_conditions import (
     Conditions,
     new_case,
@@ -44,7 +46,7 @@ from fecontact.integrate.nonsmooth.equations import (
     speed_rate,
     stick_limit,
 )
-from fecontact.integrate.nonsmooth.event_search import ROOM
+from fecontact.integrate.nonsmooth.event_search import Room
 from fecontact.integrate.nonsmooth.problem import (
     CLOSED,
     CREEP,
@@ -56,14 +58,14 @@ from fecontact.integrate.nonsmooth.problem import (
     IMPACTS,
     OPEN,
     PENETRATION,
-    PROBLEM,
-    PROGRESS,
     RATE,
     RATE_SIZE,
     SLIP_SIZE,
     SLOPE,
     STICK,
-    WORKSPACE,
+    NonsmoothProblem,
+    Progress,
+    Workspace,
 )
 from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
 from fecontact.integrate.nonsmooth.steps.rates import set_prescribed
@@ -86,8 +88,9 @@ _RATE_ROUNDING = 1e-14
 # Corrections of the places of stops that close or open.
 _MOST_CORRECTIONS = 5
 
-CHANGE = f8(f8, Reference(PROBLEM), Reference(PROGRESS), Reference(ROOM), Reference(WORKSPACE), f8,
-            f8, f8, vector)
+CHANGE = Callable[[
+    float, NonsmoothProblem, Progress, Room, Workspace, float, float, float, Vector,
+], float]
 change_contacts_at = function_at(CHANGE)
 
 

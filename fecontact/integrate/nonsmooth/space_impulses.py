@@ -27,9 +27,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import helper, i8, integers, matrix, routine, vector
+from fecontact.core.compiled import helper, i8, routine
 from fecontact.core.dense_lu import factorise, solve
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import IntegerMatrix, IntegerVector, Matrix, Vector
 from fecontact.integrate.nonsmooth.problem import NonsmoothProblem
 from fecontact.integrate.nonsmooth.space_contact import contact_of
 from fecontact.system.nodes import ground_motion
@@ -75,40 +75,35 @@ class ImpactRoom(NamedTuple):
     touching, pivots : (n,), (m,) arrays
     """
 
-    rows: Array
-    pushes: Array
-    coupling: Array
-    given: Array
-    before: Array
-    after: Array
-    impulses: Array
-    rest: Array
-    slopes: Array
-    sides: Array
-    weights: Array
-    grip: Array
-    sticking: Array
-    slipping: Array
-    matrix: Array
-    middle: Array
-    change: Array
-    rates: Array
-    largest: Array
-    whole: Array
-    half: Array
-    end: Array
-    forces: Array
-    closed: Integers
-    touching: Integers
-    pivots: Integers
+    rows: Matrix
+    pushes: Matrix
+    coupling: Matrix
+    given: Vector
+    before: Vector
+    after: Vector
+    impulses: Vector
+    rest: Vector
+    slopes: Vector
+    sides: Vector
+    weights: Vector
+    grip: Vector
+    sticking: Vector
+    slipping: Vector
+    matrix: Matrix
+    middle: Vector
+    change: Vector
+    rates: Vector
+    largest: Vector
+    whole: Vector
+    half: Vector
+    end: Vector
+    forces: Matrix
+    closed: IntegerMatrix
+    touching: IntegerVector
+    pivots: IntegerVector
 
 
 _flags = types.Array(i8, 2, "C")
-IMPACT_ROOM = types.NamedTuple(
-    [matrix] * 3 + [vector] * 11 + [matrix] + [vector] * 7 + [matrix, _flags] + [integers] * 2,
-    ImpactRoom)
-
-
 def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
     """Room for a problem."""
     n, m = problem.system.Tx.shape

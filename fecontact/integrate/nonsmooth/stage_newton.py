@@ -19,19 +19,18 @@ solution methods, Computer Methods in Applied Mechanics and Engineering 92 (1991
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, function_at, helper, i8, matrix, vector
-from fecontact.core.references import Reference
-from fecontact.core.types import Array
+from fecontact.core.compiled import function_at, helper
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
-from fecontact.integrate.nonsmooth.problem import CREEP, PROBLEM
+from fecontact.integrate.nonsmooth.problem import CREEP, NonsmoothProblem
 from fecontact.laws.signatures import friction_at
 from fecontact.system.kernels import normal_gradients
-from fecontact.system.nodes import GROUND_MOTION, in_space, leaning, node_contact, node_motion
+from fecontact.system.nodes import GroundMotion, in_space, leaning, node_contact, node_motion
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
@@ -51,12 +50,9 @@ class Stage(NamedTuple):
 
     t: float
     g: float
-    start: Array
-    known: Array
-    Y: Array
-
-
-STAGE = types.NamedTuple([f8, f8, vector, vector, vector], Stage)
+    start: Vector
+    known: Vector
+    Y: Vector
 
 
 class Hold(NamedTuple):
@@ -68,13 +64,10 @@ class Hold(NamedTuple):
     :data:`fecontact.integrate.nonsmooth.space_contact.linearise_in_space`.
     """
 
-    grip: Array
-    multiplier: Array
-    side: Array
+    grip: Vector
+    multiplier: Vector
+    side: Vector
     linearise: int
-
-
-HOLD = types.NamedTuple([vector, vector, vector, i8], Hold)
 
 
 class NewtonRoom(NamedTuple):
@@ -86,21 +79,19 @@ class NewtonRoom(NamedTuple):
     matrix; ``balance`` and ``residual`` (m,).
     """
 
-    gradients: Array
-    active: Array
-    partial: Array
-    linear: Array
-    matrix: Array
-    balance: Array
-    residual: Array
-
-
-NEWTON_ROOM = types.NamedTuple([block] * 2 + [matrix] * 3 + [vector] * 2, NewtonRoom)
+    gradients: Block
+    active: Block
+    partial: Matrix
+    linear: Matrix
+    matrix: Matrix
+    balance: Vector
+    residual: Vector
 
 
 # What evaluates the contact of a stage in space: number of nodes under force and creep velocity.
-LINEARISE = types.UniTuple(f8, 2)(STAGE, GROUND_MOTION, Reference(PROBLEM), Reference(HOLD), i8,
-                                  Reference(NEWTON_ROOM), vector)
+LINEARISE = Callable[[
+    Stage, GroundMotion, NonsmoothProblem, Hold, int, NewtonRoom, Vector,
+], tuple[float, float]]
 _linearise_at = function_at(LINEARISE)
 
 

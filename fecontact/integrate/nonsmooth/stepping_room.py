@@ -1,30 +1,25 @@
 """Room for implicit steps with set-valued friction, and what is called by its address in space."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, i8, matrix, vector
-from fecontact.core.references import Reference
-from fecontact.core.types import Array
+from fecontact.core.records import Matrix, Vector
 from fecontact.integrate.bernstein import DEPTH, fit
 from fecontact.integrate.nonsmooth.problem import (
-    PROBLEM,
-    STEP,
-    WORKSPACE,
     NonsmoothProblem,
+    Step,
+    Workspace,
     node_columns,
     tangents,
 )
 from fecontact.integrate.nonsmooth.stage_newton import (
-    HOLD,
-    NEWTON_ROOM,
     Hold,
     NewtonRoom,
     newton_room_for,
 )
-from fecontact.system.nodes import GROUND_MOTION
+from fecontact.system.nodes import GroundMotion
 from fecontact.system.powers import POWER_COUNT
 
 STAGES = 3
@@ -42,10 +37,8 @@ class InSpace(NamedTuple):
 
 
 IN_PLANE = InSpace(0, 0, 0, 0)
-IN_SPACE = types.NamedUniTuple(i8, 4, InSpace)
-
-OBSERVE = types.void(GROUND_MOTION, vector, Reference(PROBLEM), matrix)
-POWERS = types.void(GROUND_MOTION, Reference(PROBLEM), matrix, vector, vector)
+OBSERVE = Callable[[GroundMotion, Vector, NonsmoothProblem, Matrix], None]
+POWERS = Callable[[GroundMotion, NonsmoothProblem, Matrix, Vector, Vector], None]
 
 
 class Room(NamedTuple):
@@ -76,28 +69,24 @@ class Room(NamedTuple):
     newton: NewtonRoom
     hold: Hold
     space: InSpace
-    states: Array
-    accelerations: Array
-    forces: Array
-    rates: Array
-    start: Array
-    known: Array
-    new: Array
-    before: Array
-    after: Array
-    old: Array
-    sides: Array
-    inertia: Array
-    cubic: Array
-    speed: Array
-    halves: Array
+    states: Matrix
+    accelerations: Matrix
+    forces: Matrix
+    rates: Matrix
+    start: Vector
+    known: Vector
+    new: Vector
+    before: Vector
+    after: Vector
+    old: Matrix
+    sides: Vector
+    inertia: Vector
+    cubic: Vector
+    speed: Vector
+    halves: Matrix
 
 
-ROOM = types.NamedTuple(
-    [NEWTON_ROOM, HOLD, IN_SPACE] + [matrix] * 4 + [vector] * 5 + [matrix] + [vector] * 4
-    + [matrix], Room)
-
-SLIPS_BACK = f8(i8, STEP, Reference(PROBLEM), Reference(WORKSPACE), f8, Reference(ROOM))
+SLIPS_BACK = Callable[[int, Step, NonsmoothProblem, Workspace, float, Room], float]
 
 
 def room_for(problem: NonsmoothProblem, space: InSpace = IN_PLANE) -> Room:

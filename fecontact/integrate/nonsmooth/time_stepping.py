@@ -12,9 +12,8 @@ Numerical Analysis 14 (1977).
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import function_at, helper, i8, kernel
+from fecontact.core.compiled import function_at, helper, kernel
 from fecontact.core.references import borrowed
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
@@ -26,12 +25,8 @@ from fecontact.integrate.nonsmooth.problem import (
     GOING_ON,
     LENGTH,
     LIMIT,
-    LIMITS,
-    OUTPUT,
     OUTPUTS,
     PENETRATION,
-    PROBLEM,
-    PROGRESS,
     RATE,
     REJECTED,
     SLIP,
@@ -41,17 +36,21 @@ from fecontact.integrate.nonsmooth.problem import (
     STEPS,
     STUCK,
     TIME,
-    WORKSPACE,
+    Limits,
+    NonsmoothProblem,
+    Output,
+    Progress,
     Step,
+    Workspace,
 )
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
 from fecontact.integrate.nonsmooth.stepping_room import (
     OBSERVE,
     POWERS,
-    ROOM,
     SLIPS_BACK,
     STAGES,
     THIRDS,
+    Room,
 )
 from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
 from fecontact.system.powers import DRIVE, body_powers, drive_jump
@@ -339,8 +338,11 @@ def pass_break(step, t, p, progress, output):
         output.states[last, first + DRIVE] += work
 
 
-@kernel(types.i8(PROBLEM, LIMITS, PROGRESS, OUTPUT, WORKSPACE, ROOM, i8), nogil=True)
-def run_steps(held_p, held_limits, held_progress, held_output, held_w, held_room, most):
+@kernel(nogil=True)
+def run_steps(
+    held_p: NonsmoothProblem, held_limits: Limits, held_progress: Progress, held_output: Output,
+    held_w: Workspace, held_room: Room, most: int,
+) -> int:
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
 
     The rows of ``output`` are filled as ``progress.counts`` says.

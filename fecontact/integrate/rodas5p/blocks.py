@@ -13,7 +13,8 @@ from numba import types
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from fecontact.core.compiled import helper, i8, integers, matrix
+from fecontact.core.compiled import helper, i8
+from fecontact.core.records import IntegerBlock, IntegerMatrix, IntegerVector, Matrix
 from fecontact.core.types import Array, Integers
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.nodes import SystemArrays
@@ -50,24 +51,20 @@ class Blocks(NamedTuple):
         In this order, ends of the columns and, with the fill-in of pivoting, of the rows.
     """
 
-    nodes: Integers
-    used: Integers
-    shapes: Array
-    parts: Integers
-    tiles: Integers
-    spans: Integers
-    own: Integers
-    coupled: Integers
-    pairs: Integers
-    position: Integers
-    reach: Integers
+    nodes: IntegerVector
+    used: IntegerVector
+    shapes: Matrix
+    parts: IntegerMatrix
+    tiles: IntegerMatrix
+    spans: IntegerBlock
+    own: IntegerMatrix
+    coupled: IntegerMatrix
+    pairs: IntegerMatrix
+    position: IntegerVector
+    reach: IntegerMatrix
 
 
 _TABLE = types.Array(i8, 2, "C")
-BLOCKS = types.NamedTuple(
-    [integers, integers, matrix, _TABLE, _TABLE, types.Array(i8, 3, "C"), _TABLE, _TABLE, _TABLE,
-     integers, _TABLE], Blocks)
-
 # So few nodes are always taken as near: to find out costs more.
 FEW = 16
 

@@ -7,10 +7,8 @@ The same equations as :mod:`fecontact.system.kernels`, laid out for speed, by th
 import math
 from typing import NamedTuple
 
-from numba import types
-
-from fecontact.core.compiled import block, helper, matrix, routine
-from fecontact.core.types import Array
+from fecontact.core.compiled import helper, routine
+from fecontact.core.records import Block, Matrix
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system import kernels, nodes
@@ -30,12 +28,9 @@ class Gradients(NamedTuple):
     In space (n, 4, 6), (n, 2 (4 + s)) and (n, s, 4 + s), of friction in two directions.
     """
 
-    partial: Array
-    force: Array
-    rates: Array
-
-
-GRADIENTS = types.NamedTuple([block, matrix, block], Gradients)
+    partial: Block
+    force: Matrix
+    rates: Block
 
 
 @routine

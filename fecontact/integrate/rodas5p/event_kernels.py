@@ -8,31 +8,26 @@ known at the looks only.
 """
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 
 from fecontact.core.compiled import (
     compile_law,
-    f8,
     function_at,
     helper,
-    i8,
-    integers,
-    matrix,
     routine,
-    vector,
 )
-from fecontact.core.references import Reference
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import IntegerVector, Matrix, Vector
+from fecontact.core.types import Array
 from fecontact.integrate import bernstein
 from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, Course, changes
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau
 from fecontact.system import kernels, nodes
 
-EVENT = f8(f8, vector, vector)
+EVENT = Callable[[float, Vector, Vector], float]
 event_at = function_at(EVENT)
 
 # Kinds of events; a user's event k is FIRST_OWN + k.
@@ -81,30 +76,28 @@ class Watch(NamedTuple):
         the normal forces.
     """
 
-    stick_speed: Array
-    curve_speed: Array
-    curve: Array
-    zones: Integers
-    own: Integers
-    own_parameters: Array
-    own_values: Array
-    own_direction: Integers
-    linear: Integers
-    places: Array
-    known: Integers
-    changed: Array
+    stick_speed: Vector
+    curve_speed: Vector
+    curve: Matrix
+    zones: IntegerVector
+    own: IntegerVector
+    own_parameters: Matrix
+    own_values: Vector
+    own_direction: IntegerVector
+    linear: IntegerVector
+    places: Matrix
+    known: IntegerVector
+    changed: Vector
     note: int
-    stops: Integers
-    found: Array
-    states: Array
-    counts: Integers
+    stops: IntegerVector
+    found: Matrix
+    states: Matrix
+    counts: IntegerVector
 
 
-WATCH = types.NamedTuple(
-    [vector, vector, matrix, integers, integers, matrix, vector, integers, integers, matrix,
-     integers, vector, i8, integers, matrix, matrix, integers], Watch)
-NOTE = f8(run_arrays.STEP_TYPE, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
-          Reference(run_arrays.ROOM), Reference(WATCH))
+NOTE = Callable[[
+    run_arrays.Step, run_arrays.Problem, run_arrays.Progress, run_arrays.Room, Watch,
+], float]
 note_events_at = function_at(NOTE)
 
 

@@ -8,12 +8,14 @@ Forces are continuous at both ends of slip, and the derivatives of a deflection 
 the limit become those of the limit.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
-from fecontact.core.compiled import compile_law, f8, function_at, i8, routine, vector
-from fecontact.core.references import Reference
+from fecontact.core.compiled import compile_law, function_at, routine
+from fecontact.core.records import Vector
 from fecontact.integrate.rodas5p import dynamics, state, tableau
-from fecontact.integrate.rodas5p.variational import VARY
+from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.system.elastic_sliders import (
     SHORT,
     deflection_of,
@@ -25,8 +27,9 @@ from fecontact.system.elastic_sliders import (
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import force_room, ground_motion, in_space, memory_of, node_motion
 
-_ATTEND = f8(i8, state.STEP_TYPE, Reference(state.PROBLEM), Reference(state.PROGRESS),
-             Reference(state.ROOM), Reference(VARY), f8, vector)
+_ATTEND = Callable[[
+    int, state.Step, state.Problem, state.Progress, state.Room, Vary, float, Vector,
+], float]
 attend_at = function_at(_ATTEND)
 
 # Requests: the part of the step until slip ends or begins; a state at a time within its

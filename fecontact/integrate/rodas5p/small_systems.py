@@ -14,17 +14,17 @@ import numpy as np
 from fecontact.core.compiled import kernel
 from fecontact.core.references import constants
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, step_loop
-from fecontact.integrate.rodas5p.blocks import BLOCKS, one_block
+from fecontact.integrate.rodas5p.blocks import Blocks, one_block
 from fecontact.integrate.rodas5p.variational import (
     PROPAGATE,
-    VARIATION,
+    Variation,
     Vary,
     propagate,
     propagate_in_parts,
     variation_for,
 )
-from fecontact.integrate.shared_nodes.team import TEAM
-from fecontact.system.nodes import SYSTEM, SystemArrays
+from fecontact.integrate.shared_nodes.team import Team
+from fecontact.system.nodes import SystemArrays
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
 # Modes and nodes.
@@ -120,21 +120,21 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     room = state.room_for(m, n, 0, 2, blocks)
     tables = {name: value for name, value in blocks._asdict().items() if name != "shapes"}
     return {
-        SYSTEM: {
+        SystemArrays: {
             **dict.fromkeys(("stiffness", "damping", "modal_damping"), (m, m)),
             **dict.fromkeys(("Tx", "Ty"), (n, m)), "T2": (0, m), "gap": (n,), "drive": (2,),
             "drive_shapes": (2, m), "load_shapes": (None, m), "constant_load": (m,),
             "memory": np.zeros(n, dtype=np.int64), "second_motion": 0},
-        BLOCKS: {"shapes": blocks.shapes.shape, **tables},
-        state.CONTROL: {"largest": (m,), "memory_scale": (0,), "breaks": (None, 2),
+        Blocks: {"shapes": blocks.shapes.shape, **tables},
+        state.Control: {"largest": (m,), "memory_scale": (0,), "breaks": (None, 2),
                         "levels": (None, n), "sliders": 0},
-        state.PROGRESS: _shapes(progress),
-        state.ROOM: _shapes(room),
-        TEAM: {**_shapes(room.team), "most": 0},
-        stage_solver.REDUCED: _shapes(room.reduced),
-        dynamics.GRADIENTS: _shapes(progress.gradients),
-        state.OUTPUT: {"states": (None, 2 * m), "work": (None, POWER_COUNT + NODE_POWERS * n)},
-        VARIATION: {"columns": (0, None)},
+        state.Progress: _shapes(progress),
+        state.Room: _shapes(room),
+        Team: {**_shapes(room.team), "most": 0},
+        stage_solver.Reduced: _shapes(room.reduced),
+        dynamics.Gradients: _shapes(progress.gradients),
+        state.Output: {"states": (None, 2 * m), "work": (None, POWER_COUNT + NODE_POWERS * n)},
+        Variation: {"columns": (0, None)},
     }
 
 
@@ -146,8 +146,8 @@ def values_of_derivatives(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     room["norms"], room["least"] = (2, None), (None,)
     values = fixed_values(modes, nodes)
     # Of the nodes, and in the room for differences of all directions of each of them.
-    gradients = {name: (None, *shape[1:]) for name, shape in values[dynamics.GRADIENTS].items()}
-    return {**values, VARIATION: room, dynamics.GRADIENTS: gradients}
+    gradients = {name: (None, *shape[1:]) for name, shape in values[dynamics.Gradients].items()}
+    return {**values, Variation: room, dynamics.Gradients: gradients}
 
 
 def _shapes(arrays: Any) -> dict[str, Any]:

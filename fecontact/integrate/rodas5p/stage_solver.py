@@ -17,11 +17,10 @@ u_v) / G leaves
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, helper, integers, matrix, routine, vector
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise_within, solve_within
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.integrate.rodas5p.blocks import block_at, within
 from fecontact.integrate.rodas5p.dynamics import project
 from fecontact.system.nodes import in_space
@@ -36,20 +35,17 @@ class Reduced(NamedTuple):
     ``solver`` (m, 2 m) of :func:`set_solver`.
     """
 
-    J: Array
-    factors: Array
-    starts: Integers
-    pivots: Integers
-    inverse: Array
-    weights: Array
-    room: Array
-    coefficients: Array
-    answers: Array
-    solver: Array
+    J: Matrix
+    factors: Matrix
+    starts: IntegerVector
+    pivots: IntegerVector
+    inverse: Block
+    weights: Matrix
+    room: Vector
+    coefficients: Matrix
+    answers: Matrix
+    solver: Matrix
 
-
-REDUCED = types.NamedTuple(
-    [matrix, matrix, integers, integers, block, matrix, vector, matrix, matrix, matrix], Reduced)
 
 # So few modes are solved for by the matrix that makes u_v of right sides.
 _FEW = 4

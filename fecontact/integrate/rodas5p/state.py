@@ -1,24 +1,22 @@
 """What the compiled integrator works on: limits, the state of a run, room to work in."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, i8, integers, matrix, vector
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
+from fecontact.core.types import Array
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
-from fecontact.integrate.rodas5p.blocks import BLOCKS, Blocks, near_blocks
+from fecontact.integrate.rodas5p.blocks import Blocks, near_blocks
 from fecontact.integrate.rodas5p.step_length import LAST_ROOT, STEP, TIME
-from fecontact.integrate.shared_nodes.team import ALONE, TEAM, Team
+from fecontact.integrate.shared_nodes.team import ALONE, Team
 from fecontact.system.nodes import (
     CONTACT_FIELDS,
-    GROUND_MOTION,
-    SYSTEM,
     TOLD,
     GroundMotion,
+    SystemArrays,
 )
 from fecontact.system.powers import NODE_POWERS, POWER_COUNT
 
@@ -73,17 +71,17 @@ class Control(NamedTuple):
         Number of these elements of each node.
     """
 
-    displacement_scale: Array
-    memory_scale: Array
-    slip_scale: Array
-    slow: Array
-    stick_speed: Array
-    depth: Array
-    largest: Array
-    untouched: Array
-    breaks: Array
-    levels: Array
-    ground: Array
+    displacement_scale: Vector
+    memory_scale: Vector
+    slip_scale: Vector
+    slow: Vector
+    stick_speed: Vector
+    depth: Vector
+    largest: Vector
+    untouched: Vector
+    breaks: Matrix
+    levels: Matrix
+    ground: Vector
     rtol: float
     slip_part: float
     switch_part: float
@@ -93,22 +91,15 @@ class Control(NamedTuple):
     work: int
     unfelt: int
     sliders: int
-    slider_counts: Integers
-
-
-CONTROL = types.NamedTuple(
-    [vector] * 8 + [matrix, matrix, vector] + [f8] * 6 + [i8] * 3 + [integers], Control)
+    slider_counts: IntegerVector
 
 
 class Problem(NamedTuple):
     """What is integrated, and how finely."""
 
-    system: Any
+    system: SystemArrays
     blocks: Blocks
     control: Control
-
-
-PROBLEM = types.NamedTuple([SYSTEM, BLOCKS, CONTROL], Problem)
 
 
 class Step(NamedTuple):
@@ -138,9 +129,6 @@ class Step(NamedTuple):
     at_break: bool
 
 
-STEP_TYPE = types.NamedTuple([f8] * 4 + [GROUND_MOTION, f8, types.boolean], Step)
-
-
 class Progress(NamedTuple):
     """All that a run needs to go on, bit for bit; copies of the arrays are a checkpoint.
 
@@ -160,31 +148,23 @@ class Progress(NamedTuple):
         Signs of the normal forces: 1, 0 or -1.
     """
 
-    numbers: Array
-    counts: Integers
-    state: Array
-    rate: Array
-    extremes: Array
-    work: Array
-    power: Array
+    numbers: Vector
+    counts: IntegerVector
+    state: Vector
+    rate: Vector
+    extremes: Vector
+    work: Vector
+    power: Vector
     gradients: motion.Gradients
-    signs: Integers
-
-
-PROGRESS = types.NamedTuple(
-    [vector, integers, vector, vector, vector, vector, vector, motion.GRADIENTS, integers],
-    Progress)
+    signs: IntegerVector
 
 
 class Output(NamedTuple):
     """Output times (N,), and states (N, size) and work (N, p + 2 n) there."""
 
-    times: Array
-    states: Array
-    work: Array
-
-
-OUTPUT = types.NamedTuple([vector, matrix, matrix], Output)
+    times: Vector
+    states: Matrix
+    work: Matrix
 
 
 class Room(NamedTuple):
@@ -203,40 +183,34 @@ class Room(NamedTuple):
     """
 
     near: Blocks
-    clearance: Array
-    stages: Array
-    dense: Array
-    stage: Array
-    right: Array
-    base: Array
-    time_rate: Array
-    after: Array
-    rate_after: Array
-    nodes: Array
-    slots: Array
-    between: Array
-    given: Array
-    load: Array
-    pull_rate: Array
-    power: Array
-    creeps: Array
+    clearance: Vector
+    stages: Matrix
+    dense: Matrix
+    stage: Vector
+    right: Vector
+    base: Vector
+    time_rate: Vector
+    after: Vector
+    rate_after: Vector
+    nodes: Matrix
+    slots: Matrix
+    between: Matrix
+    given: Vector
+    load: Vector
+    pull_rate: Vector
+    power: Matrix
+    creeps: Matrix
     reduced: stage_solver.Reduced
     scratch: motion.Gradients
     gradients_after: motion.Gradients
-    ends: Array
-    inner: Array
-    courses: Array
-    bound: Array
-    halves: Array
-    places: Array
-    sums: Array
+    ends: Matrix
+    inner: Matrix
+    courses: Matrix
+    bound: Matrix
+    halves: Matrix
+    places: Vector
+    sums: Block
     team: Team
-
-
-ROOM = types.NamedTuple(
-    [BLOCKS, vector] + [matrix] * 2 + [vector] * 6 + [matrix] * 3 + [vector] * 3
-    + [matrix, matrix, stage_solver.REDUCED, motion.GRADIENTS, motion.GRADIENTS] + [matrix] * 5
-    + [vector, block, TEAM], Room)
 
 
 def gradients_for(

@@ -1,9 +1,10 @@
 """The compiled time integrator: Rodas5P steps of variable size over given output times."""
 
-import numpy as np
-from numba import types
+from collections.abc import Callable
 
-from fecontact.core.compiled import helper, i8, kernel, routine
+import numpy as np
+
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.course_bounds import doubtful, restless
 from fecontact.integrate.courses import keep_ends, set_courses, set_ends
@@ -25,7 +26,7 @@ from fecontact.integrate.rodas5p.error_control import (
 from fecontact.integrate.rodas5p.event_kernels import (
     KINKS,
     NODES,
-    WATCH,
+    Watch,
     begin,
     full,
     next_switch,
@@ -53,7 +54,7 @@ from fecontact.integrate.rodas5p.step_length import (
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
-    VARY,
+    Vary,
     begin_anew,
     keep,
     propagate_at,
@@ -64,7 +65,7 @@ from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
-ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.ROOM, state.OUTPUT, VARY, WATCH, i8)
+ADVANCE = Callable[[state.Problem, state.Progress, state.Room, state.Output, Vary, Watch, int], int]
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 # Attempts at a step that end where something was not felt.
@@ -437,8 +438,11 @@ def advance_by(problem, progress, room, output, vary, watch, most):
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
 
 
-@kernel(ADVANCE, nogil=True)
-def advance(problem, progress, room, output, vary, watch, most):
+@kernel(nogil=True)
+def advance(
+    problem: state.Problem, progress: state.Progress, room: state.Room, output: state.Output,
+    vary: Vary, watch: Watch, most: int,
+) -> int:
     """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
 
     Fills the rows of ``output`` that belong to the output times passed. A run that is continued

@@ -9,8 +9,9 @@ The step is then taken anew to a place within that stretch: its end feels the fo
 estimate of the error sees it.
 """
 
-from fecontact.core.compiled import compile_law, f8, function_at, helper, i8
-from fecontact.core.references import Reference
+from collections.abc import Callable
+
+from fecontact.core.compiled import compile_law, function_at, helper
 from fecontact.integrate.courses import (
     COEFFICIENTS,
     DOUBT,
@@ -24,8 +25,9 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.nodes import in_space
 
-_UNFELT = f8(run_arrays.STEP_TYPE, i8, Reference(run_arrays.PROBLEM),
-             Reference(run_arrays.PROGRESS), Reference(run_arrays.ROOM))
+_UNFELT = Callable[[
+    run_arrays.Step, int, run_arrays.Problem, run_arrays.Progress, run_arrays.Room,
+], float]
 first_unfelt_at = function_at(_UNFELT)
 
 # An unfelt impulse counts from this part of the tolerance on.

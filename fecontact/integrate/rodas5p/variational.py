@@ -14,29 +14,23 @@ ones but beside kinks: of the forces of each node, once a step along each direct
 Derivatives to p are differences between a system above and one below.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from fecontact.core.compiled import (
-    block,
-    f8,
     function_at,
     helper,
-    i8,
-    matrix,
     routine,
-    vector,
 )
-from fecontact.core.references import Reference
-from fecontact.core.types import Array
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.integrate import collocated_columns as collocation
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.system.nodes import SYSTEM, ground_motion
+from fecontact.system.nodes import SystemArrays, ground_motion
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5
@@ -81,37 +75,32 @@ class Variation(NamedTuple):
         the parameter, and their change along each direction of each node.
     """
 
-    columns: Array
-    after: Array
-    norms: Array
-    least: Array
-    stages: Array
+    columns: Matrix
+    after: Matrix
+    norms: Matrix
+    least: Vector
+    stages: Matrix
     tolerance: float
     faded: float
-    moved: Array
-    pushed: Array
-    right: Array
-    answers: Array
-    both: Array
-    solver: Array
-    vectors: Array
-    nodes: Array
-    given: Array
-    load: Array
-    none: Array
-    forces: Array
-    paths: Array
+    moved: Matrix
+    pushed: Matrix
+    right: Matrix
+    answers: Matrix
+    both: Matrix
+    solver: Matrix
+    vectors: Matrix
+    nodes: Matrix
+    given: Matrix
+    load: Matrix
+    none: Vector
+    forces: Vector
+    paths: Block
     inside: dynamics.Gradients
     ahead: dynamics.Gradients
     behind: dynamics.Gradients
     usual: dynamics.Gradients
     between: dynamics.Gradients
     bends: dynamics.Gradients
-
-
-VARIATION = types.NamedTuple(
-    [matrix] * 3 + [vector, matrix, f8, f8] + [matrix] * 10 + [vector] * 2 + [block]
-    + [dynamics.GRADIENTS] * 6, Variation)
 
 
 class Vary(NamedTuple):
@@ -124,18 +113,18 @@ class Vary(NamedTuple):
     :func:`propagate`: runs without derivatives do not need it.
     """
 
-    above: Any
-    below: Any
+    above: SystemArrays
+    below: SystemArrays
     width: float
     central: int
     variation: Variation
-    transitions: Array
+    transitions: Block
     propagate: int
 
 
-VARY = types.NamedTuple([SYSTEM, SYSTEM, f8, i8, VARIATION, block, i8], Vary)
-PROPAGATE = f8(run_arrays.STEP_TYPE, Reference(run_arrays.PROBLEM), Reference(run_arrays.PROGRESS),
-                Reference(run_arrays.ROOM), Reference(VARY))
+PROPAGATE = Callable[[
+    run_arrays.Step, run_arrays.Problem, run_arrays.Progress, run_arrays.Room, Vary,
+], float]
 propagate_at = function_at(PROPAGATE)
 
 

@@ -8,11 +8,11 @@ falls to zero.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel, routine
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import state
 from fecontact.integrate.rodas5p.event_kernels import (
@@ -21,7 +21,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
     NODES,
     STICK,
     TOUCH_DOWN,
-    WATCH,
+    Watch,
 )
 from fecontact.integrate.rodas5p.state import (
     ENERGY,
@@ -49,7 +49,7 @@ from fecontact.integrate.series.branches import (
     MET_RELEASE,
     MET_UPPER,
     PLACE,
-    SERIES,
+    Series,
 )
 from fecontact.integrate.series.expansion import (
     expand,
@@ -68,7 +68,7 @@ from fecontact.system.powers import (
     POWER_COUNT,
 )
 
-ADVANCE = types.i8(state.PROBLEM, state.PROGRESS, state.OUTPUT, WATCH, SERIES, i8)
+ADVANCE = Callable[[state.Problem, state.Progress, state.Output, Watch, Series, int], int]
 
 # Columns of the work in the order of `Series.powers`.
 _WORKS = np.array([DRIVE, LOAD, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING])
@@ -338,8 +338,11 @@ def _advance_by(problem, progress, output, watch, series, most):
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
 
 
-@kernel(ADVANCE, nogil=True)
-def advance(problem, progress, output, watch, series, most):
+@kernel(nogil=True)
+def advance(
+    problem: state.Problem, progress: state.Progress, output: state.Output, watch: Watch,
+    series: Series, most: int,
+) -> int:
     """Go on by up to ``most`` steps; returns how it ended, as ``step_loop.advance`` does."""
     return _advance_by(borrowed(problem), borrowed(progress), borrowed(output), borrowed(watch),
                        borrowed(series), most)

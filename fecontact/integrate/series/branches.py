@@ -5,11 +5,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import block, f8, i8, matrix, vector
 from fecontact.core.errors import InputError
+from fecontact.core.records import Block, IntegerMatrix, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.events import AnyEvent, ContactEvents
 from fecontact.integrate.series.polynomials import COEFFICIENTS, DEPTH
@@ -66,31 +65,26 @@ class Series(NamedTuple):
         Room to work in; l is n + 1, or the number of nodes where that is more.
     """
 
-    pieces: Array
-    constants: Array
-    sines: Array
-    constant_force: Array
-    sine_force: Array
-    cosine_force: Array
+    pieces: Block
+    constants: Vector
+    sines: Matrix
+    constant_force: Vector
+    sine_force: Matrix
+    cosine_force: Matrix
     longest: float
     tolerance: float
-    states: Integers
-    q: Array
-    v: Array
-    forcing: Array
-    signal: Array
-    u: Array
-    F: Array
-    square: Array
-    cube: Array
-    powers: Array
-    line: Array
-    room: Array
-
-
-SERIES = types.NamedTuple(
-    [block, vector, matrix, vector, matrix, matrix, f8, f8, types.Array(i8, 2, "C"),
-     *[matrix] * 11], Series)
+    states: IntegerMatrix
+    q: Matrix
+    v: Matrix
+    forcing: Matrix
+    signal: Matrix
+    u: Matrix
+    F: Matrix
+    square: Matrix
+    cube: Matrix
+    powers: Matrix
+    line: Matrix
+    room: Matrix
 
 
 def chosen_series(

@@ -12,7 +12,7 @@ from fecontact.core.references import constants
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.integrate.rodas5p.state import Problem
 from fecontact.integrate.series.advance import ADVANCE, advance
-from fecontact.integrate.series.branches import SERIES, SERIES_POWERS
+from fecontact.integrate.series.branches import SERIES_POWERS, Series
 from fecontact.integrate.series.polynomials import COEFFICIENTS
 from fecontact.laws.pieces import PIECE
 
@@ -37,7 +37,7 @@ def _advance(modes: int, nodes: int) -> Any:
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all systems of a size, for each type of tuples."""
     m, n = modes, nodes
-    return small_systems.fixed_values(m, n) | {SERIES: {
+    return small_systems.fixed_values(m, n) | {Series: {
         "pieces": (n, None, PIECE), "sines": (None, 4), "constant_force": (m,),
         "sine_force": (None, m), "cosine_force": (None, m), "states": (n, 3),
         **dict.fromkeys(("q", "v", "forcing"), (m, COEFFICIENTS)),

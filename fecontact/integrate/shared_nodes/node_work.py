@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.compiled import helper, i8, kernel, routine
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.blocks import block_at, within
@@ -171,8 +171,11 @@ def _power_part(part, begin, end, problem, room):
                     room.power[point, POWER_COUNT:])
 
 
-@kernel(WORK, no_cpython_wrapper=True)
-def work(task, part, parts, problem, progress, room):
+@kernel(no_cpython_wrapper=True)
+def work(
+    task: int, part: int, parts: int, problem: state.Problem, progress: state.Progress,
+    room: state.Room,
+) -> int:
     """Do a part of a task."""
     if task == PRODUCTS:
         _product_part(part, parts, room)
@@ -247,8 +250,10 @@ def _take_parts(parts, task, problem, progress, room):
     wait_for(parts, words)
 
 
-@kernel(SHARE, no_cpython_wrapper=True)
-def share(task, value, problem, progress, room):
+@kernel(no_cpython_wrapper=True)
+def share(
+    task: int, value: float, problem: state.Problem, progress: state.Progress, room: state.Room,
+) -> float:
     """Do a task, together with the helpers that are there."""
     words, parts = room.team.words, parts_of(room)
     room.team.numbers[VALUE] = value
@@ -263,8 +268,8 @@ def share(task, value, problem, progress, room):
     return _add_parts(task, value, parts, problem, progress, room)
 
 
-@kernel(i8(state.PROBLEM, state.PROGRESS, state.ROOM), nogil=True)
-def assist(problem, progress, room):
+@kernel(nogil=True)
+def assist(problem: state.Problem, progress: state.Progress, room: state.Room) -> int:
     """Take parts of the tasks of a run until it ends, or none has been offered for about a second.
 
     Returns how many it did.

@@ -7,10 +7,12 @@ cache of the same core. It goes on when all parts are done. Nobody waits for a t
 taken a part: one that does not run, on a busy computer, or has left, is not missed.
 """
 
+from collections.abc import Callable
+
 from numba import types
 from numba.extending import intrinsic
 
-from fecontact.core.compiled import f8, function_at, helper, i8, integers
+from fecontact.core.compiled import function_at, helper, i8, integers
 from fecontact.core.references import Reference
 from fecontact.integrate.rodas5p import state
 
@@ -29,9 +31,9 @@ TICKET, DONE, LEAVE, YIELD, SLEEP, PAUSE = 0, _LINE, 2 * _LINE, 3 * _LINE, 3 * _
     3 * _LINE + 2)
 WORDS = 4 * _LINE
 
-_ARGUMENTS = (Reference(state.PROBLEM), Reference(state.PROGRESS), Reference(state.ROOM))
-SHARE = f8(i8, f8, *_ARGUMENTS)
-WORK = i8(i8, i8, i8, *_ARGUMENTS)
+_ARGUMENTS = (Reference(state.Problem), Reference(state.Progress), Reference(state.Room))
+SHARE = Callable[[int, float, state.Problem, state.Progress, state.Room], float]
+WORK = Callable[[int, int, int, state.Problem, state.Progress, state.Room], int]
 share_at, work_at = function_at(SHARE), function_at(WORK)
 _yield_at, _sleep_at = function_at(types.int32()), function_at(types.int32(types.int32))
 

@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, integers, matrix, vector
-from fecontact.core.types import Array, Integers
+from fecontact.core.compiled import helper
+from fecontact.core.records import IntegerVector, Matrix, Vector
 
 # Nodes that are near the other side are shared from so many on, in an even number of parts, of at
 # least so many each where there are more than two: loops over fewer nodes cost more.
@@ -35,16 +34,14 @@ class Team(NamedTuple):
         Addresses of what does a task, and of what does a part of it.
     """
 
-    words: Integers
-    numbers: Array
-    sums: Array
+    words: IntegerVector
+    numbers: Vector
+    sums: Matrix
     most: int
     helpers: int
     share: int
     work: int
 
-
-TEAM = types.NamedTuple([integers, vector, matrix, i8, i8, i8, i8], Team)
 
 ALONE = Team(np.zeros(1, dtype=np.int64), np.zeros(1), np.zeros((1, 1)), 0, 0, 0, 0)
 

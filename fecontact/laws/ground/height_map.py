@@ -6,11 +6,11 @@ from functools import cached_property
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numba import types
 
 from fecontact.core.checks import as_floats
-from fecontact.core.compiled import helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
 from fecontact.laws.data_columns import read_columns
@@ -22,8 +22,8 @@ _HEAD = 7
 _UNEVEN = 0.01  # of the spacing: rounding of the places in a file
 
 
-@kernel(types.void(i8, vector, vector, vector, matrix))
-def _shape(address, x, y, p, out):
+@kernel
+def _shape(address: int, x: Vector, y: Vector, p: Vector, out: Matrix) -> None:
     for k in range(len(x)):
         found = surface_at(address)(x[k], y[k], p)
         for c in range(6):

@@ -5,18 +5,18 @@ from dataclasses import dataclass, fields
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numba import types
 
 from fecontact.core.checks import as_floats
-from fecontact.core.compiled import CompiledLaw, i8, kernel, matrix, vector
+from fecontact.core.compiled import CompiledLaw, kernel
 from fecontact.core.errors import require_finite, require_not_negative, require_positive
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
 from fecontact.laws.signatures import ground_at, ground_profile
 
 
-@kernel(types.void(i8, vector, vector, matrix))
-def _shape(address, xi, p, out):
+@kernel
+def _shape(address: int, xi: Vector, p: Vector, out: Matrix) -> None:
     for k in range(len(xi)):
         out[k, 0], out[k, 1], out[k, 2] = ground_at(address)(xi[k], p)
 

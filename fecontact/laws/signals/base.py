@@ -4,17 +4,17 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
-from numba import types
 
 from fecontact.core.checks import as_floats
-from fecontact.core.compiled import CompiledLaw, i8, kernel, matrix, vector
+from fecontact.core.compiled import CompiledLaw, kernel
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, ArrayLike
 from fecontact.laws.signatures import signal_at
 
 
-@kernel(types.void(i8, vector, vector, matrix))
-def _history(address, t, p, out):
+@kernel
+def _history(address: int, t: Vector, p: Vector, out: Matrix) -> None:
     for k in range(len(t)):
         out[k, 0], out[k, 1] = signal_at(address)(t[k], p)
 

@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import kernel, matrix, vector
+from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError
+from fecontact.core.records import FlagVector, Matrix, ShortVector, Vector
 from fecontact.core.types import Array, Integers
 
 
@@ -138,8 +139,10 @@ _flags = types.Array(types.boolean, 1, "C")
 _BLOCK = 32
 
 
-@kernel(types.void(_index, _index, vector, matrix, _flags), nogil=True)
-def _forward(indptr, indices, data, x, active):
+@kernel(nogil=True)
+def _forward(
+    indptr: ShortVector, indices: ShortVector, data: Vector, x: Matrix, active: FlagVector,
+) -> None:
     """Solve L x = b in place, L unit lower triangular by columns; zero rows are skipped."""
     n, width = x.shape
     for j in range(n):
@@ -153,8 +156,8 @@ def _forward(indptr, indices, data, x, active):
                         x[i, c] -= entry * x[j, c]
 
 
-@kernel(types.void(_index, _index, vector, matrix), nogil=True)
-def _backward(indptr, indices, data, x):
+@kernel(nogil=True)
+def _backward(indptr: ShortVector, indices: ShortVector, data: Vector, x: Matrix) -> None:
     """Solve L^T x = b in place."""
     n, width = x.shape
     for j in range(n - 1, -1, -1):

@@ -1,5 +1,6 @@
 """Compiled loops over many states for a vector field that is given by its address."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -7,26 +8,28 @@ from numba import types
 from numpy.typing import NDArray
 
 from fecontact.core.compiled import (
-    block,
-    f8,
     function_at,
     helper,
-    i8,
-    integers,
     kernel,
-    matrix,
-    vector,
+)
+from fecontact.core.records import (
+    Block,
+    ComplexMatrix,
+    ComplexVector,
+    IntegerVector,
+    Matrix,
+    Vector,
 )
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 
 c16 = types.complex128
 complex_vector = types.Array(c16, 1, "C")
 complex_matrix = types.Array(c16, 2, "C")
 
-RATES = types.void(f8, vector, vector, vector)
-JACOBIAN = types.void(f8, vector, vector, matrix)
-COMPLEX_RATES = types.void(f8, complex_vector, complex_vector, complex_vector)
+RATES = Callable[[float, Vector, Vector, Vector], None]
+JACOBIAN = Callable[[float, Vector, Vector, Matrix], None]
+COMPLEX_RATES = Callable[[float, ComplexVector, ComplexVector, ComplexVector], None]
 
 rates_at = function_at(RATES)
 jacobian_at = function_at(JACOBIAN)
@@ -66,18 +69,14 @@ class Places(NamedTuple):
         Whether those to the states are wanted.
     """
 
-    t: Array
-    x: Array
-    f: Array
-    p: Array
-    scales: Array
-    sizes: Array
-    active: Integers
+    t: Vector
+    x: Matrix
+    f: Matrix
+    p: Vector
+    scales: Vector
+    sizes: Vector
+    active: IntegerVector
     states: bool
-
-
-PLACES = types.NamedTuple([vector, matrix, matrix, vector, vector, vector, integers, types.boolean],
-                          Places)
 
 
 class Place(NamedTuple):
@@ -92,17 +91,14 @@ class Place(NamedTuple):
 class Room(NamedTuple):
     """Room for the work on one place; ``best`` and ``error`` (d,) are results of differences."""
 
-    y: Array
-    q: Array
-    above: Array
-    below: Array
-    orders: Array
-    best: Array
-    error: Array
-    column: Array
-
-
-ROOM = types.NamedTuple([vector] * 4 + [matrix] + [vector] * 3, Room)
+    y: Vector
+    q: Vector
+    above: Vector
+    below: Vector
+    orders: Matrix
+    best: Vector
+    error: Vector
+    column: Vector
 
 
 @helper
@@ -294,24 +290,27 @@ def columns_by_differences(function, place, x, scales, room, J):
             J[i, j] = best[i]
 
 
-@kernel(types.void(i8, vector, matrix, vector, matrix))
-def batch_rates(address, t, x, p, f):
+@kernel
+def batch_rates(address: int, t: Vector, x: Matrix, p: Vector, f: Matrix) -> None:
     """Fill f (N, d)."""
     function = rates_at(address)
     for k in range(len(t)):
         function(t[k], x[k], p, f[k])
 
 
-@kernel(types.void(i8, vector, matrix, vector, block))
-def batch_jacobians(address, t, x, p, J):
+@kernel
+def batch_jacobians(address: int, t: Vector, x: Matrix, p: Vector, J: Block) -> None:
     """Fill J (N, d, d) by the function that gives one."""
     function = jacobian_at(address)
     for k in range(len(t)):
         function(t[k], x[k], p, J[k])
 
 
-@kernel(types.void(i8, i8, PLACES, ROOM, complex_matrix, block, block, integers))
-def complex_steps(address, complex_address, places, room, complex_room, J, P, wrong):
+@kernel
+def complex_steps(
+    address: int, complex_address: int, places: Places, room: Room, complex_room: ComplexMatrix,
+    J: Block, P: Block, wrong: IntegerVector,
+) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by the complex step.
 
     Each column is compared with differences, which take the place of what differs from them:
@@ -349,8 +348,8 @@ def complex_steps(address, complex_address, places, room, complex_room, J, P, wr
                 P[n, i, a] = column[i]
 
 
-@kernel(types.void(i8, PLACES, ROOM, block, block))
-def differences(address, places, room, J, P):
+@kernel
+def differences(address: int, places: Places, room: Room, J: Block, P: Block) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by extrapolated central differences."""
     function = rates_at(address)
     places, room = borrowed(places), borrowed(room)
@@ -372,8 +371,10 @@ def differences(address, places, room, J, P):
                 P[n, i, a] = best[i]
 
 
-@kernel(types.void(i8, PLACES, f8, vector, matrix, block, block))
-def central_differences(address, places, step, q, beside, J, P):
+@kernel
+def central_differences(
+    address: int, places: Places, step: float, q: Vector, beside: Matrix, J: Block, P: Block,
+) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by central differences over one step in sizes.
 
     ``q`` (k,) and ``beside`` (3, d) are room.
@@ -408,8 +409,10 @@ def central_differences(address, places, step, q, beside, J, P):
                 P[n, i, a] = (above[i] - below[i]) / (2.0 * h)
 
 
-@kernel(types.void(i8, PLACES, complex_matrix, block, block))
-def unchecked_complex_steps(complex_address, places, complex_room, J, P):
+@kernel
+def unchecked_complex_steps(
+    complex_address: int, places: Places, complex_room: ComplexMatrix, J: Block, P: Block,
+) -> None:
     """As :func:`complex_steps`, without the comparison, which takes nearly all of the time."""
     complex_function = complex_rates_at(complex_address)
     places, complex_room = borrowed(places), borrowed(complex_room)

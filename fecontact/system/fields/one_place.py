@@ -4,21 +4,19 @@ A field comes as a tuple :class:`FieldKernel`, whose two addresses lead to a fun
 compiled or to one of Python.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import compile_law, f8, function_at, i8, integers, matrix, vector
-from fecontact.core.references import Reference
-from fecontact.core.types import Array, ComplexArray, Integers
+from fecontact.core.compiled import compile_law, function_at
+from fecontact.core.records import ComplexMatrix, IntegerVector, Matrix, Vector
+from fecontact.core.types import Array
 from fecontact.system.fields.function_kernels import (
-    ROOM,
     Place,
     Room,
     columns_by_complex_step,
     columns_by_differences,
-    complex_matrix,
     complex_rates_at,
     complex_room_for,
     jacobian_at,
@@ -50,19 +48,17 @@ class FieldKernel(NamedTuple):
     function: int
     jacobian: int
     analytic: int
-    p: Array
-    scales: Array
+    p: Vector
+    scales: Vector
     room: Room
-    complex_room: ComplexArray
-    wrong: Integers
+    complex_room: ComplexMatrix
+    wrong: IntegerVector
 
 
-FIELD = types.NamedTuple(
-    [i8, i8, i8, i8, i8, vector, vector, ROOM, complex_matrix, integers], FieldKernel)
-EVALUATE = types.void(f8, vector, Reference(FIELD), vector)
-DERIVE = types.void(f8, vector, Reference(FIELD), vector, matrix)
+EVALUATE = Callable[[float, Vector, FieldKernel, Vector], None]
+DERIVE = Callable[[float, Vector, FieldKernel, Vector, Matrix], None]
 # Functions of Python: t, and the addresses of x (d,), f (d,) and J (d, d), which may be zero.
-PYTHON = types.void(f8, i8, i8, i8)
+PYTHON = Callable[[float, int, int, int], None]
 
 evaluate_at, derive_at = function_at(EVALUATE), function_at(DERIVE)
 _python_at = function_at(PYTHON)

@@ -20,16 +20,16 @@ radius phi F along its own direction a = R* / |R*|, with
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, kernel, vector
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.records import Vector
 from fecontact.core.references import borrowed
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import (
-    GROUND_MOTION,
-    SYSTEM,
+    GroundMotion,
     NodeMotion,
+    SystemArrays,
     in_space,
     leaning,
     moved_across,
@@ -43,10 +43,10 @@ from fecontact.system.quasistatic.pose import (
     PENETRATION,
     PER_TANGENT,
     PLACE,
-    POSE,
     PRESSING,
-    ROOM,
-    SLIDERS,
+    Pose,
+    Room,
+    Sliders,
 )
 from fecontact.system.space_nodes import (
     WAVES_X,
@@ -196,8 +196,11 @@ def _stretched(j, tangent, sliders, pose):
     return total
 
 
-@kernel(types.f8(vector, GROUND_MOTION, SLIDERS, SYSTEM, POSE, ROOM, i8))
-def evaluate(load, moved, held_sliders, held_s, held_pose, held_room, derive):
+@kernel
+def evaluate(
+    load: Vector, moved: GroundMotion, held_sliders: Sliders, held_s: SystemArrays,
+    held_pose: Pose, held_room: Room, derive: int,
+) -> float:
     """Set nodes, slider forces, out-of-balance force and its matrix; size of forces that cancel.
 
     The matrix is minus the derivative of the out-of-balance force.
@@ -360,8 +363,11 @@ def _newton(load, moved, sliders, s, pose, room):
     return False
 
 
-@kernel(types.boolean(vector, GROUND_MOTION, SLIDERS, SYSTEM, POSE, ROOM))
-def find_equilibrium(load, moved, held_sliders, held_s, held_pose, held_room):
+@kernel
+def find_equilibrium(
+    load: Vector, moved: GroundMotion, held_sliders: Sliders, held_s: SystemArrays,
+    held_pose: Pose, held_room: Room,
+) -> bool:
     """Bring ``pose`` into equilibrium from where it is; whether that succeeded.
 
     ``pose.force`` and ``pose.left`` are those of the last equilibrium at the begin. Rigid sliders

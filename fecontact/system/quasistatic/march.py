@@ -13,13 +13,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, f8, helper, integers, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.core.references import borrowed
-from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import normal_at
-from fecontact.system.nodes import SYSTEM, GroundMotion, in_space, moved_across, moved_along
+from fecontact.system.nodes import GroundMotion, SystemArrays, in_space, moved_across, moved_along
 from fecontact.system.quasistatic.increment import find_equilibrium
 from fecontact.system.quasistatic.pose import (
     AGAINST,
@@ -28,10 +27,10 @@ from fecontact.system.quasistatic.pose import (
     PENETRATION,
     PER_TANGENT,
     PLACE,
-    POSE,
     PRESSING,
-    ROOM,
-    SLIDERS,
+    Pose,
+    Room,
+    Sliders,
     node_columns,
 )
 
@@ -61,15 +60,12 @@ class Kept(NamedTuple):
     numbers of increments.
     """
 
-    q: Array
-    node: Array
-    force: Array
-    left: Array
-    work: Array
-    counts: Integers
-
-
-KEPT = types.NamedTuple([matrix, block, block, block, matrix, integers], Kept)
+    q: Matrix
+    node: Block
+    force: Block
+    left: Block
+    work: Matrix
+    counts: IntegerVector
 
 
 def kept_for(rows: int, m: int, n: int, sliders: int, tangents: int) -> Kept:
@@ -198,8 +194,11 @@ def _works(old, new, given, s, out):
             out[_TRAVEL] += _moving(j, 1, moved_across(j, travelled, second, s), old, new, s)
 
 
-@kernel(types.void(SYSTEM, SLIDERS, POSE, POSE, matrix, vector, vector))
-def _measure(held_s, held_sliders, held_old, held_new, given, part, turnover):
+@kernel
+def _measure(
+    held_s: SystemArrays, held_sliders: Sliders, held_old: Pose, held_new: Pose, given: Matrix,
+    part: Vector, turnover: Vector,
+) -> None:
     """Fill part (4 + n,) with the works and losses of an increment, and ``turnover`` (4,).
 
     The latter are the error and the work of friction, and those of the normal forces.
@@ -259,8 +258,11 @@ def _keep(row, pose, total, kept):
         kept.work[row, i] = total[i]
 
 
-@kernel(types.i8(SYSTEM, SLIDERS, matrix, f8, POSE, POSE, ROOM, KEPT))
-def march(held_s, held_sliders, given, rtol, held_old, held_new, held_room, held_kept):
+@kernel
+def march(
+    held_s: SystemArrays, held_sliders: Sliders, given: Matrix, rtol: float, held_old: Pose,
+    held_new: Pose, held_room: Room, held_kept: Kept,
+) -> int:
     """Go along rows of given loads and motions: modal loads, drive in x and y, travel, (N, m + 3).
 
     In space (N, m + 5): with the drive in z, and the travel along y.

@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import integers, matrix, vector
-from fecontact.core.types import Array, Integers
+from fecontact.core.records import IntegerVector, Matrix, Vector
+from fecontact.core.types import Array
 
 # Columns of `Pose.node`; in space the last three follow for the second tangent.
 FORCE, PRESSING, PENETRATION, PLACE, AGAINST, LEANING = range(6)
@@ -19,12 +18,9 @@ class Sliders(NamedTuple):
     ``stiffness`` is c, ``limit`` phi; ``rigid`` is 1 where c is only a penalty, else 0.
     """
 
-    stiffness: Array
-    limit: Array
-    rigid: Array
-
-
-SLIDERS = types.NamedUniTuple(matrix, 3, Sliders)
+    stiffness: Matrix
+    limit: Matrix
+    rigid: Matrix
 
 
 class Pose(NamedTuple):
@@ -35,13 +31,10 @@ class Pose(NamedTuple):
     of the sliders, in space (n, 2 e), both components of each one after the other.
     """
 
-    q: Array
-    node: Array
-    force: Array
-    left: Array
-
-
-POSE = types.NamedTuple([vector, matrix, matrix, matrix], Pose)
+    q: Vector
+    node: Matrix
+    force: Matrix
+    left: Matrix
 
 
 class Room(NamedTuple):
@@ -50,23 +43,19 @@ class Room(NamedTuple):
     ``acting`` (m,) sums the magnitudes of the forces on each mode.
     """
 
-    scale: Array
-    start: Array
-    acting: Array
-    residual: Array
-    step: Array
-    before: Array
-    multiplier: Array
-    along: Array
-    away: Array
-    across: Array
-    matrix: Array
-    partial: Array
-    pivots: Integers
-
-
-ROOM = types.NamedTuple(
-    [vector] * 6 + [matrix] * 6 + [integers], Room)
+    scale: Vector
+    start: Vector
+    acting: Vector
+    residual: Vector
+    step: Vector
+    before: Vector
+    multiplier: Matrix
+    along: Matrix
+    away: Matrix
+    across: Matrix
+    matrix: Matrix
+    partial: Matrix
+    pivots: IntegerVector
 
 
 def node_columns(tangents: int) -> int:

@@ -1,12 +1,12 @@
 """Derivatives of the rates along orbits of a contact system, in compiled code."""
 
 import numpy as np
-from numba import types
 
-from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS
+from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.evaluation import speed_coefficient, take_parameter
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
-from fecontact.core.compiled import block, f8, helper, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Array4, Block, Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.system.jacobian import batch_derivatives
 
@@ -20,8 +20,10 @@ def _take_coefficients(u, T, X):
             X[0, j, k], X[1, j, k] = u[k * m + j], speed_coefficient(u, k, j, m, T)
 
 
-@kernel(types.void(matrix, block, vector, matrix, EQUATIONS, types.Array(f8, 4, "C")))
-def derivatives_along(us, zs, tau, series, e, J):
+@kernel
+def derivatives_along(
+    us: Matrix, zs: Block, tau: Vector, series: Matrix, e: Equations, J: Array4,
+) -> None:
     """Fill J (K, P, d, d) with the derivatives of the rates at times tau (P,) of K orbits.
 
     Kinks of normal forces are means over samples, as in the equations of the orbits.

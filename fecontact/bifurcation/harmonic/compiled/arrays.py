@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import block, f8, i8, integers, matrix, vector
-from fecontact.core.types import Array, Integers
-from fecontact.system.nodes import SYSTEM, SystemArrays
+from fecontact.core.compiled import f8
+from fecontact.core.records import Array4, Block, IntegerVector, Matrix, Vector
+from fecontact.system.nodes import SystemArrays
 
 
 class Room(NamedTuple):
@@ -25,39 +25,39 @@ class Room(NamedTuple):
     :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`.
     """
 
-    t: Array
-    x: Array
-    y: Array
-    z: Array
-    target: Array
-    f: Array
-    f_marched: Array
-    J: Array
-    J_marched: Array
-    coefficients: Array
-    rows: Array
-    spectra: Array
-    square: Array
-    followed: Array
-    forces: Array
-    slopes: Array
-    condensed: Array
-    a: Array
-    pivots: Integers
-    order: Integers
-    coupled: Integers
-    alone: Array
-    extent: Array
-    linear: Array
-    column: Array
-    residual: Array
-    beside: Array
-    along: Array
-    vectors: Array
-    motion: Array
-    pushes: Array
-    node: Array
-    widths: Array
+    t: Vector
+    x: Matrix
+    y: Matrix
+    z: Matrix
+    target: Matrix
+    f: Matrix
+    f_marched: Matrix
+    J: Block
+    J_marched: Block
+    coefficients: Block
+    rows: Matrix
+    spectra: Vector
+    square: Vector
+    followed: Block
+    forces: Block
+    slopes: Array4
+    condensed: Vector
+    a: Vector
+    pivots: IntegerVector
+    order: IntegerVector
+    coupled: IntegerVector
+    alone: Matrix
+    extent: Block
+    linear: Block
+    column: Vector
+    residual: Vector
+    beside: Vector
+    along: Vector
+    vectors: Matrix
+    motion: Matrix
+    pushes: Matrix
+    node: Matrix
+    widths: Matrix
 
 
 class Equations(NamedTuple):
@@ -80,22 +80,22 @@ class Equations(NamedTuple):
     """
 
     contact: SystemArrays
-    flat: Array
-    base: Array
-    slope: Array
-    tau: Array
-    values: Array
-    projection: Array
-    cosines: Array
-    sines: Array
-    body: Array
-    given: Array
-    pulls: Array
-    springs: Array
-    offsets: Array
-    onsets: Array
-    limits: Array
-    numbers: Array
+    flat: Vector
+    base: Vector
+    slope: Vector
+    tau: Vector
+    values: Matrix
+    projection: Matrix
+    cosines: Matrix
+    sines: Matrix
+    body: Block
+    given: Block
+    pulls: Block
+    springs: Matrix
+    offsets: Vector
+    onsets: Matrix
+    limits: Vector
+    numbers: Vector
     nodes: int
     room: Room
 
@@ -104,16 +104,6 @@ class Equations(NamedTuple):
  LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED, KINKS) = range(17)
 
 _blocks = types.Array(f8, 4, "C")
-ROOM = types.NamedTuple(
-    [vector, *[matrix] * 6, block, block, block, matrix, vector, vector,
-     block, block, _blocks, vector, vector, integers, integers, integers, matrix, block,
-     block, *[vector] * 4, *[matrix] * 5], Room)
-EQUATIONS = types.NamedTuple(
-    [SYSTEM, *[vector] * 4, *[matrix] * 4, *[block] * 3, matrix, vector, matrix, vector, vector,
-     i8, ROOM],
-    Equations)
-
-
 class Reached(NamedTuple):
     """Points that were reached, K at most.
 
@@ -122,19 +112,15 @@ class Reached(NamedTuple):
     steps, which points are folds (K,), and ``step`` (1,).
     """
 
-    u: Array
-    tangent: Array
-    z: Array
-    forces: Array
-    mean: Array
-    scales: Array
-    lengths: Array
-    folds: Integers
-    step: Array
-
-
-REACHED = types.NamedTuple(
-    [matrix, matrix, *[block] * 3, matrix, vector, integers, vector], Reached)
+    u: Matrix
+    tangent: Matrix
+    z: Block
+    forces: Block
+    mean: Block
+    scales: Matrix
+    lengths: Vector
+    folds: IntegerVector
+    step: Vector
 
 
 def room_for(

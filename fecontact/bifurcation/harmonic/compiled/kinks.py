@@ -17,17 +17,16 @@ those of the law.
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.core.compiled import block, f8, helper, i8, kernel, matrix, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.kernels import normal_values
 from fecontact.system.nodes import (
-    SYSTEM,
     SystemArrays,
     ground_motion,
     in_space,
@@ -146,8 +145,11 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
             A[m + i, m + k] += s.Ty[j, i] * F_w - s.Tx[j, i] * T_w
 
 
-@kernel(types.void(vector, matrix, SYSTEM, matrix, f8, i8, matrix, block, matrix))
-def add_kinks(t, x, s, onsets, h, derivatives, f, J, widths):
+@kernel
+def add_kinks(
+    t: Vector, x: Matrix, s: SystemArrays, onsets: Matrix, h: float, derivatives: int, f: Matrix,
+    J: Block, widths: Matrix,
+) -> None:
     """Add to rates f (N, d) at samples t (N,), x (N, d) a distance h apart what kinks change.
 
     ``onsets`` (k, n) are penetrations of the nodes; with ``derivatives`` the Jacobians J (N, d, d)

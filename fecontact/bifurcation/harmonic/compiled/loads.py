@@ -3,16 +3,26 @@
 import math
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import block, kernel, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Block, Vector
 from fecontact.core.references import borrowed
 from fecontact.system.kernels import given_at, node_forces
-from fecontact.system.nodes import SYSTEM, force_room, in_space, leaning, memory_of, node_motion
+from fecontact.system.nodes import (
+    SystemArrays,
+    force_room,
+    in_space,
+    leaning,
+    memory_of,
+    node_motion,
+)
 
 
-@kernel(types.void(vector, vector, vector, vector, vector, vector, SYSTEM, block, block, vector))
-def forces_at_rest(places, periods, tau, flat, base, slope, s, body, given, told):
+@kernel
+def forces_at_rest(
+    places: Vector, periods: Vector, tau: Vector, flat: Vector, base: Vector, slope: Vector,
+    s: SystemArrays, body: Block, given: Block, told: Vector,
+) -> None:
     """Fill body (4, m, m) and given (2, N, m), affine in a parameter p, from its first two places.
 
     These are stiffness and damping, and loads at the samples: values at p = 0 and their slopes. The

@@ -1,6 +1,6 @@
 """Equations of harmonic balance at one orbit, and the orbit nearby, in compiled code."""
 
-from fecontact.bifurcation.harmonic.compiled.arrays import EQUATIONS, STEADY, TOLERANCE
+from fecontact.bifurcation.harmonic.compiled.arrays import STEADY, TOLERANCE, Equations
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
     condense,
     evaluate_at,
@@ -14,15 +14,19 @@ from fecontact.bifurcation.harmonic.compiled.linear_systems import (
     solve_with,
 )
 from fecontact.bifurcation.harmonic.compiled.newton import settled
-from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.references import borrowed
 
 # What is wanted at an orbit.
 RESIDUAL, DERIVATIVES, SOLUTION, ORBIT = range(4)
 
 
-@kernel(i8(vector, i8, EQUATIONS, matrix, matrix, vector, vector, vector))
-def evaluate(u, wanted, e, forces, mean, row, weights, x):
+@kernel
+def evaluate(
+    u: Vector, wanted: int, e: Equations, forces: Matrix, mean: Matrix, row: Vector,
+    weights: Vector, x: Vector,
+) -> int:
     """Fill forces (N, m) and leave ``residual`` and ``z`` at u (n + 1,) in the room of e.
 
     With derivatives, ``wanted`` = DERIVATIVES, also ``condensed``, and the mean derivatives

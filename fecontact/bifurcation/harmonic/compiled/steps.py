@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.arrays import (
-    EQUATIONS,
     FIRST_BOUND,
     FOLDS,
     HIGH,
@@ -21,8 +20,9 @@ from fecontact.bifurcation.harmonic.compiled.arrays import (
     LARGEST_TURN,
     LAST_BOUND,
     LOW,
-    REACHED,
     SQUARE,
+    Equations,
+    Reached,
 )
 from fecontact.bifurcation.harmonic.compiled.evaluation import take_forces, take_mean
 from fecontact.bifurcation.harmonic.compiled.linear_systems import inner, length
@@ -32,7 +32,8 @@ from fecontact.bifurcation.harmonic.compiled.newton import (
     fold_between,
     linearised,
 )
-from fecontact.core.compiled import helper, i8, kernel, vector
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Vector
 from fecontact.core.references import borrowed
 
 # Largest curvature correction of the predictor, in steps.
@@ -125,8 +126,11 @@ def _exact(count, row, weights, e, out):
     return 1
 
 
-@kernel(i8(vector, vector, vector, vector, EQUATIONS, REACHED, vector))
-def steps(u, tangent, bend, scales, e, out, why):
+@kernel
+def steps(
+    u: Vector, tangent: Vector, bend: Vector, scales: Vector, e: Equations, out: Reached,
+    why: Vector,
+) -> int:
     """Make steps from u along a tangent until ``out`` is full or something is to be looked at.
 
     u, tangent and bend (n + 1,), the derivative of the tangent, and scales (m + 1,) are

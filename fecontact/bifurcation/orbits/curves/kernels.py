@@ -8,12 +8,13 @@ import math
 
 from numba import types
 
-from fecontact.core.compiled import block, f8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Block, ComplexMatrix, Matrix, Vector
 from fecontact.core.references import borrowed
 
 
-@kernel(types.void(matrix, vector, matrix, matrix))
-def open_values(nodes, end, values, out):
+@kernel
+def open_values(nodes: Matrix, end: Vector, values: Matrix, out: Matrix) -> None:
     """Fill out (N m, d) with the values of nodes (N m, d) that end at ``end`` (d,)."""
     nodes, end, out, values = borrowed(nodes), borrowed(end), borrowed(out), borrowed(values)
     m = len(values)
@@ -29,8 +30,8 @@ def open_values(nodes, end, values, out):
                     out[row, i] += value * (nodes[node, i] if node < total else end[i])
 
 
-@kernel(types.void(block, matrix, matrix))
-def applied(matrices, vectors, out):
+@kernel
+def applied(matrices: Block, vectors: Matrix, out: Matrix) -> None:
     """Fill out (N m, d) with the products of matrices (N m, d, d) and vectors."""
     matrices, vectors, out = borrowed(matrices), borrowed(vectors), borrowed(out)
     rows, d = vectors.shape
@@ -45,8 +46,10 @@ def applied(matrices, vectors, out):
 _complex_matrix = types.Array(types.complex128, 2, "C")
 
 
-@kernel(types.void(block, block, f8, _complex_matrix, _complex_matrix))
-def multiplied(real, imaginary, sign, vectors, out):
+@kernel
+def multiplied(
+    real: Block, imaginary: Block, sign: float, vectors: ComplexMatrix, out: ComplexMatrix,
+) -> None:
     """Fill out (N m, d) with the products of matrices, real + sign i imaginary, and vectors."""
     real, imaginary = borrowed(real), borrowed(imaginary)
     vectors, out = borrowed(vectors), borrowed(out)
@@ -59,8 +62,8 @@ def multiplied(real, imaginary, sign, vectors, out):
             out[row, i] = total
 
 
-@kernel(f8(vector, matrix, matrix))
-def unit_factor(widths, part, before):
+@kernel
+def unit_factor(widths: Vector, part: Matrix, before: Matrix) -> float:
     """Factor that gives part (N m, d) the mean square one, and the direction of ``before``.
 
     Where there are no such vectors before, these are (0, 0).
@@ -79,8 +82,8 @@ def unit_factor(widths, part, before):
     return math.copysign(1.0 / math.sqrt(square), along if len(before) > 0 else 1.0)
 
 
-@kernel(types.void(block, block, block, f8, block, block))
-def central(up, down, here, step, first, second):
+@kernel
+def central(up: Block, down: Block, here: Block, step: float, first: Block, second: Block) -> None:
     """Fill first and second (N m, d, k), differences of matrices to both sides and here."""
     up, down, here = borrowed(up), borrowed(down), borrowed(here)
     first, second = borrowed(first), borrowed(second)
@@ -94,8 +97,11 @@ def central(up, down, here, step, first, second):
                 second[row, i, c] = two * ((a + b) - 2.0 * here[row, i, c])
 
 
-@kernel(types.void(matrix, matrix, f8, f8, vector, block, block, block, block, matrix, vector))
-def add_term(left, states, period, T, widths, J, P, bend, shift, points, common):
+@kernel
+def add_term(
+    left: Matrix, states: Matrix, period: float, T: float, widths: Vector, J: Block, P: Block,
+    bend: Block, shift: Block, points: Matrix, common: Vector,
+) -> None:
     """Add a term to the derivative of a test function, see the module ``singularity``.
 
     ``points`` (N m, d) are its derivatives to the states at the Gauss points, over the width of

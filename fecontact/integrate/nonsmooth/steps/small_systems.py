@@ -14,9 +14,9 @@ from fecontact.core.compiled import kernel
 from fecontact.core.references import constants
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.event_driven import RUN, run_events
-from fecontact.integrate.nonsmooth.event_search import ROOM, room_for
+from fecontact.integrate.nonsmooth.event_search import Room, room_for
 from fecontact.integrate.rodas5p import small_systems
-from fecontact.system.nodes import SYSTEM
+from fecontact.system.nodes import SystemArrays
 from fecontact.system.powers import POWER_COUNT
 
 # Modes and nodes.
@@ -45,7 +45,7 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all small systems of a size, for each type of tuples."""
     m, n = modes, nodes
     own, size = np.arange(n), 2 * m + POWER_COUNT + n
-    system = small_systems.fixed_values(m, n)[SYSTEM]
+    system = small_systems.fixed_values(m, n)[SystemArrays]
     problem: dict[str, Any] = {"static": (n,), "cluster": own, "rows": (n, m), "sliding": (n,),
                                "restitution": (n,), "tangential": (n,), "relief": (3,)}
     plain = kinds.NonsmoothProblem(
@@ -53,13 +53,13 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
         np.zeros(n), np.zeros(n), 0, np.zeros(3), 0, 0, 0)
     progress = kinds.progress_for(plain, own >= 0, np.zeros(2 * m), 0.0, 0.0)
     return {
-        SYSTEM: system,
-        kinds.PROBLEM: problem,
-        kinds.LIMITS: {"floor": (size,)},
-        kinds.PROGRESS: _shapes(progress),
-        kinds.OUTPUT: {"states": (None, size), "friction": (None, n), "normal": (None, n)},
-        kinds.WORKSPACE: _shapes(kinds.workspace_for(plain)),
-        ROOM: _shapes(room_for(plain, size)),
+        SystemArrays: system,
+        kinds.NonsmoothProblem: problem,
+        kinds.Limits: {"floor": (size,)},
+        kinds.Progress: _shapes(progress),
+        kinds.Output: {"states": (None, size), "friction": (None, n), "normal": (None, n)},
+        kinds.Workspace: _shapes(kinds.workspace_for(plain)),
+        Room: _shapes(room_for(plain, size)),
     }
 
 
