@@ -174,15 +174,22 @@ class _Kernel(CPUDispatcher):
     """A function for Python, compiled for one signature when it is first called.
 
     Compiled functions that call it get the function itself as a part of theirs, see
-    :func:`routine`, with references to records.
+    :func:`borrowing`, with references to records.
     """
 
     given: Any = None
+    by_address = False
+    options: Any = None
 
     @cached_property
     def signature(self) -> Any:
         """Arguments and result, as numba's types."""
-        return self.given or signature_of(self.py_func, by_reference=False)
+        return self.given or signature_of(self.py_func, by_reference=self.by_address)
+
+    def for_values(self, constants: str) -> Any:
+        """The same for records with values of :func:`fecontact.core.constants.constants`."""
+        return kernel(self.py_func, constants=constants, signature=self.given,
+                      by_address=self.by_address, **self.options)
 
     @property
     def _numba_type_(self) -> Any:
@@ -190,7 +197,7 @@ class _Kernel(CPUDispatcher):
 
     @cached_property
     def _inner(self) -> Any:
-        return routine(self.py_func)
+        return borrowing(self.py_func)
 
     def ready(self) -> Any:
         """Itself, compiled."""
@@ -216,26 +223,29 @@ KERNELS: list[_Kernel] = []
 
 
 def kernel(
-    function: Callable[..., Any] | None = None, *, signature: Any = None, constants: str = "",
-    **options: Any,
+    function: Callable[..., Any] | None = None, *, signature: Any = None, by_address: bool = False,
+    constants: str = "", **options: Any,
 ) -> Any:
     """Compile a function for the types of its annotations, at its first call; kept on disk.
 
     Records and arrays belong to the caller, so that the function has references to them. Sums may
     be reordered (so that they vectorise), but NaN and infinity keep their meaning. The stored code
     is renewed when the function changes, or anything that it is compiled from, see
-    :func:`source_digest`. With ``constants`` of :func:`fecontact.core.references.constants` it
-    serves for records with these values only. ``signature`` says what annotations cannot.
+    :func:`source_digest`. With ``constants`` of :func:`fecontact.core.constants.constants` it
+    serves for records with these values only. ``signature`` says what annotations cannot. One
+    that is called ``by_address`` gets references from compiled functions, and has no entry for
+    Python.
     """
     if function is None:
-        return partial(kernel, signature=signature, constants=constants, **options)
+        return partial(kernel, signature=signature, by_address=by_address, constants=constants,
+                       **options)
     function = getattr(function, "py_func", function)
     settings: dict[str, Any] = {
         "nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": _FASTMATH,
-        **options,
+        "no_cpython_wrapper": by_address, **options,
     }
     made = _Kernel(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
-    made.given = signature
+    made.given, made.by_address, made.options = signature, by_address, options
     made.enable_caching()
     _stamp(made, made, variant=constants)
     KERNELS.append(made)
@@ -251,6 +261,14 @@ def routine(function: Callable[..., Any]) -> Any:
     """As :func:`helper`, for long functions: they are not copied, and optimised by themselves."""
     # Said, lest it be as in the function for which it is compiled first.
     return part(function, error_model="numpy", fastmath=_FASTMATH, forceinline=False)
+
+
+def borrowing(function: Callable[..., Any]) -> Any:
+    """As :func:`routine`; as a kernel, it counts no references to arrays that it is given.
+
+    It must not return any of them.
+    """
+    return part(function, borrows=True, error_model="numpy", fastmath=_FASTMATH, forceinline=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,7 +330,9 @@ def compile_law(contract: Any, form: str, function: Callable[..., Any]) -> Compi
 
 
 def _signature(contract: Any) -> Any:
-    return contract if isinstance(contract, Signature) else signature_of(contract)
+    if isinstance(contract, Signature):
+        return contract
+    return signature_of(getattr(contract, "py_func", contract))
 
 
 def _arguments(function: Callable[..., Any]) -> str:
@@ -374,8 +394,8 @@ def _call_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 def function_at(contract: Any, *, only_reads: bool = False) -> Any:
     """A function for kernels that turns an address into a callable.
 
-    ``contract`` is its type, ``Callable[[...], ...]``. Functions that store nothing,
-    ``only_reads``, leave what kernels have read as it was.
+    ``contract`` is its type, ``Callable[[...], ...]``, or a kernel of that. Functions that
+    store nothing, ``only_reads``, leave what kernels have read as it was.
     """
     kind = _FunctionAt(_signature(contract), only_reads)
 

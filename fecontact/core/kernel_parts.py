@@ -128,7 +128,7 @@ class BorrowingCompiler(Compiler):
 
 
 def kernel_compiler(constants: str) -> Any:
-    """A compiler whose kernels have fixed values by :func:`fecontact.core.references.constants`."""
+    """A compiler whose kernels have fixed values by :func:`fecontact.core.constants.constants`."""
 
     class KernelCompiler(BorrowingCompiler):
         def define_pipelines(self) -> Any:
@@ -141,11 +141,19 @@ def kernel_compiler(constants: str) -> Any:
     return KernelCompiler
 
 
-class _PartCompiler(Compiler):
-    def define_pipelines(self) -> Any:
+class _OfParts:
+    def define_pipelines(self: Any) -> Any:
         state = self.state
         state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        return super().define_pipelines()
+        return super().define_pipelines()  # type: ignore[misc]
+
+
+class _PartCompiler(_OfParts, Compiler):
+    """A compiler of parts."""
+
+
+class _BorrowingPartCompiler(_OfParts, BorrowingCompiler):
+    """A compiler of parts that borrow what they are given."""
 
 
 class _Part(CPUDispatcher):
@@ -160,7 +168,8 @@ class _Part(CPUDispatcher):
         return self._callable(*arguments)
 
 
-def part(function: Callable[..., Any], **options: Any) -> Any:
+def part(function: Callable[..., Any], *, borrows: bool = False, **options: Any) -> Any:
     """A function that kernels call; ``options`` are those of numba."""
     return _Part(function, targetoptions={"nopython": True, "boundscheck": None, **_NO_ENTRY,
-                                          **options}, pipeline_class=_PartCompiler)
+                                          **options},
+                 pipeline_class=_BorrowingPartCompiler if borrows else _PartCompiler)

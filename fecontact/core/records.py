@@ -108,6 +108,6 @@ def signature_of(annotated: Any, *, by_reference: bool = True) -> Signature:
 
 
 def holds_arrays(kind: Any) -> bool:
-    """Whether a type of numba is an array, or a record that has some."""
+    """Whether a type of numba is an array, or a tuple that has some."""
     return isinstance(kind, types.Array) or (
-        isinstance(kind, types.BaseNamedTuple) and any(map(holds_arrays, kind)))
+        isinstance(kind, types.BaseTuple) and any(map(holds_arrays, kind)))

@@ -6,10 +6,8 @@ when they are named, so that functions are written as if they had the tuple itse
 """
 
 import hashlib
-from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -135,39 +133,6 @@ def _asked(builder: Any, name: str, value: Any, *place: int) -> Any:
         found.set_metadata("invariant.load", builder.module.add_metadata([]))
         inside.ret(found)
     return builder.call(function, [builder.bitcast(value, cgutils.voidptr_t)])
-
-
-def constants(given: Mapping[Any, Mapping[str, Any]]) -> str:
-    """Intermediate code that gives fields of tuples fixed values in a kernel.
-
-    Parameters
-    ----------
-    given : mapping
-        For each tuple type its fields: a shape, whose entries may be None, of an array; an integer
-        array for that and its entries; an integer for a number.
-    """
-    module = ir.Module("constants")
-    for tuple_type, fields in given.items():
-        for field, value in fields.items():
-            name = f"{Reference(tuple_type).name}.{field}"
-            if not isinstance(value, np.ndarray | tuple):
-                _define(module, name, _I64(value))
-                continue
-            shape = value.shape if isinstance(value, np.ndarray) else value
-            for axis, length in enumerate(shape):
-                if length is not None:
-                    _define(module, f"{name}.{axis}", _I64(length))
-            if isinstance(value, np.ndarray):
-                entries = ir.Constant(ir.ArrayType(_I64, value.size), value.ravel().tolist())
-                table = cgutils.global_constant(module, f"{name}.entries", entries)
-                _define(module, f"{name}.data", table.bitcast(_I64.as_pointer()))
-    return str(module)
-
-
-def _define(module: Any, name: str, value: Any) -> None:
-    function = ir.Function(module, ir.FunctionType(value.type, [cgutils.voidptr_t]), name)
-    function.attributes.add("alwaysinline")
-    ir.IRBuilder(function.append_basic_block()).ret(value)
 
 
 def _write(builder: Any, value: Any, place: Any) -> None:

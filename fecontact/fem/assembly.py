@@ -17,7 +17,6 @@ lateral constant for lambda.
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import MeshError
@@ -32,10 +31,6 @@ from fecontact.core.records import (
     Vector,
 )
 from fecontact.core.types import Array, Integers
-
-_index = types.Array(types.int32, 1, "C")
-_slots = types.Array(types.int32, 3, "C")
-_reference = types.Array(types.float64, 4, "C")
 
 # Largest difference between the edges of a cell whose map counts as affine, relative to them.
 _AFFINE = 1e-13

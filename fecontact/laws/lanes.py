@@ -11,7 +11,7 @@ from typing import Any
 
 from numba import types
 
-from fecontact.core.compiled import CompiledLaw, compile_law, function_at, helper, matrix
+from fecontact.core.compiled import CompiledLaw, compile_law, function_at, helper
 from fecontact.core.lanes.functions import (
     arctangent,
     exponential,
@@ -21,6 +21,7 @@ from fecontact.core.lanes.functions import (
     sine_and_cosine,
 )
 from fecontact.core.lanes.vectors import bits, chosen, lanes, magnitude, read, root, spread
+from fecontact.core.records import Matrix, numba_type
 from fecontact.laws.friction import stribeck
 from fecontact.laws.ground.motion import HarmonicSpeed, constant_speed
 from fecontact.laws.normal import rough_surface
@@ -28,8 +29,8 @@ from fecontact.laws.normal.linear import LinearContact, PrescribedForce, TwoSide
 from fecontact.laws.normal.power import PowerContact
 from fecontact.laws.signals.harmonic import Constant, Harmonic
 
-_NODE = types.UniTuple(lanes, 3)(lanes, lanes, matrix)
-_SIGNAL = types.UniTuple(lanes, 2)(lanes, matrix)
+_NODE = types.UniTuple(lanes, 3)(lanes, lanes, numba_type(Matrix))
+_SIGNAL = types.UniTuple(lanes, 2)(lanes, numba_type(Matrix))
 node_lanes_at = function_at(_NODE, only_reads=True)
 signal_lanes_at = function_at(_SIGNAL, only_reads=True)
 

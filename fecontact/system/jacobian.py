@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.compiled import borrowing, helper, kernel, routine
 from fecontact.core.records import Block, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.system.kernels import (
     body_rates,
     friction_across,
@@ -129,7 +128,6 @@ def _contact_gradients(t, y, s, gradients, active, out):
 @kernel
 def jacobian(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
     """Fill out (2 m + n s, 2 m + n s) with dy'/dy."""
-    y, s = borrowed(y), borrowed(s)
     n, m = s.Tx.shape
     rows = 3 if in_space(s) else 2
     gradients, active = np.empty((2 * rows, n, m)), np.empty((n, rows * m))
@@ -148,10 +146,8 @@ def jacobian(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
             out[m:end, m:end] += np.dot(T2, gradients[5, :count])
 
 
-@helper
+@borrowing
 def _fill_rates(t, x, s, load, force, rates, f):
-    t, x, s, f = borrowed(t), borrowed(x), borrowed(s), borrowed(f)
-    load, force, rates = borrowed(load), borrowed(force), borrowed(rates)
     moved = GroundMotion(0.0, 0.0, 0.0, 0.0)
     for c in range(len(t)):
         if c == 0 or t[c] != t[c - 1]:
@@ -205,13 +201,11 @@ def _add_contact(j, F, T, T2, s, partial, gradient, rate, out):
                 out[m + i, k] += across * gradient[2, k]
 
 
-@helper
+@borrowing
 def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
-    # What is made in this call is borrowed too: counting references costs as much as the laws.
-    t, x, s, f, J = borrowed(t), borrowed(x), borrowed(s), borrowed(f), borrowed(J)
-    r, P, laws = borrowed(r), borrowed(P), borrowed(laws)
-    load, load_p, force, room, memory, shifts = borrowed(vectors)
-    rates, room_rates, partial, gradient = borrowed(matrices)
+    # Counting references to what is made for it costs as much as the laws.
+    load, load_p, force, room, memory, shifts = vectors
+    rates, room_rates, partial, gradient = matrices
     n, m = s.Tx.shape
     states = len(rates)
     differs = len(P) > 0

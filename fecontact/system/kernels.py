@@ -23,7 +23,6 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
 from fecontact.system.nodes import (
     SystemArrays,
@@ -140,7 +139,6 @@ def contact_state(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
 
     In space (n, 8): with friction force and slip velocity along the second tangent.
     """
-    y, s = borrowed(y), borrowed(s)
     n = len(s.Tx)
     moved = ground_motion(t, s)
     states = s.memory.max()
@@ -245,7 +243,6 @@ def rates_under(load, moved, y, s, force, rates, out):
 @kernel
 def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     """Fill out (2 m + n s,) with y'."""
-    y, s = borrowed(y), borrowed(s)
     states = s.memory.max()
     load = np.empty(s.Tx.shape[1])
     moved = given_at(t, s, load)

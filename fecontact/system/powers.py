@@ -6,7 +6,6 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Vector
-from fecontact.core.references import borrowed
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system.kernels import friction_across, node_forces
 from fecontact.system.nodes import (
@@ -159,4 +158,4 @@ def powers(
     t: float, y: Vector, s: SystemArrays, stick_speed: Vector, out: Vector, nodes: Vector,
 ) -> None:
     """As :func:`set_powers`."""
-    set_powers(t, borrowed(y), borrowed(s), stick_speed, out, nodes)
+    set_powers(t, y, s, stick_speed, out, nodes)

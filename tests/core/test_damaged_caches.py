@@ -15,11 +15,12 @@ from fecontact.core.lanes import vectors
 from fecontact.core.lanes.vectors import WIDTH
 
 MODULE = '''
-from fecontact.core.compiled import compile_law, f8, kernel
+from collections.abc import Callable
+from fecontact.core.compiled import compile_law, kernel
 
 
-@kernel(f8(f8))
-def doubled(x):
+@kernel
+def doubled(x: float) -> float:
     return 2.0 * x
 
 
@@ -27,7 +28,7 @@ def halved(x):
     return 0.5 * x
 
 
-LAW = compile_law(f8(f8), "f(x) -> y", halved)
+LAW = compile_law(Callable[[float], float], "f(x) -> y", halved)
 assert doubled(3.0) == 6.0
 assert LAW.address
 hits = sum(doubled.stats.cache_hits.values()), LAW._compiled.cache_hits
@@ -125,7 +126,7 @@ def scaled(x):
 '''
 CALLING = '''
 import helpers
-from fecontact.core.compiled import f8, helper, kernel
+from fecontact.core.compiled import helper, kernel
 
 
 @helper
@@ -133,12 +134,13 @@ def shifted(x):
     return helpers.scaled(x) + 1.0
 
 
-@kernel(f8(f8))
-def outer(x):
+@kernel
+def outer(x: float) -> float:
     return shifted(x)
 
 
-print(*outer.stats.cache_hits.values() or [0], outer(3.0))
+value = outer(3.0)
+print(*outer.stats.cache_hits.values() or [0], value)
 '''
 
 

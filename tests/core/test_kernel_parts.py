@@ -2,42 +2,39 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from numba import types
 
-from fecontact.core.compiled import (
-    compile_law,
-    f8,
-    function_at,
-    helper,
-    i8,
-    integers,
-    kernel,
-    matrix,
-    routine,
-    vector,
+from fecontact.core.compiled import compile_law, function_at, helper, kernel, routine
+from fecontact.core.constants import constants
+from fecontact.core.records import (
+    IntegerVector,
+    Matrix,
+    Vector,
+    holds_arrays,
+    numba_type,
+    signature_of,
 )
-from fecontact.core.references import Reference, borrowed, constants
+from fecontact.core.references import Reference
 
 
 class Inner(NamedTuple):
-    rows: Any
+    rows: Matrix
     factor: float
 
 
 class Outer(NamedTuple):
-    x: Any
+    x: Vector
     inner: Inner
     count: int
 
 
-INNER = types.NamedTuple([matrix, f8], Inner)
-OUTER = types.NamedTuple([vector, INNER, i8], Outer)
-_ADDED = f8(Reference(OUTER), vector)
+_ADDED = Callable[[Outer, Vector], float]
 _added_at = function_at(_ADDED)
 
 
@@ -62,20 +59,19 @@ def _add(p, y):
 added = compile_law(_ADDED, "added(p, y)", _add)
 
 
-@kernel(f8(INNER))
-def first_by_value(held):
-    return first_of(borrowed(held))
+@kernel
+def first_by_kernel(inner: Inner) -> float:
+    return first_of(inner)
 
 
-@kernel(f8(OUTER, vector, i8))
-def run(held, y, address):
-    p = borrowed(held)
+@kernel
+def run(p: Outer, y: Vector, address: int) -> float:
     total = 0.0
     for _ in range(p.count):
         # What is stored between two reads is seen, and so is a change in place.
         p.x[0] += 1.0
         total += _added_at(address)(p, y)
-    return total + first_by_value(p.inner)
+    return total + first_by_kernel(p.inner)
 
 
 def given():
@@ -102,33 +98,29 @@ def test_one_kernel_for_tuples_of_any_values():
 
 
 def test_references_are_told_apart_by_what_they_refer_to():
-    other = types.NamedTuple([vector, f8], Inner)
-    assert Reference(INNER) == Reference(INNER)
-    assert Reference(INNER) != Reference(other)
-    assert len(Reference(OUTER).name) < 60
+    inner = numba_type(Inner)
+    other = types.NamedTuple([numba_type(Vector), types.float64], Inner)
+    assert Reference(inner) == Reference(numba_type(Inner))
+    assert Reference(inner) != Reference(other)
+    assert len(Reference(numba_type(Outer)).name) < 60
 
 
 def test_a_part_of_kernels_can_be_called_from_python():
     p, y = given(), np.zeros(3)
     add_product(p, y)
     assert y == pytest.approx(2.5 * p.inner.rows @ p.x, rel=1e-14)
-    assert first_of(p.inner) == pytest.approx(first_by_value(p.inner), rel=1e-15)
+    assert first_of(p.inner) == pytest.approx(first_by_kernel(p.inner), rel=1e-15)
 
 
 class Table(NamedTuple):
-    places: Any
-    weights: Any
+    places: IntegerVector
+    weights: Vector
     inner: Inner
     factor: int
 
 
-TABLE = types.NamedTuple([integers, vector, INNER, i8], Table)
-_SUM = f8(TABLE)
-
-
-@kernel(_SUM)
-def weighted(held):
-    p = borrowed(held)
+@kernel
+def weighted(p: Table) -> float:
     total = 0.0
     for k in range(len(p.places)):
         total += p.weights[p.places[k]]
@@ -141,12 +133,68 @@ def test_constants_stand_for_what_a_tuple_says():
     rows = np.arange(12.0).reshape(3, 4)
     p = Table(np.array([0, 1, 2]), np.array([1.0, 10.0, 100.0, 1000.0]), Inner(rows, 2.5), 2)
     assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)
-    said = constants({TABLE: {"places": np.array([3, 2]), "factor": 5}, INNER: {"rows": (2, None)}})
-    assert kernel(_SUM, constants=said)(weighted.py_func)(p) == 5.0 * (1100.0 + 1.0 + 5.0)
+    said = constants({Table: {"places": np.array([3, 2]), "factor": 5}, Inner: {"rows": (2, None)}})
+    assert weighted.for_values(said)(p) == 5.0 * (1100.0 + 1.0 + 5.0)
     # What numbers stand beside one another follows from the shape alone.
-    narrow = constants({INNER: {"rows": (None, 2)}})
-    assert kernel(_SUM, constants=narrow)(weighted.py_func)(p) == 2.0 * (111.0 + 1.0 + 3.0 + 5.0)
+    narrow = constants({Inner: {"rows": (None, 2)}})
+    assert weighted.for_values(narrow)(p) == 2.0 * (111.0 + 1.0 + 3.0 + 5.0)
     assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)
+
+
+class Numbers(NamedTuple):
+    a: float
+    b: float
+
+
+def test_annotations_stand_for_types():
+    vector = types.Array(types.float64, 1, "C")
+    assert numba_type(Numbers) == types.NamedUniTuple(types.float64, 2, Numbers)
+    assert numba_type(Table) == types.NamedTuple(
+        [types.Array(types.int64, 1, "C"), vector, numba_type(Inner), types.int64], Table)
+    assert numba_type(tuple[float, int]) == types.Tuple([types.float64, types.int64])
+    assert holds_arrays(numba_type(Outer))
+    assert not holds_arrays(numba_type(Numbers))
+    with pytest.raises(TypeError, match="stands for no type"):
+        numba_type(dict)
+
+
+def test_only_records_with_arrays_go_by_reference():
+    found = signature_of(Callable[[Outer, Numbers, Vector, bool], None])
+    assert found.args == (Reference(numba_type(Outer)), numba_type(Numbers), numba_type(Vector),
+                          types.boolean)
+    assert found.return_type == types.void
+    assert signature_of(weighted.py_func, by_reference=False).args == (numba_type(Table),)
+
+
+@kernel(by_address=True)
+def scaled_first(p: Inner, factor: float) -> float:
+    return factor * p.rows[0, 0]
+
+
+_scaled_at = function_at(scaled_first)
+
+
+@kernel
+def through_address(p: Outer, address: int) -> float:
+    return _scaled_at(address)(p.inner, 3.0)
+
+
+def test_a_kernel_is_called_by_its_address():
+    p = given()
+    assert through_address(p, scaled_first.address) == 3.0 * p.inner.rows[0, 0]
+
+
+@kernel
+def twice(p: Inner) -> float:
+    return 2.0 * p.factor
+
+
+def test_a_kernel_is_compiled_at_its_first_call_and_for_its_types_alone():
+    assert not twice.overloads
+    assert twice(Inner(np.ones((1, 1)), 1.5)) == 3.0
+    assert len(twice.overloads) == 1
+    with pytest.raises(TypeError, match="No matching definition"):
+        twice(Inner(np.ones(1), 1.5))
 
 
 @pytest.mark.long

@@ -2,55 +2,53 @@
 
 import numpy as np
 import pytest
-from numba import types
 
-from fecontact.core.compiled import kernel, matrix
+from fecontact.core.compiled import kernel
 from fecontact.core.lanes import functions
 from fecontact.core.lanes.vectors import bits, chosen, mask_of, read, write
+from fecontact.core.records import Matrix
 
-_ONE = types.void(matrix, matrix)
 
-
-@kernel(_ONE)
-def exponentials(x, out):
+@kernel
+def exponentials(x: Matrix, out: Matrix) -> None:
     for i in range(len(x)):
         write(out[i], functions.exponential(read(x[i])))
 
 
-@kernel(_ONE)
-def logarithms(x, out):
+@kernel
+def logarithms(x: Matrix, out: Matrix) -> None:
     for i in range(len(x)):
         write(out[i], functions.logarithm(read(x[i])))
 
 
-@kernel(_ONE)
-def arctangents(x, out):
+@kernel
+def arctangents(x: Matrix, out: Matrix) -> None:
     for i in range(len(x)):
         write(out[i], functions.arctangent(read(x[i])))
 
 
-@kernel(_ONE)
-def tangents(x, out):
+@kernel
+def tangents(x: Matrix, out: Matrix) -> None:
     for i in range(len(x)):
         write(out[i], functions.hyperbolic_tangent(read(x[i])))
 
 
-@kernel(_ONE)
-def fifth_roots(x, out):
+@kernel
+def fifth_roots(x: Matrix, out: Matrix) -> None:
     for i in range(len(x)):
         write(out[i], functions.reciprocal_fifth_root(read(x[i])))
 
 
-@kernel(types.void(matrix, matrix, matrix))
-def sines(x, sine, cosine):
+@kernel
+def sines(x: Matrix, sine: Matrix, cosine: Matrix) -> None:
     for i in range(len(x)):
         first, second = functions.sine_and_cosine(read(x[i]))
         write(sine[i], first)
         write(cosine[i], second)
 
 
-@kernel(types.int64(matrix, types.int64))
-def both(x, given):
+@kernel
+def both(x: Matrix, given: int) -> int:
     """Lanes above zero that are among the given ones; x becomes -1 in all others."""
     where = (read(x[0]) > 0.0) & mask_of(given)
     write(x[0], chosen(where, read(x[0]), -1.0))

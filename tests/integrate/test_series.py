@@ -9,12 +9,13 @@ from systems import SURFACE, friction_oscillator, impact_oscillator, mass_in_y
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Load, ModalBasis, PointLoad, Status, simulate
-from fecontact.core.compiled import f8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
 from fecontact.core.errors import InputError
+from fecontact.core.records import Matrix, Vector
 from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.series import polynomials, small_systems
-from fecontact.integrate.series.advance import ADVANCE, advance
+from fecontact.integrate.series.advance import advance
 from fecontact.integrate.series.branches import MOST_MODES
 from fecontact.laws import (
     ConstantFriction,
@@ -31,8 +32,8 @@ from fecontact.laws.pieces import DAMPING, ELASTIC, LOWER, RELEASE, UPPER
 SERIES, STEPS = Rodas5P(series="always"), Rodas5P(series="never")
 
 
-@kernel(f8(vector, f8, matrix))
-def first_zero(p, limit, room):
+@kernel
+def first_zero(p: Vector, limit: float, room: Matrix) -> float:
     """As the kernels find it."""
     return polynomials.first_zero(p, limit, room)
 
@@ -467,9 +468,9 @@ def test_what_small_systems_take_for_granted(modes, nodes):
     runs = [driver.start(system, state, np.linspace(0.0, 0.2, 11), rtol=1e-8, series="always")
             for _ in range(2)]
     said = small_systems.fixed_values(modes, nodes)
-    for values, kind in zip((runs[0].problem, runs[0].progress, runs[0].output, runs[0].watch,
-                             runs[0].series), ADVANCE.args, strict=False):
-        for field, expected in said.get(kind, {}).items():
+    for values in (runs[0].problem, runs[0].progress, runs[0].output, runs[0].watch,
+                   runs[0].series):
+        for field, expected in said.get(type(values), {}).items():
             value = getattr(values, field)
             if isinstance(expected, tuple):
                 for length, wanted in zip(value.shape, expected, strict=True):

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from systems import mass_in_y
 
-from fecontact.core.compiled import f8, kernel
+from fecontact.core.compiled import kernel
 from fecontact.integrate.collocation.courses import first_switch
-from fecontact.integrate.collocation.room import COLLOCATION, collocation_for
+from fecontact.integrate.collocation.room import Collocation, collocation_for
 from fecontact.integrate.rodas5p import driver
-from fecontact.integrate.rodas5p.state import PROBLEM
+from fecontact.integrate.rodas5p.state import Problem
 from fecontact.laws import RoughSurface
 
 STIFFNESS, HEIGHT = 1e6, 1e-5
 
 
-@kernel(f8(f8, PROBLEM, COLLOCATION))
-def found(after, problem, c):
+@kernel
+def found(after: float, problem: Problem, c: Collocation) -> float:
     return first_switch(after, problem, c)
 
 

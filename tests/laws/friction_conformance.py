@@ -1,21 +1,23 @@
 """What every friction law must do, whoever wrote it: checks that raise AssertionError."""
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Matrix, Vector
 from fecontact.laws.signatures import friction_at, memory_at
 
 SPEEDS = np.geomspace(1e-4, 1e5, 55)
 
 
-@kernel(types.void(i8, f8, f8, vector, vector))
-def _compiled_friction(address, v, F, p, out):
+@kernel
+def _compiled_friction(address: int, v: float, F: float, p: Vector, out: Vector) -> None:
     out[0], out[1], out[2] = friction_at(address)(v, F, p)
 
 
-@kernel(types.void(i8, f8, f8, vector, vector, vector, matrix))
-def _compiled_memory(address, v, F, z, p, force, rates):
+@kernel
+def _compiled_memory(
+    address: int, v: float, F: float, z: Vector, p: Vector, force: Vector, rates: Matrix,
+) -> None:
     memory_at(address)(v, F, z, p, force, rates)
 
 

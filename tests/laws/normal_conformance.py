@@ -6,15 +6,15 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numba import types
 from scipy.integrate import quad
 
-from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Matrix, Vector
 from fecontact.laws.signatures import normal_at
 
 
-@kernel(types.void(i8, vector, vector, vector, matrix))
-def _forces(address, u, v, p, out):
+@kernel
+def _forces(address: int, u: Vector, v: Vector, p: Vector, out: Matrix) -> None:
     law = normal_at(address)
     for k in range(len(u)):
         out[k, 0], out[k, 1], out[k, 2] = law(u[k], v[k], p)

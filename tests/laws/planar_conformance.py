@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 from friction_conformance import memory_outputs, parameters, sliding_memory
-from numba import types
 
-from fecontact.core.compiled import f8, i8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Matrix, Vector
 from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.signatures import planar_at
 
@@ -16,8 +16,11 @@ ANGLES = (0.0, 0.4, 1.9, 3.3, 5.1)
 _TURN = 0.7
 
 
-@kernel(types.void(i8, i8, f8, f8, f8, vector, vector, vector, matrix))
-def _compiled(address, law, v1, v2, F, z, p, force, rates):
+@kernel
+def _compiled(
+    address: int, law: int, v1: float, v2: float, F: float, z: Vector, p: Vector, force: Vector,
+    rates: Matrix,
+) -> None:
     planar_at(address)(law, v1, v2, F, z, p, force, rates)
 
 

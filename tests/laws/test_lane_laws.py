@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from numba import types
 
-from fecontact.core.compiled import i8, kernel, matrix, vector
+from fecontact.core.compiled import kernel
 from fecontact.core.lanes.vectors import read, write
+from fecontact.core.records import Matrix, Vector
 from fecontact.laws import (
     Constant,
     ConstantFriction,
@@ -30,16 +30,16 @@ from fecontact.laws import lanes as lane_laws
 from fecontact.laws.ground.motion import constant_speed
 
 
-@kernel(types.void(i8, vector, vector, matrix, matrix))
-def at_nodes(law, a, b, p, out):
+@kernel
+def at_nodes(law: int, a: Vector, b: Vector, p: Matrix, out: Matrix) -> None:
     one, two, three = lane_laws.node_lanes_at(law)(read(a), read(b), p)
     write(out[0], one)
     write(out[1], two)
     write(out[2], three)
 
 
-@kernel(types.void(i8, vector, matrix, matrix))
-def at_times(law, t, p, out):
+@kernel
+def at_times(law: int, t: Vector, p: Matrix, out: Matrix) -> None:
     value, rate = lane_laws.signal_lanes_at(law)(read(t), p)
     write(out[0], value)
     write(out[1], rate)

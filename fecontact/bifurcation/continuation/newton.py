@@ -11,7 +11,6 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, Line
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 
@@ -52,7 +51,6 @@ def improve(weights: Vector, steps: Matrix, count: int) -> float:
 
     Broyden's update of the matrix, applied as sums over the steps. Returns the step's length.
     """
-    weights, steps = borrowed(weights), borrowed(steps)
     change = steps[count]
     for index in range(count):
         step = steps[index]

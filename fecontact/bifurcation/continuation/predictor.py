@@ -15,7 +15,6 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 # Points behind the last one that count at most.
@@ -70,7 +69,6 @@ def _guesses(weights: Vector, trail: Matrix, step: float, out: Matrix) -> int:
 
     ``trail`` (2 k, n) are u and tangent of the last point, of the one before it, and so on.
     """
-    weights, trail, out = borrowed(weights), borrowed(trail), borrowed(out)
     points, size = len(trail) // 2, trail.shape[1]
     places, factors = np.zeros(points), np.zeros(points)
     root, count = 0.0, 0

@@ -16,7 +16,6 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import IntegerVector, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import ERROR_3, ERROR_5, STAGES, A, B, C
 from fecontact.integrate.nonsmooth.equations import (
     derivative,
@@ -146,8 +145,8 @@ def _error(h, sizes, rtol, slopes):
 
 @kernel(nogil=True)
 def flow(
-    held_p: NonsmoothProblem, held_above: NonsmoothProblem, held_below: NonsmoothProblem,
-    held_w: Workspace, change: float, tick: float, limits: Vector, begin: float, longest: float,
+    p: NonsmoothProblem, above: NonsmoothProblem, below: NonsmoothProblem,
+    w: Workspace, change: float, tick: float, limits: Vector, begin: float, longest: float,
     times: Vector, start: Vector, status: IntegerVector, closed: IntegerVector, sizes: Vector,
     full: Vector, rate: Vector, states: Matrix, slopes: Matrix,
 ) -> int:
@@ -159,8 +158,6 @@ def flow(
     ``below`` change by ``change`` to either side; ``tick`` is the step of differences in time, 0
     for equations that do not depend on it. ``full`` and ``rate`` are room for a state.
     """
-    p, above, below = borrowed(held_p), borrowed(held_above), borrowed(held_below)
-    w = borrowed(held_w)
     d = len(start)
     y, around, near = start.copy(), np.empty(d), np.empty(d)
     places, stages = np.empty((STAGES + 1, d)), np.empty((STAGES + 1, d))
@@ -235,7 +232,7 @@ def _pressed(j, p, w):
 
 @kernel
 def observe(
-    held_p: NonsmoothProblem, held_w: Workspace, times: Vector, states: Matrix,
+    p: NonsmoothProblem, w: Workspace, times: Vector, states: Matrix,
     status: IntegerVector, closed: IntegerVector, full: Vector, rate: Vector, margins: Matrix,
     rates: Matrix,
 ) -> None:
@@ -246,7 +243,6 @@ def observe(
     and of a node on compliant contact its force at 2 k + j, of an open stop its height. The rest is
     infinite. The force of an open node is what its law would pull.
     """
-    p, w = borrowed(held_p), borrowed(held_w)
     clusters, n = len(p.rows), len(p.cluster)
     for row in range(len(times)):
         _rates(times[row], states[row], p, status, closed, w, full, rate, rates[row])
@@ -274,14 +270,13 @@ def observe(
 
 @kernel
 def strike_rows(
-    held_p: NonsmoothProblem, held_w: Workspace, t: float, state: Vector, status: IntegerVector,
+    p: NonsmoothProblem, w: Workspace, t: float, state: Vector, status: IntegerVector,
     closed: IntegerVector, full: Vector, rate: Vector, held: Matrix, pushing: Matrix,
     speeds: Vector, coefficients: Vector,
 ) -> None:
     """What an impact needs: rows held (n + k, m), pushing (n + k, m) of unit impulses, penetration
     rates and slip velocities (n + k,), and coefficients of friction (n,) at these.
     """
-    p, w = borrowed(held_p), borrowed(held_w)
     clusters, n, m = len(p.rows), len(p.cluster), p.rows.shape[1]
     _rates(t, state, p, status, closed, w, full, rate, rate[: len(state)].copy())
     w.friction[:] = 0.0
@@ -298,7 +293,7 @@ def strike_rows(
 
 @kernel
 def decide(
-    held_p: NonsmoothProblem, held_w: Workspace, held_progress: Progress, held_room: Room,
+    p: NonsmoothProblem, w: Workspace, progress: Progress, room: Room,
     t: float, near: float, slow: float,
 ) -> float:
     """Change the contact state at a moment as a run does; NO_ACCELERATION or NO_IMPULSES where that
@@ -307,8 +302,6 @@ def decide(
     What ``room`` marks changes: see :func:`fecontact.integrate.nonsmooth.rigid_stops` and
     :func:`fecontact.integrate.nonsmooth.transitions.decide_clusters`.
     """
-    p, w, progress, room = (borrowed(held_p), borrowed(held_w), borrowed(held_progress),
-                            borrowed(held_room))
     if p.rigid != 0:
         return change_contacts_at(p.change)(t, p, progress, room, w, slow, 0.0, 0.0,
                                             room.slopes[0])
@@ -317,9 +310,8 @@ def decide(
 
 
 @kernel
-def forces_of_touch(held_p: NonsmoothProblem, out: Vector) -> None:
+def forces_of_touch(p: NonsmoothProblem, out: Vector) -> None:
     """Fill out (n,) with the normal forces at first contact of dashpots, at a unit rate."""
-    p = borrowed(held_p)
     for j in range(len(out)):
         law = normal_at(p.system.normal[j])
         out[j] = (law(_FIRST, 1.0, p.system.normal_parameters[j])[0]
@@ -327,8 +319,7 @@ def forces_of_touch(held_p: NonsmoothProblem, out: Vector) -> None:
 
 
 @kernel
-def kinetic_coefficients(held_p: NonsmoothProblem, out: Vector) -> None:
+def kinetic_coefficients(p: NonsmoothProblem, out: Vector) -> None:
     """Fill out (n,) with the coefficients of friction at the begin of slip."""
-    p = borrowed(held_p)
     for j in range(len(out)):
         out[j] = slipping_force(j, CREEP, 1.0, 1.0, p.system)

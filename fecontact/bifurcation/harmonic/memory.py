@@ -16,17 +16,13 @@ node by node.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, helper, kernel
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.records import Array4, Block, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import SystemArrays, force_room, ground_motion, in_space, node_motion
-
-_nodes = types.Array(f8, 4, "C")
 
 LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
@@ -75,7 +71,6 @@ def solve_around(slopes: Array4, T: float, x: Block) -> None:
     two samples are guessed as zero first; what this leaves around the period is the solution of
     2 s equations, since solutions of the homogeneous equations combine.
     """
-    slopes, x = borrowed(slopes), borrowed(x)
     N, n, s, _ = slopes.shape
     columns = x.shape[2]
     rate = N / T
@@ -167,7 +162,6 @@ def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Ma
     begin without deflection; after two of them, Newton's method finds the start that repeats.
     Returns 1 if every node has come to that, 0 if one has not.
     """
-    t, y, s, z, target = borrowed(t), borrowed(y), borrowed(s), borrowed(z), borrowed(target)
     N, n = len(t), len(s.Tx)
     states = s.memory.max()
     length, width = force_room(states, in_space(s))

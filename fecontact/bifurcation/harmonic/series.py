@@ -8,14 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8, helper, kernel
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Array4, Matrix
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
-
-_blocks = types.Array(f8, 4, "C")
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +149,6 @@ def fill_blocks(
     those to the velocities x' / T of the first m functions. The matrix is that of x'' / T^2 - f for
     these m, and of x' / T - f for the others.
     """
-    Cx, Sx, Cv, Sv, out = borrowed(Cx), borrowed(Sx), borrowed(Cv), borrowed(Sv), borrowed(out)
     # One function alone is common, and its loops of one round take most of the time.
     if rows == 1 and displacements == 1:
         _fill(Cx, Sx, Cv, Sv, T, 1, 1, out)

@@ -26,7 +26,6 @@ from fecontact.core.dense_lu import (
 from fecontact.core.dense_lu import solve as solve_dense
 from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.references import borrowed
 
 
 @helper
@@ -64,8 +63,6 @@ def reduce_border(
     Fills ``small`` (2 d + e,) and, over the pivot rows, ``weights``: the multiples of the reduced
     right-hand sides to subtract from that of the border.
     """
-    factors, given, small, weights = (borrowed(factors), borrowed(given), borrowed(small),
-                                      borrowed(weights))
     inner_weights, chain_weights, top_weights = _parts(factors, weights)
     groups, size, width, _ = factors.inner.shape
     N, d, columns = factors.local.shape
@@ -129,8 +126,6 @@ def reduce_side(factors: CondensedFactors, rhs: Vector, reduced: Vector, side: V
 
     Fills ``reduced`` over the pivot rows and ``side`` (d,) for the rows of ``factors.end``.
     """
-    factors, rhs, side, reduced = (borrowed(factors), borrowed(rhs), borrowed(side),
-                                   borrowed(reduced))
     of_inner, of_chain, of_top = _parts(factors, reduced)
     groups, size, _, _ = factors.inner.shape
     N, d, _ = factors.local.shape
@@ -182,8 +177,6 @@ def original_rows(factors: CondensedFactors, reduced: Vector, end: Vector, out: 
     Their sum is that of the pivot rows times ``reduced`` and of the rows of ``factors.end`` times
     ``end`` (d,): the transpose of :func:`reduce_side`.
     """
-    factors, end, out, reduced = (borrowed(factors), borrowed(end), borrowed(out),
-                                  borrowed(reduced))
     of_inner, of_chain, of_top = _parts(factors, reduced)
     groups, size, _, _ = factors.inner.shape
     N, d, _ = factors.local.shape
@@ -233,7 +226,6 @@ def expand(
     out: Vector,
 ) -> None:
     """Fill ``out`` (N m d,) with all nodes from x_0, x_N and the common unknowns."""
-    factors, out, reduced = borrowed(factors), borrowed(out), borrowed(reduced)
     of_inner, of_chain, of_top = _parts(factors, reduced)
     groups, size, width, _ = factors.inner.shape
     N, d, columns = factors.local.shape

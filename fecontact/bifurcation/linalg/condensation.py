@@ -19,19 +19,13 @@ segments.
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
-from fecontact.core.compiled import f8, helper, i8, kernel
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise
 from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.records import Array4, Block, IntegerBlock, IntegerMatrix, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
-
-_pivots = types.Array(i8, 2, "C")
-_orders = types.Array(i8, 3, "C")
-_groups = types.Array(f8, 4, "C")
 
 
 class CondensedFactors(NamedTuple):
@@ -147,7 +141,6 @@ def _chain_segments(local, chain, order, end):
 @kernel
 def chain_intervals(factors: CondensedFactors) -> None:
     """Eliminate x_1, x_2, ... from the equations ``local`` of the intervals."""
-    factors = borrowed(factors)
     top, end = factors.top, factors.end
     d, columns = end.shape
     e = columns - 2 * d
@@ -186,7 +179,6 @@ def condense(
     (m, m + 1) of the basis there. Rows: sum_k slopes x_k - h T f. The common unknowns are T (if
     ``with_period``) and q parameters.
     """
-    J, f, P, factors = borrowed(J), borrowed(f), borrowed(P), borrowed(factors)
     local = factors.local
     groups = len(factors.inner)
     N = len(widths)

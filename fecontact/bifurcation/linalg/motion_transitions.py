@@ -17,7 +17,6 @@ from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.records import Block, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 
@@ -68,7 +67,6 @@ def motion_transitions(
     J (N s, 2 m, 2 m) are the derivatives of [q', q''] at the collocation points, ``points`` (s,),
     A (s, s) and b (s,) those of :func:`integrals`.
     """
-    J, points, A, b, out = (borrowed(J), borrowed(points), borrowed(A), borrowed(b), borrowed(out))
     N, d, s = out.shape[0], out.shape[1], len(points)
     m = d // 2
     size, columns = s * m, s * m + d

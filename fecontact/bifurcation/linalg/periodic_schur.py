@@ -10,17 +10,12 @@ triangular form, and each eigenvalue is the product of corresponding diagonal en
 import math
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.transition_matrices import condense_products
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, ComplexVector
 from fecontact.core.types import Array
-
-_complex = types.complex128
-_complex_block = types.Array(_complex, 3, "C")
-_complex_vector = types.Array(_complex, 1, "C")
 
 _EPS = float(np.finfo(float).eps)
 _STEPS = 60  # shifted steps for one eigenvalue before giving up

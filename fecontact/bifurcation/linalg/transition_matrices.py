@@ -8,13 +8,11 @@ from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.core.compiled import kernel
 from fecontact.core.dense_lu import factorise, solve_rows
 from fecontact.core.records import Block
-from fecontact.core.references import borrowed
 
 
 @kernel
 def transitions(factors: CondensedFactors, out: Block) -> None:
     """Fill out (N, d, d) with the M_j of the condensed intervals, x_(j+1) = M_j x_j."""
-    factors, out = borrowed(factors), borrowed(out)
     local = factors.local
     N, d, _ = out.shape
     a, pivots = np.empty((d, d)), np.empty(d, dtype=np.int64)
@@ -34,7 +32,6 @@ def condense_products(M: Block) -> int:
     A product ends before the bound of its condition number exceeds 100. Returns the number of
     products.
     """
-    M = borrowed(M)
     N, d, _ = M.shape
     a, inverse, total = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
     pivots = np.empty(d, dtype=np.int64)

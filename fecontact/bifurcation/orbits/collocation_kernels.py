@@ -9,7 +9,6 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Block, Matrix, Vector
-from fecontact.core.references import borrowed
 
 # Smallest range of a state to which an error of it is related: in its scale (Newton's method leaves
 # errors of 1e-8 of that), in its largest value, and in the largest range of all states.
@@ -28,8 +27,6 @@ def fill_mesh(
 
     The first d scales are those of the states, the others those of the last unknowns.
     """
-    mesh, scales, widths = borrowed(mesh), borrowed(scales), borrowed(widths)
-    times, weights, points = borrowed(times), borrowed(weights), borrowed(points)
     N, m = len(widths), len(points)
     common = len(weights) % (N * m)
     d = (len(weights) - common) // (N * m)
@@ -48,8 +45,6 @@ def fill_phase_row(
     nodes: Matrix, gauss_weights: Vector, values: Matrix, slopes: Matrix, row: Vector,
 ) -> None:
     """Fill row with the nodes' weights (N m d,) in int <x, y'>, y with these nodes, then zeros."""
-    nodes, row = borrowed(nodes), borrowed(row)
-    values, slopes = borrowed(values), borrowed(slopes)
     m = len(values)
     total, d = nodes.shape
     row[:] = 0.0
@@ -72,7 +67,6 @@ def at_points(nodes: Matrix, values: Matrix, slopes: Matrix, x: Matrix, rates: M
 
     Basis values and slopes (k, m + 1) are those at k points of an interval.
     """
-    nodes, x, rates = borrowed(nodes), borrowed(x), borrowed(rates)
     points, m = len(values), values.shape[1] - 1
     total, d = nodes.shape
     for j in range(total // m):
@@ -96,8 +90,6 @@ def fill_residual(
     slopes: Matrix, f: Matrix, widths: Vector, T: float, phase_row: Vector, u: Vector, out: Vector,
 ) -> None:
     """Fill out with slopes - h T f (N m d,) and, where there is room, the phase condition."""
-    slopes, f, out = borrowed(slopes), borrowed(f), borrowed(out)
-    phase_row, u = borrowed(phase_row), borrowed(u)
     total, d = f.shape
     m = total // len(widths)
     for j in range(len(widths)):
@@ -115,7 +107,6 @@ def fill_residual(
 @kernel
 def to_nodes(at_points: Matrix, values: Matrix, widths: Vector, out: Matrix) -> None:
     """Fill out (N m, d), the nodes' weights in sum_j h_j sum_c values_ck at_points_jc x_jk."""
-    at_points, out = borrowed(at_points), borrowed(out)
     m = len(values)
     total, d = out.shape
     out[:] = 0.0
@@ -134,7 +125,6 @@ def to_nodes(at_points: Matrix, values: Matrix, widths: Vector, out: Matrix) -> 
 @kernel
 def amplitude_along(weights: Vector, nodes: Matrix, before: Matrix) -> float:
     """Amplitude of nodes (N m, d) about their mean along that of those before, in the latter."""
-    weights, nodes, before = borrowed(weights), borrowed(nodes), borrowed(before)
     total, d = nodes.shape
     mixed, square = 0.0, 0.0
     for i in range(d):
@@ -162,7 +152,6 @@ def _power(x, m):
 @kernel
 def fill_ranges(nodes: Matrix, scales: Vector, sizes: Vector) -> None:
     """Fill sizes (d,) with the range of each state, to which its errors are related."""
-    nodes, scales, sizes = borrowed(nodes), borrowed(scales), borrowed(sizes)
     most = 0.0
     for i in range(len(sizes)):
         low, high = nodes[0, i], nodes[0, i]
@@ -186,8 +175,6 @@ def integrate_defect(
 
     Infinite where rates are not finite.
     """
-    slopes, f, widths = borrowed(slopes), borrowed(f), borrowed(widths)
-    integrals, sizes, errors = borrowed(integrals), borrowed(sizes), borrowed(errors)
     rows, per = integrals.shape
     defect = np.empty(per)
     errors[:] = 0.0
@@ -214,8 +201,6 @@ def fill_smooth_errors(
     The derivative is the larger one of those between an interval and its neighbours, each from the
     jump of that of order m.
     """
-    widths, nodes, sizes = borrowed(widths), borrowed(nodes), borrowed(sizes)
-    errors = borrowed(errors)
     total, d = nodes.shape
     N, m = len(widths), len(top) - 1
     slopes = np.empty(N)
@@ -248,9 +233,6 @@ def fill_carried(
     Slopes and rates (2 N m, d) at the Gauss points of halves; J (N m, d, d) at those of intervals,
     where values and ``ends`` (m, m + 1) are the basis polynomials and their derivatives.
     """
-    slopes, f, J, side = borrowed(slopes), borrowed(f), borrowed(J), borrowed(side)
-    widths, values, ends = borrowed(widths), borrowed(values), borrowed(ends)
-    weights, integrals = borrowed(weights), borrowed(integrals)
     m, d = len(weights), side.shape[1]
     per = 2 * m
     mean, filtering = np.empty((d, d)), np.empty((d, d))

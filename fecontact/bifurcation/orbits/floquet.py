@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.point import BranchPoint
@@ -182,7 +181,6 @@ FLAT, _FLAT_LOST = 1e-8, 1e-4
 # A multiplier differs from one if its distance exceeds this multiple of the trivial error.
 _RESOLVED = 10.0
 
-_complex_vector = types.Array(types.complex128, 1, "C")
 
 
 @kernel

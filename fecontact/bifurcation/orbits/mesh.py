@@ -13,7 +13,6 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import InputError
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 
 
@@ -114,7 +113,6 @@ def _combined(nodes, j, weights, out):
 @kernel
 def _interpolate(mesh: Vector, nodes: Matrix, times: Vector, out: Matrix) -> None:
     """Fill out (k, d); the times need not be in order."""
-    mesh, nodes, times, out = borrowed(mesh), borrowed(nodes), borrowed(times), borrowed(out)
     m = len(nodes) // (len(mesh) - 1)
     weights, scales = np.empty(m + 1), _scales_of_basis(m)
     j = 0
@@ -125,8 +123,6 @@ def _interpolate(mesh: Vector, nodes: Matrix, times: Vector, out: Matrix) -> Non
 
 @helper
 def _fill_other_mesh(mesh, renewed, given, weights, scales, out):
-    mesh, renewed, given, out = borrowed(mesh), borrowed(renewed), borrowed(given), borrowed(out)
-    weights, scales = borrowed(weights), borrowed(scales)
     m = len(weights) - 1
     total, renewed_total = (len(mesh) - 1) * m, (len(renewed) - 1) * m
     d = given.shape[1] // total
@@ -175,8 +171,6 @@ def compare_halves(
     Differences are those between a half of an orbit and the other, half a period later. Both
     orbits have nodes (N m, d).
     """
-    mesh, weights, out = borrowed(mesh), borrowed(weights), borrowed(out)
-    nodes, before = borrowed(nodes), borrowed(before)
     total, d = nodes.shape
     N = len(mesh) - 1
     m = total // N
@@ -206,7 +200,6 @@ def compare_halves(
 @kernel
 def _extremes(nodes: Matrix, fine: Matrix, low: Vector, high: Vector) -> None:
     """Fill low and high (d,); fine (k, m + 1) are the basis polynomials at k points."""
-    nodes, fine = borrowed(nodes), borrowed(fine)
     total, d = nodes.shape
     m = fine.shape[1] - 1
     for i in range(d):
@@ -291,7 +284,6 @@ def _monitor(mesh, nodes, top, share):
 @kernel
 def _equidistribute(mesh: Vector, nodes: Matrix, top: Vector, renewed: Vector) -> None:
     """Fill a mesh, see :func:`equidistributed`."""
-    mesh, nodes, top, renewed = borrowed(mesh), borrowed(nodes), borrowed(top), borrowed(renewed)
     N, intervals = len(mesh) - 1, len(renewed) - 1
     share = np.zeros(N)
     _monitor(mesh, nodes, top, share)

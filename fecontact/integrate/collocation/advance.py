@@ -1,12 +1,10 @@
 """The step loop by collocation: few long steps, each of which ends where forces switch."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.references import borrowed
 from fecontact.integrate.collocation.columns import propagate_at
 from fecontact.integrate.collocation.courses import (
     first_switch,
@@ -51,10 +49,6 @@ from fecontact.integrate.rodas5p.step_loop import (
 )
 from fecontact.integrate.rodas5p.variational import Vary, begin_anew, keep, write_columns
 from fecontact.system.nodes import ground_motion
-
-ADVANCE = Callable[[
-    state.Problem, state.Progress, state.Room, state.Output, Collocation, Vary, int,
-], int]
 
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.85, 0.1, 2.0
 _POWER = -1.0 / ERROR_POWER
@@ -220,8 +214,15 @@ def _fail(progress):
     progress.numbers[REJECTED_LAST] = 1.0
 
 
-@helper
-def _advance_by(problem, progress, room, output, c, vary, most):
+def advance(
+    problem: state.Problem, progress: state.Progress, room: state.Room, output: state.Output,
+    c: Collocation, vary: Vary, most: int,
+) -> int:
+    """Go on by up to ``most`` attempts at steps, and to an accepted one; returns how it ended.
+
+    Columns of ``vary`` go with the steps as in
+    :func:`fecontact.integrate.rodas5p.step_loop.advance`.
+    """
     control, numbers, counts = problem.control, progress.numbers, progress.counts
     t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
     smallest = 1e-14 * max(abs(output.times[0]), abs(end))
@@ -307,13 +308,3 @@ def _advance_by(problem, progress, room, output, c, vary, most):
         h = min(h, control.longest)
     numbers[TIME], numbers[STEP] = t, h
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
-
-
-def advance(problem, progress, room, output, collocation, vary, most):
-    """Go on by up to ``most`` attempts at steps, and to an accepted one; returns how it ended.
-
-    Columns of ``vary`` go with the steps as in
-    :func:`fecontact.integrate.rodas5p.step_loop.advance`.
-    """
-    return _advance_by(borrowed(problem), borrowed(progress), borrowed(room), borrowed(output),
-                       borrowed(collocation), borrowed(vary), most)

@@ -15,11 +15,10 @@ switch, so that columns are as accurate as the motion. What their course misses 
 which it has through the accelerations at its begin too, is their error.
 """
 
-from collections.abc import Callable
 
 import numpy as np
 
-from fecontact.core.compiled import function_at, helper, routine
+from fecontact.core.compiled import function_at, helper, kernel, routine
 from fecontact.core.dense_lu import backward, factorise, forward
 from fecontact.integrate.collocation.courses import look
 from fecontact.integrate.collocation.room import Collocation
@@ -59,12 +58,6 @@ from fecontact.system.nodes import (
 
 # A change of a force at once by more than this part of it is a jump.
 _JUMP = 1e-3
-
-PROPAGATE = Callable[[
-    float, float, float, float, float, run_arrays.Problem, run_arrays.Progress, run_arrays.Room,
-    Collocation, Vary,
-], float]
-propagate_at = function_at(PROPAGATE)
 
 
 @routine
@@ -283,7 +276,11 @@ def _cross(t, near, problem, c, vary):
                     x[m + k] += (s.Ty[j, k] * jump - s.Tx[j, k] * slip_jump) * ahead / rate
 
 
-def propagate(t, h, latest, before, near, problem, progress, room, c, vary):
+@kernel(by_address=True)
+def propagate(
+    t: float, h: float, latest: float, before: float, near: float, problem: run_arrays.Problem,
+    progress: run_arrays.Progress, room: run_arrays.Room, c: Collocation, vary: Vary,
+) -> float:
     """Carry the columns over the step whose stages ``c`` holds; the largest error of one.
 
     It is relative to the size of the column, or to the part ``faded`` of the largest it has been.
@@ -320,3 +317,6 @@ def propagate(t, h, latest, before, near, problem, progress, room, c, vary):
     if before > 0.0:
         _cross(min(t + h, latest), near * h, problem, c, vary)
     return largest
+
+
+propagate_at = function_at(propagate)

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.compiled import kernel
-from fecontact.core.references import constants
-from fecontact.integrate.collocation.advance import ADVANCE, advance
-from fecontact.integrate.collocation.columns import PROPAGATE, propagate
+from fecontact.core.constants import constants
+from fecontact.integrate.collocation.advance import advance
+from fecontact.integrate.collocation.columns import propagate
 from fecontact.integrate.collocation.room import Collocation, collocation_for
 from fecontact.integrate.rodas5p import small_systems
-from fecontact.integrate.rodas5p.small_systems import compiled_address
 from fecontact.integrate.rodas5p.state import Problem
 from fecontact.integrate.rodas5p.variational import Variation
 
@@ -28,7 +27,7 @@ def advance_for(problem: Problem) -> Any:
 
 @cache
 def _advance(modes: int, nodes: int) -> Any:
-    return kernel(ADVANCE, constants=constants(fixed_values(modes, nodes)), nogil=True)(advance)
+    return kernel(advance, constants=constants(fixed_values(modes, nodes)), nogil=True)
 
 
 def propagate_for(problem: Problem) -> int:
@@ -40,7 +39,7 @@ def propagate_for(problem: Problem) -> int:
 @cache
 def _propagate(modes: int, nodes: int) -> int:
     known = {**small_systems.values_of_derivatives(modes, nodes), **_of_room(modes, nodes)}
-    return compiled_address(PROPAGATE, propagate, constants(known))
+    return int(propagate.for_values(constants(known)).address)
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:

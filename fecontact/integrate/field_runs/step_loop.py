@@ -4,7 +4,6 @@ The Jacobian J = df/dx of each step is the field's own; df/dt is a one-sided dif
 order over a ten thousandth of the step.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 from fecontact.core.compiled import kernel, routine
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerVector, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
 from fecontact.integrate.field_runs.variational import Varied, propagate, steepest
 from fecontact.integrate.rodas5p import tableau
@@ -117,7 +115,6 @@ class _View(NamedTuple):
     y: Array
 
 
-ADVANCE = Callable[[FieldKernel, Progress, Room, Output, Varied, Watch, int], int]
 
 
 @routine
@@ -260,9 +257,6 @@ def advance(
     the call returns. If there are columns in ``varied``, steps end at output times, where the
     columns are stored and begin anew.
     """
-    field, progress, room, output, varied, watch = (
-        borrowed(field), borrowed(progress), borrowed(room), borrowed(output), borrowed(varied),
-        borrowed(watch))
     numbers, counts, times = progress.numbers, progress.counts, output.times
     t, h, end = numbers[TIME], numbers[STEP], times[-1]
     smallest = 1e-14 * max(abs(times[0]), abs(end))

@@ -8,16 +8,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import f8, i8
 from fecontact.core.lanes.vectors import WIDTH
 from fecontact.core.records import Block, IntegerMatrix, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p import tableau
-
-_block4 = types.Array(f8, 4, "C")
 
 # Rows of `LaneProgress.numbers`.
 (TIME, STEP, END, SMALLEST, SPEED_SCALE, LAST_STEP, LAST_ROOT, REJECTED_LAST, CAUTIOUS, AGAIN,
@@ -118,7 +114,6 @@ class LaneProgress(NamedTuple):
     fresh: IntegerVector
 
 
-_table = types.Array(i8, 2, "C")
 class LaneRoom(NamedTuple):
     """Room for one step of all lanes.
 

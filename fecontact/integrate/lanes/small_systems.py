@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.compiled import kernel
+from fecontact.core.constants import constants
 from fecontact.core.lanes.vectors import WIDTH
-from fecontact.core.references import constants
 from fecontact.integrate.lanes import arrays, step_loop
 from fecontact.integrate.rodas5p import small_systems
 
@@ -26,7 +26,7 @@ def compile_usual() -> None:
 def advance_for(modes: int, nodes: int) -> Any:
     """The step loop for so many modes and nodes."""
     given = constants(fixed_values(modes, nodes))
-    return kernel(step_loop.ADVANCE, constants=given, nogil=True)(step_loop.advance)
+    return kernel(step_loop.advance, constants=given, nogil=True)
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:

@@ -5,7 +5,6 @@ its own. A lane whose run has ended takes the next one that waits. No lane has a
 another one computes, so that results do not depend on which runs are side by side.
 """
 
-from collections.abc import Callable
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from fecontact.core.lanes.vectors import (
     spread,
     write,
 )
-from fecontact.core.references import borrowed
 from fecontact.integrate.course_bounds import doubtful
 from fecontact.integrate.courses import QUICKEST, set_courses
 from fecontact.integrate.lanes import arrays, checks, equations, stages
@@ -52,9 +50,6 @@ from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FI
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.system.nodes import GroundMotion
 
-ADVANCE = Callable[[
-    arrays.Lanes, arrays.LaneRuns, run_arrays.Problem, run_arrays.Progress, run_arrays.Room, int,
-], int]
 # How a call returned: so many attempts were made, lanes are free that more runs may take, or all
 # runs have ended.
 GOES_ON, HUNGRY, DONE = range(3)
@@ -339,8 +334,16 @@ def _attempt(active, b, runs, problem, progress, room):
                 _end(lane, MINIMUM_STEP if w.stage[0, lane] < np.inf else NOT_FINITE, b, runs)
 
 
-@helper
-def advance_by(b, runs, problem, progress, room, most):
+def advance(
+    b: arrays.Lanes, runs: arrays.LaneRuns, problem: run_arrays.Problem,
+    progress: run_arrays.Progress, room: run_arrays.Room, most: int,
+) -> int:
+    """Go on until ``most`` steps have been tried in all lanes; returns how it ended.
+
+    ``problem``, ``progress`` and ``room`` are those of some run of the same kind, as room for
+    checks of single lanes. It is compiled for each size, in
+    :mod:`fecontact.integrate.lanes.small_systems`.
+    """
     """As :func:`advance`, by references."""
     active = _fill(b, runs)
     for _ in range(most):
@@ -359,14 +362,3 @@ def advance_by(b, runs, problem, progress, room, most):
             if b.progress.runs[lane] >= 0:
                 active |= 1 << lane
     return GOES_ON
-
-
-def advance(b, runs, problem, progress, room, most):
-    """Go on until ``most`` steps have been tried in all lanes; returns how it ended.
-
-    ``problem``, ``progress`` and ``room`` are those of some run of the same kind, as room for
-    checks of single lanes. It is compiled for each size, in
-    :mod:`fecontact.integrate.lanes.small_systems`.
-    """
-    return advance_by(borrowed(b), borrowed(runs), borrowed(problem), borrowed(progress),
-                      borrowed(room), most)

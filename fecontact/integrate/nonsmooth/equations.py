@@ -17,7 +17,6 @@ from collections.abc import Callable
 from fecontact.core.compiled import compile_law, function_at, helper
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerVector, Vector
-from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
     CURVED,
@@ -370,10 +369,8 @@ def add_contact_forces(t, Y, moved, p, status, closed, w, acceleration):
     hold_clusters(t, p, status, w, acceleration)
 
 
-def _derivative(t, held_Y, p, held_status, held_closed, w, held_out):
+def _derivative(t, Y, p, status, closed, w, out):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
-    Y, out = borrowed(held_Y), borrowed(held_out)
-    status, closed = borrowed(held_status), borrowed(held_closed)
     s = p.system
     m = s.Tx.shape[1]
     for i in range(m):

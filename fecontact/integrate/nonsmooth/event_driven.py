@@ -6,12 +6,10 @@ step's interpolation to the last digits, and repeated with the shorter length.
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel
-from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative, place_size
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
@@ -310,22 +308,18 @@ def _stop_within(step, part, p, progress, output, w, room):
     progress.clock[TIME] = reached
 
 
-RUN = Callable[[NonsmoothProblem, Limits, Progress, Output, Workspace, Room, Watch, int], int]
 
 
 @kernel(nogil=True)
 def run_events(
-    held_p: NonsmoothProblem, held_limits: Limits, held_progress: Progress, held_output: Output,
-    held_w: Workspace, held_room: Room, held_watch: Watch, most: int,
+    p: NonsmoothProblem, limits: Limits, progress: Progress, output: Output,
+    w: Workspace, room: Room, watch: Watch, most: int,
 ) -> int:
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
 
     The rows of ``output`` are filled as ``progress.counts`` says. Ends early where the table of
     events is full.
     """
-    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
-    output, w, room = borrowed(held_output), borrowed(held_w), borrowed(held_room)
-    watch = borrowed(held_watch)
     Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
     clock, largest, longest = progress.clock, progress.largest, limits.longest
     t, h, end = clock[TIME], clock[LENGTH], output.times[-1]

@@ -13,7 +13,6 @@ Flights that have just begun, and forces of what holds, are looked at in
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.records import FlagVector, Matrix, Vector
@@ -121,7 +120,6 @@ class Room(NamedTuple):
     heights: Vector
 
 
-_flags = types.Array(types.boolean, 1, "C")
 def room_for(problem: NonsmoothProblem, size: int) -> Room:
     """Room for a problem whose state is of this size."""
     n, (k, m) = len(problem.cluster), problem.rows.shape

@@ -39,7 +39,6 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.dense_lu import solve
-from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.equations import stick_limit
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
@@ -298,12 +297,10 @@ def _fastest(p, room):
 
 @kernel(nogil=True)
 def run_impact_steps(
-    held_p: NonsmoothProblem, held_limits: Limits, held_progress: Progress, held_output: Output,
-    held_room: ImpactRoom, most: int,
+    p: NonsmoothProblem, limits: Limits, progress: Progress, output: Output,
+    room: ImpactRoom, most: int,
 ) -> int:
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended."""
-    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
-    output, room = borrowed(held_output), borrowed(held_room)
     Y, counts, clock, closed = progress.state, progress.counts, progress.clock, progress.closed
     m = p.system.Tx.shape[1]
     t, h, end = clock[TIME], clock[LENGTH], output.times[-1]

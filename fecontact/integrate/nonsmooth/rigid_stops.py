@@ -29,7 +29,6 @@ import numpy as np
 
 from fecontact.core.compiled import compile_law, function_at, routine
 from fecontact.core.records import Vector
-from fecontact.core.references import borrowed
 from fecontact.integrate.nonsmooth.contact_conditions import (
     Conditions,
     new_case,
@@ -374,7 +373,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
     return flight
 
 
-def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
+def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
     """Impact of the ``room.touched`` nodes, then which stops stay closed and what sticks.
 
     An approach at a penetration rate within rounding is stopped, but is no impact;
@@ -386,7 +385,6 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, held_out):
     presses them. Returns the longest flight that a rebound may take [s], infinite if none,
     NO_ACCELERATION or NO_IMPULSES, and fills ``out`` with Y'.
     """
-    out = borrowed(held_out)
     Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest
     n = len(p.cluster)
     touching = np.zeros(n, np.bool_)

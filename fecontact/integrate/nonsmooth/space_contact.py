@@ -14,7 +14,6 @@ Plane bodies need none of it; it is called by its address.
 import math
 
 from fecontact.core.compiled import compile_law, helper
-from fecontact.core.references import borrowed
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import stick_limit
 from fecontact.integrate.nonsmooth.problem import (
@@ -82,9 +81,8 @@ def scale_of(j, contact, s):
     return scale, a * slope, b * slope
 
 
-def _observe(moved, held_Y, p, held_nodes):
+def _observe(moved, Y, p, nodes):
     """Fill ``nodes`` from the positions and velocities in Y."""
-    Y, nodes = borrowed(held_Y), borrowed(held_nodes)
     s = p.system
     for j in range(len(nodes)):
         contact = contact_of(j, Y, moved, s)
@@ -99,9 +97,8 @@ def _observe(moved, held_Y, p, held_nodes):
         nodes[j, CURVED], nodes[j, GRIP] = 0.0, 0.0
 
 
-def _contact_powers(moved, p, held_nodes, held_friction, held_out):
+def _contact_powers(moved, p, nodes, friction, out):
     """Add the powers at the nodes to out (p,) and put those of friction behind them (n,)."""
-    nodes, friction, out = borrowed(held_nodes), borrowed(held_friction), borrowed(held_out)
     s, n = p.system, len(nodes)
     for j in range(n):
         force, rubbed = nodes[j, FORCE], 0.0
@@ -175,7 +172,7 @@ def _grip(j, g, hold, s):
     return 1.0 / (softest + _FINER * max(1.0 / hold.grip[j] - softest, 0.0))
 
 
-def _linearise(held_stage, moved, p, hold, turning, room, held_force):
+def _linearise(stage, moved, p, hold, turning, room, force):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
     As in the plane: adds ``Ty F - Tx T - T2 T_across`` to ``room.balance``, fills ``force`` (2 n,)
@@ -183,7 +180,6 @@ def _linearise(held_stage, moved, p, hold, turning, room, held_force):
     under force and the largest velocity that there must not be: of a sticking node, or of slip
     athwart its friction; infinite when a node has changed between stick and slip.
     """
-    stage, force = borrowed(held_stage), borrowed(held_force)
     s, g, side = p.system, stage.g, hold.side
     n, m = s.Tx.shape
     count, creep = 0, 0.0

@@ -25,9 +25,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import helper, i8, routine
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerMatrix, IntegerVector, Matrix, Vector
 from fecontact.integrate.nonsmooth.problem import NonsmoothProblem
@@ -103,7 +102,6 @@ class ImpactRoom(NamedTuple):
     pivots: IntegerVector
 
 
-_flags = types.Array(i8, 2, "C")
 def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
     """Room for a problem."""
     n, m = problem.system.Tx.shape

@@ -14,7 +14,6 @@ import math
 import numpy as np
 
 from fecontact.core.compiled import function_at, helper, kernel
-from fecontact.core.references import borrowed
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
 from fecontact.integrate.nonsmooth.event_search import ROUGHLY, UNFELT, first_pressed, pressed
@@ -340,15 +339,13 @@ def pass_break(step, t, p, progress, output):
 
 @kernel(nogil=True)
 def run_steps(
-    held_p: NonsmoothProblem, held_limits: Limits, held_progress: Progress, held_output: Output,
-    held_w: Workspace, held_room: Room, most: int,
+    p: NonsmoothProblem, limits: Limits, progress: Progress, output: Output,
+    w: Workspace, room: Room, most: int,
 ) -> int:
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
 
     The rows of ``output`` are filled as ``progress.counts`` says.
     """
-    p, limits, progress = borrowed(held_p), borrowed(held_limits), borrowed(held_progress)
-    output, w, room = borrowed(held_output), borrowed(held_w), borrowed(held_room)
     Y, counts, clock, largest = progress.state, progress.counts, progress.clock, progress.largest
     n, m = p.system.Tx.shape
     slowest = _set_inertia(p, limits, room)

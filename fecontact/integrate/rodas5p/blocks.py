@@ -9,11 +9,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from fecontact.core.compiled import helper, i8
+from fecontact.core.compiled import helper
 from fecontact.core.records import IntegerBlock, IntegerMatrix, IntegerVector, Matrix
 from fecontact.core.types import Array, Integers
 from fecontact.reduction.modal_basis import ModalBasis
@@ -64,7 +63,6 @@ class Blocks(NamedTuple):
     reach: IntegerMatrix
 
 
-_TABLE = types.Array(i8, 2, "C")
 # So few nodes are always taken as near: to find out costs more.
 FEW = 16
 

@@ -25,7 +25,7 @@ from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.sliders import attend
-from fecontact.integrate.rodas5p.small_systems import compile_step_loops, in_parts, propagate_for
+from fecontact.integrate.rodas5p.small_systems import in_parts, propagate_for
 from fecontact.integrate.rodas5p.state import (
     Control,
     Output,
@@ -397,8 +397,3 @@ def _place(run: Run, ended: Status) -> str:
     if ended is Status.MINIMUM_STEP and run.progress.counts[run_arrays.REJECTIONS]:
         where += f", near contact node {int(run.progress.counts[run_arrays.WORST_NODE])}"
     return f"{where}."
-
-
-# What they are compiled from is at hand while the step loop itself has just been compiled.
-if step_loop.advance.stats.cache_misses:
-    compile_step_loops()

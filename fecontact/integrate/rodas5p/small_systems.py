@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.compiled import kernel
-from fecontact.core.references import constants
+from fecontact.core.constants import constants
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, step_loop
 from fecontact.integrate.rodas5p.blocks import Blocks, one_block
 from fecontact.integrate.rodas5p.variational import (
-    PROPAGATE,
     Variation,
     Vary,
     propagate,
@@ -77,22 +75,14 @@ def not_small(system: SystemArrays) -> str | None:
 
 @cache
 def _advance(modes: int, nodes: int) -> Any:
-    return kernel(step_loop.ADVANCE, constants=constants(fixed_values(modes, nodes)), nogil=True)(
-        step_loop.advance.py_func)
+    return step_loop.advance.for_values(constants(fixed_values(modes, nodes)))
 
 
 @cache
 def _propagate(size: tuple[int, int] | None, parts: bool = False) -> int:
     """Address of what carries derivatives over a step, of modes and nodes of a size or of all."""
     known = "" if size is None else constants(values_of_derivatives(*size))
-    return compiled_address(PROPAGATE, propagate_in_parts if parts else propagate, known)
-
-
-def compiled_address(signature: Any, function: Any, known: str) -> int:
-    """Address of a function that is compiled for tuples with ``known`` values."""
-    compiled = kernel(signature, constants=known, no_cpython_wrapper=True)(function)
-    found = compiled.overloads[signature.args]
-    return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
+    return int((propagate_in_parts if parts else propagate).for_values(known).address)
 
 
 def compile_step_loops(last_first: bool = False) -> None:

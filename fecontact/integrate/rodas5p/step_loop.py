@@ -1,11 +1,9 @@
 """The compiled time integrator: Rodas5P steps of variable size over given output times."""
 
-from collections.abc import Callable
 
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.references import borrowed
 from fecontact.integrate.course_bounds import doubtful, restless
 from fecontact.integrate.courses import keep_ends, set_courses, set_ends
 from fecontact.integrate.near_nodes import choose_near, set_end
@@ -65,7 +63,6 @@ from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
-ADVANCE = Callable[[state.Problem, state.Progress, state.Room, state.Output, Vary, Watch, int], int]
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 # Attempts at a step that end where something was not felt.
@@ -350,8 +347,20 @@ def _go_on(step, problem, progress, room, output):
     progress.counts[STEPS] += 1
 
 
-@helper
-def advance_by(problem, progress, room, output, vary, watch, most):
+@kernel(nogil=True)
+def advance(
+    problem: state.Problem, progress: state.Progress, room: state.Room, output: state.Output,
+    vary: Vary, watch: Watch, most: int,
+) -> int:
+    """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
+
+    Fills the rows of ``output`` that belong to the output times passed. A run that is continued
+    gives the same numbers as one that was not interrupted.
+
+    If the columns of ``vary.variation`` are not empty, those that belong to each output time are
+    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
+    What is watched for is noted in ``watch``; when that is full, the call returns.
+    """
     """As :func:`advance`, by references."""
     s, control, numbers, counts = (problem.system, problem.control, progress.numbers,
                                    progress.counts)
@@ -436,21 +445,3 @@ def advance_by(problem, progress, room, output, vary, watch, most):
             numbers[CAUTIOUS] = step.caution
     numbers[TIME], numbers[STEP] = t, h
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
-
-
-@kernel(nogil=True)
-def advance(
-    problem: state.Problem, progress: state.Progress, room: state.Room, output: state.Output,
-    vary: Vary, watch: Watch, most: int,
-) -> int:
-    """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
-
-    Fills the rows of ``output`` that belong to the output times passed. A run that is continued
-    gives the same numbers as one that was not interrupted.
-
-    If the columns of ``vary.variation`` are not empty, those that belong to each output time are
-    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
-    What is watched for is noted in ``watch``; when that is full, the call returns.
-    """
-    return advance_by(borrowed(problem), borrowed(progress), borrowed(room), borrowed(output),
-                      borrowed(vary), borrowed(watch), most)

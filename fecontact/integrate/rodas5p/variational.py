@@ -14,7 +14,6 @@ ones but beside kinks: of the forces of each node, once a step along each direct
 Derivatives to p are differences between a system above and one below.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from fecontact.core.compiled import (
     function_at,
     helper,
+    kernel,
     routine,
 )
 from fecontact.core.records import Block, Matrix, Vector
@@ -120,12 +120,6 @@ class Vary(NamedTuple):
     variation: Variation
     transitions: Block
     propagate: int
-
-
-PROPAGATE = Callable[[
-    run_arrays.Step, run_arrays.Problem, run_arrays.Progress, run_arrays.Room, Vary,
-], float]
-propagate_at = function_at(PROPAGATE)
 
 
 def variation_for(
@@ -255,7 +249,11 @@ def _largest_error(scale, v):
     return largest
 
 
-def propagate(step, problem, progress, room, vary):
+@kernel(by_address=True)
+def propagate(
+    step: run_arrays.Step, problem: run_arrays.Problem, progress: run_arrays.Progress,
+    room: run_arrays.Room, vary: Vary,
+) -> float:
     """Carry the columns over the step whose stages and factors the room holds.
 
     Returns the largest error of a column in units of its size, or of the part ``faded`` of the
@@ -350,7 +348,11 @@ def _set_accelerations(t, Y, blocks, vary, out):
         out[i] = v.vectors[3, m + i]
 
 
-def propagate_in_parts(step, problem, progress, room, vary):
+@kernel(by_address=True)
+def propagate_in_parts(
+    step: run_arrays.Step, problem: run_arrays.Problem, progress: run_arrays.Progress,
+    room: run_arrays.Room, vary: Vary,
+) -> float:
     """As :func:`propagate`, but by collocation in parts of the step, for systems without memory.
 
     The derivatives are those along the interpolant of the step. Returns zero where they are within
@@ -416,3 +418,6 @@ def begin_anew(v):
     v.norms[0], v.norms[1] = v.least, v.least
     for k in range(v.columns.shape[1]):
         v.columns[k, k] = 1.0
+
+
+propagate_at = function_at(propagate)

@@ -8,12 +8,10 @@ falls to zero.
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import state
 from fecontact.integrate.rodas5p.event_kernels import (
     FOUND,
@@ -67,8 +65,6 @@ from fecontact.system.powers import (
     MODAL_DAMPING,
     POWER_COUNT,
 )
-
-ADVANCE = Callable[[state.Problem, state.Progress, state.Output, Watch, Series, int], int]
 
 # Columns of the work in the order of `Series.powers`.
 _WORKS = np.array([DRIVE, LOAD, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING])
@@ -263,8 +259,12 @@ def _expanded(t, h, problem, progress, series):
     return part
 
 
-@helper
-def _advance_by(problem, progress, output, watch, series, most):
+@kernel(nogil=True)
+def advance(
+    problem: state.Problem, progress: state.Progress, output: state.Output, watch: Watch,
+    series: Series, most: int,
+) -> int:
+    """Go on by up to ``most`` steps; returns how it ended, as ``step_loop.advance`` does."""
     numbers, counts, control = progress.numbers, progress.counts, problem.control
     m, n = len(series.q), len(series.states)
     t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
@@ -336,13 +336,3 @@ def _advance_by(problem, progress, output, watch, series, most):
             return STOPPED
     numbers[TIME], numbers[STEP] = t, h
     return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
-
-
-@kernel(nogil=True)
-def advance(
-    problem: state.Problem, progress: state.Progress, output: state.Output, watch: Watch,
-    series: Series, most: int,
-) -> int:
-    """Go on by up to ``most`` steps; returns how it ended, as ``step_loop.advance`` does."""
-    return _advance_by(borrowed(problem), borrowed(progress), borrowed(output), borrowed(watch),
-                       borrowed(series), most)

@@ -7,11 +7,10 @@ out for arrays of a known size. Those over coefficients are not, so that they ar
 from functools import cache
 from typing import Any
 
-from fecontact.core.compiled import kernel
-from fecontact.core.references import constants
+from fecontact.core.constants import constants
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.integrate.rodas5p.state import Problem
-from fecontact.integrate.series.advance import ADVANCE, advance
+from fecontact.integrate.series.advance import advance
 from fecontact.integrate.series.branches import SERIES_POWERS, Series
 from fecontact.integrate.series.polynomials import COEFFICIENTS
 from fecontact.laws.pieces import PIECE
@@ -30,8 +29,7 @@ def advance_for(problem: Problem) -> Any:
 
 @cache
 def _advance(modes: int, nodes: int) -> Any:
-    return kernel(ADVANCE, constants=constants(fixed_values(modes, nodes)), nogil=True)(
-        advance.py_func)
+    return advance.for_values(constants(fixed_values(modes, nodes)))
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
@@ -44,9 +42,3 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
         **dict.fromkeys(("u", "F", "square", "cube"), (n, COEFFICIENTS)),
         "signal": (None, COEFFICIENTS), "powers": (SERIES_POWERS, COEFFICIENTS),
     }}
-
-
-# What they are compiled from is at hand while the loop itself has just been compiled.
-if advance.stats.cache_misses:
-    for size in SIZES:
-        _advance(*size)

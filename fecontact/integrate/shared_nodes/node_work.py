@@ -4,12 +4,10 @@ The parts depend on the number of near nodes alone, and their sums are added in 
 are the same bit for bit for any number of threads, one too.
 """
 
-from typing import Any
 
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.blocks import block_at, within
 from fecontact.integrate.rodas5p.error_control import add_some_powers, largest_slip_error
@@ -21,7 +19,6 @@ from fecontact.integrate.shared_nodes.tasks import (
     PAUSE,
     POWERS,
     PRODUCTS,
-    SHARE,
     SLEEP,
     SLIP_ERROR,
     STAGE,
@@ -29,7 +26,6 @@ from fecontact.integrate.shared_nodes.tasks import (
     TIME_RATE,
     VALUE,
     WORDS,
-    WORK,
     YIELD,
     add,
     announce,
@@ -171,7 +167,7 @@ def _power_part(part, begin, end, problem, room):
                     room.power[point, POWER_COUNT:])
 
 
-@kernel(no_cpython_wrapper=True)
+@kernel(by_address=True)
 def work(
     task: int, part: int, parts: int, problem: state.Problem, progress: state.Progress,
     room: state.Room,
@@ -250,7 +246,7 @@ def _take_parts(parts, task, problem, progress, room):
     wait_for(parts, words)
 
 
-@kernel(no_cpython_wrapper=True)
+@kernel(by_address=True)
 def share(
     task: int, value: float, problem: state.Problem, progress: state.Progress, room: state.Room,
 ) -> float:
@@ -274,7 +270,6 @@ def assist(problem: state.Problem, progress: state.Progress, room: state.Room) -
 
     Returns how many it did.
     """
-    problem, progress, room = borrowed(problem), borrowed(progress), borrowed(room)
     words = room.team.words
     looks, done = 0, 0
     while rest(looks, words):
@@ -296,9 +291,4 @@ def team_for(modes: int, nodes: int, helpers: int) -> Team:
     words[[YIELD, SLEEP, PAUSE]] = how_to_wait()
     width = max(modes, POWER_COUNT)
     return Team(words, np.zeros(NUMBERS), np.zeros((parts, -(-width // 8) * 8)),
-                parts, helpers, _address(share, SHARE), _address(work, WORK))
-
-
-def _address(compiled: Any, signature: Any) -> int:
-    found = compiled.overloads[signature.args]
-    return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
+                parts, helpers, share.address, work.address)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from numba import types
 from numba.extending import intrinsic
 
-from fecontact.core.compiled import function_at, helper, i8, integers
+from fecontact.core.compiled import function_at, helper
 from fecontact.core.references import Reference
 from fecontact.integrate.rodas5p import state
 
@@ -35,6 +35,7 @@ _ARGUMENTS = (Reference(state.Problem), Reference(state.Progress), Reference(sta
 SHARE = Callable[[int, float, state.Problem, state.Progress, state.Room], float]
 WORK = Callable[[int, int, int, state.Problem, state.Progress, state.Room], int]
 share_at, work_at = function_at(SHARE), function_at(WORK)
+_WORDS = types.Array(types.int64, 1, "C")
 _yield_at, _sleep_at = function_at(types.int32()), function_at(types.int32(types.int32))
 
 # Looks at the ticket before a thread lets others go first, before it sleeps in between, and before
@@ -53,7 +54,7 @@ def load(typingctx, words, place):
     def codegen(context, builder, signature, args):
         return builder.load_atomic(_place(context, builder, signature, args), "seq_cst", 8)
 
-    return i8(integers, i8), codegen
+    return types.int64(_WORDS, types.int64), codegen
 
 
 @intrinsic
@@ -63,7 +64,7 @@ def store(typingctx, words, place, value):
         builder.store_atomic(args[2], _place(context, builder, signature, args), "seq_cst", 8)
         return args[2]
 
-    return i8(integers, i8, i8), codegen
+    return types.int64(_WORDS, types.int64, types.int64), codegen
 
 
 @intrinsic
@@ -73,7 +74,7 @@ def add(typingctx, words, place, value):
         return builder.atomic_rmw("add", _place(context, builder, signature, args), args[2],
                                   "seq_cst")
 
-    return i8(integers, i8, i8), codegen
+    return types.int64(_WORDS, types.int64, types.int64), codegen
 
 
 @helper

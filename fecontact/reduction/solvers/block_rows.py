@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from fecontact.core.compiled import i8, kernel
+from fecontact.core.compiled import kernel
 from fecontact.core.types import Array, Integers
-
-_index = types.Array(types.int32, 1, "C")
 
 
 def _product(first, last, indptr, indices, blocks, x, y):
@@ -107,9 +105,9 @@ def _compiled(function: Any, *arrays: tuple[int, bool]) -> dict[Any, Any]:
     """One kernel for single and one for double precision; arrays are (dimensions, whole)."""
     found = {}
     for name, kind in (("float32", types.float32), ("float64", types.float64)):
-        signature = types.void(i8, i8, *(types.Array(kind, n, "C") if numbers else _index
-                                         for n, numbers in arrays))
-        found[np.dtype(name)] = kernel(signature, nogil=True)(function)
+        given = [types.Array(kind if numbers else types.int32, n, "C") for n, numbers in arrays]
+        signature = types.void(types.int64, types.int64, *given)
+        found[np.dtype(name)] = kernel(function, signature=signature, nogil=True)
     return found
 
 

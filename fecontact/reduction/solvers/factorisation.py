@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numba import types
 
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError
@@ -132,8 +131,6 @@ def nested_dissection(matrix: Any, nodes: Integers) -> Integers:
     return np.argsort(place[numbers], kind="stable")
 
 
-_index = types.Array(types.int32, 1, "C")
-_flags = types.Array(types.boolean, 1, "C")
 
 # Columns per block: enough to vectorise, few enough for the cache.
 _BLOCK = 32

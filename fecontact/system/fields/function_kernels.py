@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fecontact.core.compiled import (
@@ -20,12 +19,7 @@ from fecontact.core.records import (
     Matrix,
     Vector,
 )
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array
-
-c16 = types.complex128
-complex_vector = types.Array(c16, 1, "C")
-complex_matrix = types.Array(c16, 2, "C")
 
 RATES = Callable[[float, Vector, Vector, Vector], None]
 JACOBIAN = Callable[[float, Vector, Vector, Matrix], None]
@@ -318,7 +312,6 @@ def complex_steps(
     ``complex_room`` is that of :func:`complex_room_for`.
     """
     function, complex_function = rates_at(address), complex_rates_at(complex_address)
-    places, room, complex_room = borrowed(places), borrowed(room), borrowed(complex_room)
     t, x, p, active, column = places.t, places.x, places.p, places.active, room.column
     d, k = x.shape[1], len(p)
     y, q = room.y, room.q
@@ -352,7 +345,6 @@ def complex_steps(
 def differences(address: int, places: Places, room: Room, J: Block, P: Block) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by extrapolated central differences."""
     function = rates_at(address)
-    places, room = borrowed(places), borrowed(room)
     t, x, p, active, best = places.t, places.x, places.p, places.active, room.best
     d = x.shape[1]
     y, q = room.y, room.q
@@ -380,7 +372,6 @@ def central_differences(
     ``q`` (k,) and ``beside`` (3, d) are room.
     """
     function = rates_at(address)
-    places, q, beside = borrowed(places), borrowed(q), borrowed(beside)
     t, x, p, active = places.t, places.x, places.p, places.active
     d = x.shape[1]
     y, above, below = beside[0], beside[1], beside[2]
@@ -415,7 +406,6 @@ def unchecked_complex_steps(
 ) -> None:
     """As :func:`complex_steps`, without the comparison, which takes nearly all of the time."""
     complex_function = complex_rates_at(complex_address)
-    places, complex_room = borrowed(places), borrowed(complex_room)
     t, x, p, active = places.t, places.x, places.p, places.active
     d, k = x.shape[1], len(p)
     z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]

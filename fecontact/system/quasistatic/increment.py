@@ -24,7 +24,6 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Vector
-from fecontact.core.references import borrowed
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import (
     GroundMotion,
@@ -198,15 +197,13 @@ def _stretched(j, tangent, sliders, pose):
 
 @kernel
 def evaluate(
-    load: Vector, moved: GroundMotion, held_sliders: Sliders, held_s: SystemArrays,
-    held_pose: Pose, held_room: Room, derive: int,
+    load: Vector, moved: GroundMotion, sliders: Sliders, s: SystemArrays,
+    pose: Pose, room: Room, derive: int,
 ) -> float:
     """Set nodes, slider forces, out-of-balance force and its matrix; size of forces that cancel.
 
     The matrix is minus the derivative of the out-of-balance force.
     """
-    sliders, s, pose, room = (borrowed(held_sliders), borrowed(held_s), borrowed(held_pose),
-                              borrowed(held_room))
     n, m = s.Tx.shape
     q, node, residual, out = pose.q, pose.node, room.residual, room.partial
     terms = 0.0
@@ -260,10 +257,10 @@ def evaluate(
         terms += room.before[i] ** 2 / room.scale[i]
     if derive:
         room.matrix[:] = s.stiffness
-        room.matrix[:] += np.dot(held_s.Tx.T, held_room.along)
-        room.matrix[:] -= np.dot(held_s.Ty.T, held_room.away)
+        room.matrix[:] += np.dot(s.Tx.T, room.along)
+        room.matrix[:] -= np.dot(s.Ty.T, room.away)
         if in_space(s):
-            room.matrix[:] += np.dot(held_s.T2.T, held_room.across)
+            room.matrix[:] += np.dot(s.T2.T, room.across)
     return np.sqrt(terms)
 
 
@@ -365,16 +362,14 @@ def _newton(load, moved, sliders, s, pose, room):
 
 @kernel
 def find_equilibrium(
-    load: Vector, moved: GroundMotion, held_sliders: Sliders, held_s: SystemArrays,
-    held_pose: Pose, held_room: Room,
+    load: Vector, moved: GroundMotion, sliders: Sliders, s: SystemArrays,
+    pose: Pose, room: Room,
 ) -> bool:
     """Bring ``pose`` into equilibrium from where it is; whether that succeeded.
 
     ``pose.force`` and ``pose.left`` are those of the last equilibrium at the begin. Rigid sliders
     that slid are left where their nodes are, springs a length R / c behind.
     """
-    sliders, s, pose, room = (borrowed(held_sliders), borrowed(held_s), borrowed(held_pose),
-                              borrowed(held_room))
     n, elements = sliders.stiffness.shape
     tangents = pose.force.shape[1] // elements
     held = False

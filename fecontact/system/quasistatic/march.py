@@ -16,7 +16,6 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import GroundMotion, SystemArrays, in_space, moved_across, moved_along
 from fecontact.system.quasistatic.increment import find_equilibrium
@@ -196,15 +195,13 @@ def _works(old, new, given, s, out):
 
 @kernel
 def _measure(
-    held_s: SystemArrays, held_sliders: Sliders, held_old: Pose, held_new: Pose, given: Matrix,
+    s: SystemArrays, sliders: Sliders, old: Pose, new: Pose, given: Matrix,
     part: Vector, turnover: Vector,
 ) -> None:
     """Fill part (4 + n,) with the works and losses of an increment, and ``turnover`` (4,).
 
     The latter are the error and the work of friction, and those of the normal forces.
     """
-    s, sliders = borrowed(held_s), borrowed(held_sliders)
-    old, new = borrowed(held_old), borrowed(held_new)
     _works(old, new, given, s, part)
     error, turned, gap, pressed = 0.0, 0.0, 0.0, 0.0
     for j in range(len(old.node)):
@@ -260,8 +257,8 @@ def _keep(row, pose, total, kept):
 
 @kernel
 def march(
-    held_s: SystemArrays, held_sliders: Sliders, given: Matrix, rtol: float, held_old: Pose,
-    held_new: Pose, held_room: Room, held_kept: Kept,
+    s: SystemArrays, sliders: Sliders, given: Matrix, rtol: float, old: Pose,
+    new: Pose, room: Room, kept: Kept,
 ) -> int:
     """Go along rows of given loads and motions: modal loads, drive in x and y, travel, (N, m + 3).
 
@@ -270,8 +267,6 @@ def march(
     ``old`` holds the pose at the first row, whose F and places are found here; ``new`` is room.
     Fills ``kept`` and returns the number of rows that were reached.
     """
-    s, sliders, room = borrowed(held_s), borrowed(held_sliders), borrowed(held_room)
-    old, new, kept = borrowed(held_old), borrowed(held_new), borrowed(held_kept)
     rows, columns = given.shape
     size = kept.work.shape[1]
     load, ends = np.empty(len(old.q)), np.zeros((2, columns))

@@ -7,7 +7,6 @@ from fecontact.bifurcation.harmonic.compiled.evaluation import speed_coefficient
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Array4, Block, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.system.jacobian import batch_derivatives
 
 
@@ -31,7 +30,6 @@ def derivatives_along(
     ``series`` (2 H + 1, P) holds the functions of the series there. Internal variables zs
     (K, N, c) are linear between the samples.
     """
-    us, zs, series, e, J = borrowed(us), borrowed(zs), borrowed(series), borrowed(e), borrowed(J)
     m, N, c = e.springs.shape[1], zs.shape[1], zs.shape[2]
     X, linear = e.room.coefficients, e.room.linear
     L = X.shape[2]

@@ -3,9 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from fecontact.core.compiled import f8
 from fecontact.core.records import Array4, Block, IntegerVector, Matrix, Vector
 from fecontact.system.nodes import SystemArrays
 
@@ -103,7 +101,6 @@ class Equations(NamedTuple):
 (TURN, PERIOD, LOW, HIGH, STEADY, PLAIN, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP,
  LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED, KINKS) = range(17)
 
-_blocks = types.Array(f8, 4, "C")
 class Reached(NamedTuple):
     """Points that were reached, K at most.
 

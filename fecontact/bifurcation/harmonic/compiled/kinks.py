@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, Matrix, Vector
-from fecontact.core.references import borrowed
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.kernels import normal_values
@@ -157,8 +156,6 @@ def add_kinks(
     through the width w, which stays where velocities change with the period. Nodes of plane bodies
     alone. Friction with memory feels the force of the law.
     """
-    t, x, s, onsets = borrowed(t), borrowed(x), borrowed(s), borrowed(onsets)
-    f, J, widths = borrowed(f), borrowed(J), borrowed(widths)
     if derivatives:
         widths[:, :] = 0.0
     if in_space(s) or len(onsets) == 0:

@@ -6,7 +6,6 @@ import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, Vector
-from fecontact.core.references import borrowed
 from fecontact.system.kernels import given_at, node_forces
 from fecontact.system.nodes import (
     SystemArrays,
@@ -31,7 +30,6 @@ def forces_at_rest(
     loads and contact at rest for the last place, relative to the largest force; and the largest
     change of the mean of the loads, relative to the largest load.
     """
-    s, body, given, told = borrowed(s), borrowed(body), borrowed(given), borrowed(told)
     n, m = s.Tx.shape
     P, N, states = len(places), len(tau), s.memory.max()
     length, width = force_room(states, in_space(s))

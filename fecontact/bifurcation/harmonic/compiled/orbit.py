@@ -16,7 +16,6 @@ from fecontact.bifurcation.harmonic.compiled.linear_systems import (
 from fecontact.bifurcation.harmonic.compiled.newton import settled
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.references import borrowed
 
 # What is wanted at an orbit.
 RESIDUAL, DERIVATIVES, SOLUTION, ORBIT = range(4)
@@ -36,8 +35,6 @@ def evaluate(
     Returns 0 where internal variables do not come to repeat, or an iteration does not converge,
     else 1.
     """
-    u, e, forces, mean = borrowed(u), borrowed(e), borrowed(forces), borrowed(mean)
-    row, weights, x = borrowed(row), borrowed(weights), borrowed(x)
     if wanted == ORBIT:
         if settled(u, row, weights, e.numbers[TOLERANCE], e) == 0:
             return 0

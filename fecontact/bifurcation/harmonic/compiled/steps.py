@@ -34,7 +34,6 @@ from fecontact.bifurcation.harmonic.compiled.newton import (
 )
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Vector
-from fecontact.core.references import borrowed
 
 # Largest curvature correction of the predictor, in steps.
 _MOST_BENT = 0.2
@@ -137,8 +136,6 @@ def steps(
     overwritten; ``out.step`` holds the length of the first step, and then of the next one. why (1,)
     says why the call ended. Returns the number of points.
     """
-    u, tangent, bend, scales = borrowed(u), borrowed(tangent), borrowed(bend), borrowed(scales)
-    e, out = borrowed(e), borrowed(out)
     room = e.room
     n, H = len(u) - 1, e.values.shape[1] // 2
     row, weights, guess, there, chord = (room.vectors[1], room.vectors[2], room.vectors[3],

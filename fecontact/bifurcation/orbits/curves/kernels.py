@@ -6,17 +6,13 @@ Arrays at Gauss points are (N m, d) for N intervals of m points, nodes as in
 
 import math
 
-from numba import types
-
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, ComplexMatrix, Matrix, Vector
-from fecontact.core.references import borrowed
 
 
 @kernel
 def open_values(nodes: Matrix, end: Vector, values: Matrix, out: Matrix) -> None:
     """Fill out (N m, d) with the values of nodes (N m, d) that end at ``end`` (d,)."""
-    nodes, end, out, values = borrowed(nodes), borrowed(end), borrowed(out), borrowed(values)
     m = len(values)
     total, d = nodes.shape
     for j in range(total // m):
@@ -33,7 +29,6 @@ def open_values(nodes: Matrix, end: Vector, values: Matrix, out: Matrix) -> None
 @kernel
 def applied(matrices: Block, vectors: Matrix, out: Matrix) -> None:
     """Fill out (N m, d) with the products of matrices (N m, d, d) and vectors."""
-    matrices, vectors, out = borrowed(matrices), borrowed(vectors), borrowed(out)
     rows, d = vectors.shape
     for row in range(rows):
         for i in range(d):
@@ -43,7 +38,6 @@ def applied(matrices: Block, vectors: Matrix, out: Matrix) -> None:
             out[row, i] = total
 
 
-_complex_matrix = types.Array(types.complex128, 2, "C")
 
 
 @kernel
@@ -51,8 +45,6 @@ def multiplied(
     real: Block, imaginary: Block, sign: float, vectors: ComplexMatrix, out: ComplexMatrix,
 ) -> None:
     """Fill out (N m, d) with the products of matrices, real + sign i imaginary, and vectors."""
-    real, imaginary = borrowed(real), borrowed(imaginary)
-    vectors, out = borrowed(vectors), borrowed(out)
     rows, d = vectors.shape
     for row in range(rows):
         for i in range(d):
@@ -68,7 +60,6 @@ def unit_factor(widths: Vector, part: Matrix, before: Matrix) -> float:
 
     Where there are no such vectors before, these are (0, 0).
     """
-    part, before, widths = borrowed(part), borrowed(before), borrowed(widths)
     total, d = part.shape
     m = total // len(widths)
     square, along = 0.0, 0.0
@@ -85,8 +76,6 @@ def unit_factor(widths: Vector, part: Matrix, before: Matrix) -> float:
 @kernel
 def central(up: Block, down: Block, here: Block, step: float, first: Block, second: Block) -> None:
     """Fill first and second (N m, d, k), differences of matrices to both sides and here."""
-    up, down, here = borrowed(up), borrowed(down), borrowed(here)
-    first, second = borrowed(first), borrowed(second)
     rows, d, columns = up.shape
     one, two = 0.5 / step, 1.0 / (step * step)
     for row in range(rows):
@@ -107,10 +96,6 @@ def add_term(
     ``points`` (N m, d) are its derivatives to the states at the Gauss points, over the width of
     the interval, ``common`` those to the period, where there is room, and to the parameters.
     """
-    left, states, points, common = (borrowed(left), borrowed(states), borrowed(points),
-                                    borrowed(common))
-    J, P, bend, shift, widths = (borrowed(J), borrowed(P), borrowed(bend), borrowed(shift),
-                                 borrowed(widths))
     rows, d, q = P.shape
     m = rows // len(widths)
     first = len(common) - q

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.compiled import kernel
-from fecontact.core.references import constants
+from fecontact.core.constants import constants
 from fecontact.integrate.nonsmooth import problem as kinds
-from fecontact.integrate.nonsmooth.event_driven import RUN, run_events
+from fecontact.integrate.nonsmooth.event_driven import run_events
 from fecontact.integrate.nonsmooth.event_search import Room, room_for
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.system.nodes import SystemArrays
@@ -37,8 +36,7 @@ def run_for(problem: kinds.NonsmoothProblem) -> Any:
 
 @cache
 def _run(modes: int, nodes: int) -> Any:
-    return kernel(RUN, constants=constants(fixed_values(modes, nodes)), nogil=True)(
-        run_events.py_func)
+    return run_events.for_values(constants(fixed_values(modes, nodes)))
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
@@ -66,9 +64,3 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
 def _shapes(arrays: Any) -> dict[str, Any]:
     return {name: value.shape for name, value in arrays._asdict().items()
             if isinstance(value, np.ndarray)}
-
-
-# What they are compiled from is at hand while the run of all systems has just been compiled.
-if run_events.stats.cache_misses:
-    for pair in SIZES:
-        _run(*pair)
