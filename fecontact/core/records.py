@@ -3,20 +3,24 @@
 A record is a ``NamedTuple`` whose annotated fields are numbers, arrays and other records. Compiled
 functions take records by reference and read fields by name, see :mod:`fecontact.core.references`.
 
->>> class Spring(NamedTuple):
-...     stiffness: float
-...     ends: Vector
->>> numba_type(Spring)
-Spring(float64, array(float64, 1d, C))
->>> signature_of(Callable[[Spring, float], float])
-(Reference(Spring, ...), float64) -> float64
+>>> NODES = Size("nodes")
+>>> class Springs(NamedTuple):
+...     stiffness: Annotated[Array, NODES]
+...     ends: Annotated[Integers, NODES, 2]
+...     preload: float
+>>> allocate(Springs, {NODES: 3}).ends.shape
+(3, 2)
+>>> numba_type(Springs)
+Springs(array(float64, 1d, C), array(int64, 2d, C), float64)
 """
 
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
+from operator import add, mul, sub
 from types import NoneType
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 import numpy as np
 from numba import types
@@ -27,22 +31,71 @@ from typing_extensions import TypeAliasType
 from fecontact.core.references import Reference
 from fecontact.core.types import Array, ComplexArray, Integers
 
+Record = TypeVar("Record", bound=tuple[Any, ...])
+
 Flags = TypeAliasType("Flags", NDArray[np.bool_])
 ShortIntegers = TypeAliasType("ShortIntegers", NDArray[np.int32])
 
+
+
+@dataclass(frozen=True, repr=False)
+class Size:
+    """A length that the annotations of records name, or a sum or product of such.
+
+    ``Annotated[Array, NODES, 2 * MODES]`` is an array with a row for each node, if NODES and MODES
+    are sizes.
+    """
+
+    name: str
+    _value: Callable[[Mapping["Size", int]], int] | None = None
+
+    def __repr__(self) -> str:
+        return self.name
+
+    def of(self, sizes: Mapping["Size", int]) -> int | None:
+        """Its value where ``sizes`` are known; None if it takes one that is not among them."""
+        try:
+            return sizes[self] if self._value is None else self._value(sizes)
+        except KeyError:
+            return None
+
+    def _combined(self, other: "Size | int", sign: str, of: Callable[[int, int], int]) -> "Size":
+        def value(sizes: Mapping[Size, int]) -> int:
+            found = [_length(item, sizes) for item in (self, other)]
+            if None in found:
+                raise KeyError
+            return of(*found)
+
+        return Size(f"({self.name} {sign} {getattr(other, 'name', other)})", value)
+
+    def __add__(self, other: "Size | int") -> "Size":
+        return self._combined(other, "+", add)
+
+    def __sub__(self, other: "Size | int") -> "Size":
+        return self._combined(other, "-", sub)
+
+    def __mul__(self, other: "Size | int") -> "Size":
+        return self._combined(other, "*", mul)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+# A length that is another in every record.
+ANY = Size("any")
+
 # Arrays in C order, by their number of axes.
-Vector = Annotated[Array, 1]
-Matrix = Annotated[Array, 2]
-Block = Annotated[Array, 3]
-Array4 = Annotated[Array, 4]
-IntegerVector = Annotated[Integers, 1]
-IntegerMatrix = Annotated[Integers, 2]
-IntegerBlock = Annotated[Integers, 3]
-ShortVector = Annotated[ShortIntegers, 1]
-ShortBlock = Annotated[ShortIntegers, 3]
-FlagVector = Annotated[Flags, 1]
-ComplexVector = Annotated[ComplexArray, 1]
-ComplexMatrix = Annotated[ComplexArray, 2]
+Vector = Annotated[Array, ANY]
+Matrix = Annotated[Array, ANY, ANY]
+Block = Annotated[Array, ANY, ANY, ANY]
+Array4 = Annotated[Array, ANY, ANY, ANY, ANY]
+IntegerVector = Annotated[Integers, ANY]
+IntegerMatrix = Annotated[Integers, ANY, ANY]
+IntegerBlock = Annotated[Integers, ANY, ANY, ANY]
+ShortVector = Annotated[ShortIntegers, ANY]
+ShortBlock = Annotated[ShortIntegers, ANY, ANY, ANY]
+FlagVector = Annotated[Flags, ANY]
+ComplexVector = Annotated[ComplexArray, ANY]
+ComplexMatrix = Annotated[ComplexArray, ANY, ANY]
 
 _NUMBERS: dict[Any, Any] = {
     float: types.float64, int: types.int64, bool: types.boolean, complex: types.complex128,
@@ -69,8 +122,8 @@ def numba_type(annotation: Any) -> Any:
     if is_record(annotation):
         return _record_type(annotation)
     if get_origin(annotation) is Annotated:
-        entries, axes = get_args(annotation)
-        return types.Array(_ENTRIES[entries], axes, "C")
+        entries, *axes = get_args(annotation)
+        return types.Array(_ENTRIES[entries], len(axes), "C")
     if get_origin(annotation) is tuple:
         return types.BaseTuple.from_types([numba_type(item) for item in get_args(annotation)])
     raise TypeError(f"{annotation!r} stands for no type of compiled functions")
@@ -83,9 +136,64 @@ def is_record(annotation: Any) -> bool:
 
 
 @cache
-def _record_type(record: Any) -> Any:
+def _fields(record: Any) -> dict[str, Any]:
+    """Annotations by the names of the fields, in their order."""
     hints = typing.get_type_hints(record, include_extras=True)
-    return types.BaseTuple.from_types([numba_type(hints[name]) for name in record._fields], record)
+    return {name: hints[name] for name in record._fields}
+
+
+@cache
+def _record_type(record: Any) -> Any:
+    return types.BaseTuple.from_types(list(map(numba_type, _fields(record).values())), record)
+
+
+def _length(axis: Size | int, sizes: Mapping[Size, int]) -> int | None:
+    return axis.of(sizes) if isinstance(axis, Size) else axis
+
+
+def allocate(record: type[Record], sizes: Mapping[Size, int], **given: Any) -> Record:
+    """A record of zeros, arrays of these sizes, but for the fields that are ``given``.
+
+    Raises
+    ------
+    TypeError
+        If the length of an array that is not given is not among the sizes.
+    """
+    unknown = given.keys() - _fields(record).keys()
+    if unknown:
+        raise TypeError(f"{record.__name__} has no {', '.join(sorted(unknown))}")
+    return record(**{name: given[name] if name in given else _zeros(record, name, kind, sizes)
+                     for name, kind in _fields(record).items()})
+
+
+def _zeros(record: Any, name: str, kind: Any, sizes: Mapping[Size, int]) -> Any:
+    if is_record(kind):
+        return allocate(kind, sizes)
+    if get_origin(kind) is not Annotated:
+        return kind()
+    entries, *axes = get_args(kind)
+    shape = [_length(axis, sizes) for axis in axes]
+    if None in shape:
+        raise TypeError(f"the shape {axes} of {record.__name__}.{name} does not follow from sizes")
+    return np.zeros(shape, dtype=_ENTRIES[entries].name)
+
+
+def shapes(sizes: Mapping[Size, int], *records: Any) -> dict[Any, dict[str, Any]]:
+    """What of the shapes of arrays follows from sizes: by record and field, None for what does not.
+
+    Records within the given ones are among them.
+    """
+    found: dict[Any, dict[str, Any]] = {}
+    for record in records:
+        own = found.setdefault(record, {})
+        for name, kind in _fields(record).items():
+            if is_record(kind):
+                found |= shapes(sizes, kind)
+            elif get_origin(kind) is Annotated:
+                shape = tuple(_length(axis, sizes) for axis in get_args(kind)[1:])
+                if any(length is not None for length in shape):
+                    own[name] = shape
+    return found
 
 
 def signature_of(annotated: Any, *, by_reference: bool = True) -> Signature:
