@@ -4,11 +4,16 @@ Arrays of a contact system as its compiled functions see them; the equations are
 :mod:`fecontact.system.kernels`.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper
-from fecontact.core.records import Block, IntegerVector, Matrix, Vector
+from fecontact.core.records import ANY, IntegerVector, Matrix, Size, Vector
+from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import ground_at, signal_at
+
+# Modes, contact nodes, dimensions of space, internal variables of a node; length of a state.
+MODES, NODES, AXES, MEMORY = map(Size, ("modes", "nodes", "axes", "memory"))
+SIZE = 2 * MODES + NODES * MEMORY
 
 
 class SystemArrays(NamedTuple):
@@ -26,39 +31,39 @@ class SystemArrays(NamedTuple):
     where that is 0 of ``profile`` along the unit vector ``wave_direction`` (2,).
     """
 
-    stiffness: Matrix
-    damping: Matrix
-    modal_damping: Matrix
-    constant_load: Vector
-    drive_shapes: Matrix
-    drive_stiffness: Vector
-    drive_damping: Vector
-    load_shapes: Matrix
-    Tx: Matrix
-    Ty: Matrix
-    T2: Matrix
-    abscissa: Vector
-    ordinate: Vector
-    gap: Vector
-    sliding: Vector
+    stiffness: Annotated[Array, MODES, MODES]
+    damping: Annotated[Array, MODES, MODES]
+    modal_damping: Annotated[Array, MODES, MODES]
+    constant_load: Annotated[Array, MODES]
+    drive_shapes: Annotated[Array, AXES, MODES]
+    drive_stiffness: Annotated[Array, AXES]
+    drive_damping: Annotated[Array, AXES]
+    load_shapes: Annotated[Array, ANY, MODES]
+    Tx: Annotated[Array, NODES, MODES]
+    Ty: Annotated[Array, NODES, MODES]
+    T2: Annotated[Array, NODES * (AXES - 2), MODES]
+    abscissa: Annotated[Array, NODES]
+    ordinate: Annotated[Array, NODES * (AXES - 2)]
+    gap: Annotated[Array, NODES]
+    sliding: Annotated[Array, NODES]
     sliding_across: Matrix
     wave_direction: Vector
     sides: Matrix
-    bristle_stiffness: Block
-    normal_parameters: Matrix
-    friction_parameters: Matrix
+    bristle_stiffness: Annotated[Array, 2, NODES, ANY]
+    normal_parameters: Annotated[Array, NODES, ANY]
+    friction_parameters: Annotated[Array, NODES, ANY]
     profile_parameters: Vector
     friction_scale_parameters: Vector
     ground_motion_parameters: Vector
     second_motion_parameters: Vector
-    drive_parameters: Matrix
+    drive_parameters: Annotated[Array, AXES, ANY]
     load_parameters: Matrix
-    normal: IntegerVector
-    friction: IntegerVector
+    normal: Annotated[Integers, NODES]
+    friction: Annotated[Integers, NODES]
     planar: IntegerVector
     memory: IntegerVector
     on_ground: IntegerVector
-    drive: IntegerVector
+    drive: Annotated[Integers, AXES]
     load: IntegerVector
     profile: int
     surface: int

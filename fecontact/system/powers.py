@@ -9,6 +9,7 @@ from fecontact.core.records import Vector
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system.kernels import friction_across, node_forces
 from fecontact.system.nodes import (
+    NODES,
     SystemArrays,
     force_room,
     ground_motion,
@@ -27,6 +28,8 @@ POWER_COUNT = len(POWERS)
 (DRIVE, BELT_NORMAL, BELT_FRICTION, LOAD, CIRCULATORY, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING,
  FRICTION, BRISTLES) = range(POWER_COUNT)
 NODE_POWERS = 2
+# Entries of what is integrated of the powers.
+WORKS = NODE_POWERS * NODES + POWER_COUNT
 
 
 @helper

@@ -127,7 +127,7 @@ def _followed(
 ) -> tuple[list[Phase], Array, Array]:
     """Phases from a state on, the last of which is cut, with begins and states there."""
     progress = progress_for(motion.problem, motion.rubbing, start, begin, 0.0)
-    room = room_for(motion.problem, len(progress.state))
+    room = room_for(motion.problem)
     phases: list[Phase] = []
     begins, states, t = [begin], [start], begin
     _first_state(motion, progress, room, t)

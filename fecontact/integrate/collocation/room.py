@@ -1,12 +1,13 @@
 """What steps by collocation work on, and the systems that take them."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.errors import InputError
-from fecontact.core.records import IntegerVector, Matrix, Vector
+from fecontact.core.records import allocate
+from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein
 from fecontact.integrate.collocation.tableau import (
     PLACE_TERMS,
@@ -18,7 +19,8 @@ from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p.small_systems import not_small
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.powers import NODE_POWERS, POWER_COUNT
+from fecontact.system.nodes import MODES, NODES
+from fecontact.system.powers import WORKS
 
 # Largest rtol at which it is taken unasked: steps of Rodas5P do not become much longer above.
 ACCURATE = 1e-7
@@ -63,46 +65,35 @@ class Collocation(NamedTuple):
     """
 
     tolerance: float
-    flags: IntegerVector
-    accelerations: Matrix
-    before: Matrix
-    matrix: Matrix
-    right: Vector
-    pivots: IntegerVector
-    small: Matrix
-    small_right: Vector
-    small_pivots: IntegerVector
-    given: Matrix
-    load: Matrix
-    speeds: Vector
-    y: Vector
-    after: Vector
-    rate: Vector
-    places: Matrix
-    rates: Matrix
-    powers: Matrix
-    work: Matrix
-    looked: Vector
-    line: Matrix
-    halves: Matrix
-    found: Vector
+    flags: Annotated[Integers, 3]
+    accelerations: Annotated[Array, RATE_TERMS, MODES]
+    before: Annotated[Array, RATE_TERMS, MODES]
+    matrix: Annotated[Array, STAGES * MODES, STAGES * MODES]
+    right: Annotated[Array, STAGES * MODES]
+    pivots: Annotated[Integers, STAGES * MODES]
+    small: Annotated[Array, MODES, MODES]
+    small_right: Annotated[Array, MODES]
+    small_pivots: Annotated[Integers, MODES]
+    given: Annotated[Array, STAGES, dynamics.GIVEN]
+    load: Annotated[Array, STAGES, MODES]
+    speeds: Annotated[Array, RATE_TERMS]
+    y: Annotated[Array, 2 * MODES]
+    after: Annotated[Array, 2 * MODES]
+    rate: Annotated[Array, 2 * MODES]
+    places: Annotated[Array, PLACE_TERMS, MODES]
+    rates: Annotated[Array, SPEED_TERMS, MODES]
+    powers: Annotated[Array, RATE_TERMS, WORKS]
+    work: Annotated[Array, SPEED_TERMS, WORKS]
+    looked: Annotated[Array, WORKS]
+    line: Annotated[Array, 3, PLACE_TERMS]
+    halves: Annotated[Array, bernstein.DEPTH, PLACE_TERMS + 1]
+    found: Annotated[Array, PLACE_TERMS]
 
 
 def collocation_for(modes: int, nodes: int, rtol: float) -> Collocation:
     """Room for a system of so many modes and nodes, before its first step."""
-    m, many = modes, STAGES * modes
-    powers = POWER_COUNT + NODE_POWERS * nodes
-    y, after, rate = np.zeros((3, 2 * m))
-    return Collocation(
-        max(_PART * rtol, _ROUNDING), np.array([1, 0, 0]),
-        np.zeros((RATE_TERMS, m)), np.zeros((RATE_TERMS, m)),
-        np.zeros((many, many)), np.zeros(many), np.zeros(many, dtype=np.int64),
-        np.zeros((m, m)), np.zeros(m), np.zeros(m, dtype=np.int64),
-        np.zeros((STAGES, dynamics.GIVEN)), np.zeros((STAGES, m)), np.zeros(RATE_TERMS),
-        y, after, rate, np.zeros((PLACE_TERMS, m)), np.zeros((SPEED_TERMS, m)),
-        np.zeros((RATE_TERMS, powers)), np.zeros((SPEED_TERMS, powers)), np.zeros(powers),
-        np.zeros((3, PLACE_TERMS)), np.zeros((bernstein.DEPTH, PLACE_TERMS + 1)),
-        np.zeros(PLACE_TERMS))
+    return allocate(Collocation, {MODES: modes, NODES: nodes},
+                    tolerance=max(_PART * rtol, _ROUNDING), flags=np.array([1, 0, 0]))
 
 
 def chosen_collocation(

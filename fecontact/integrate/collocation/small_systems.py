@@ -7,13 +7,12 @@ out for arrays of a known size.
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from fecontact.core.compiled import kernel
 from fecontact.core.constants import constants
+from fecontact.core.records import shapes
 from fecontact.integrate.collocation.advance import advance
 from fecontact.integrate.collocation.columns import propagate
-from fecontact.integrate.collocation.room import Collocation, collocation_for
+from fecontact.integrate.collocation.room import Collocation
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.integrate.rodas5p.state import Problem
 from fecontact.integrate.rodas5p.variational import Variation
@@ -38,22 +37,20 @@ def propagate_for(problem: Problem) -> int:
 
 @cache
 def _propagate(modes: int, nodes: int) -> int:
-    known = {**small_systems.values_of_derivatives(modes, nodes), **_of_room(modes, nodes)}
+    known = small_systems.values_of_derivatives(modes, nodes) | _of_room(modes, nodes)
     return int(propagate.for_values(constants(known)).address)
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
-    """What is the same in all small systems of a size, for each type of tuples."""
-    values = {**small_systems.fixed_values(modes, nodes), **_of_room(modes, nodes)}
+    """What is the same in all small systems of a size, for each record."""
+    values = small_systems.fixed_values(modes, nodes) | _of_room(modes, nodes)
     # Of any number of columns, or none.
     del values[Variation]
     return values
 
 
 def _of_room(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
-    room = collocation_for(modes, nodes, 1.0)._asdict()
-    return {Collocation: {
-        name: value.shape for name, value in room.items() if isinstance(value, np.ndarray)}}
+    return shapes(small_systems.sizes_of(modes, nodes), Collocation)
 
 
 def compile_usual() -> None:

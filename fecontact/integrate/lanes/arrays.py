@@ -5,15 +5,20 @@ in one table (rows, 8), those of the progress in another, so that a run is loade
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.lanes.vectors import WIDTH
-from fecontact.core.records import Block, IntegerMatrix, IntegerVector, Matrix, Vector
-from fecontact.core.types import Array
+from fecontact.core.records import (
+    ANY,
+    IntegerVector,
+    Matrix,
+    allocate,
+)
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p import tableau
+from fecontact.system.nodes import MODES, NODES
 
 # Rows of `LaneProgress.numbers`.
 (TIME, STEP, END, SMALLEST, SPEED_SCALE, LAST_STEP, LAST_ROOT, REJECTED_LAST, CAUTIOUS, AGAIN,
@@ -35,25 +40,25 @@ class LaneSystem(NamedTuple):
     of the ground is constant.
     """
 
-    stiffness: Block
-    damping: Block
-    constant_load: Matrix
-    drive_shapes: Block
-    drive_stiffness: Matrix
-    drive_damping: Matrix
-    load_shapes: Block
-    Tx: Block
-    Ty: Block
-    gap: Matrix
-    sliding: Matrix
-    normal_parameters: Block
-    friction_parameters: Block
-    ground_motion_parameters: Matrix
-    drive_parameters: Block
-    load_parameters: Block
-    normal: IntegerVector
-    friction: IntegerVector
-    drive: IntegerVector
+    stiffness: Annotated[Array, MODES, MODES, WIDTH]
+    damping: Annotated[Array, MODES, MODES, WIDTH]
+    constant_load: Annotated[Array, MODES, WIDTH]
+    drive_shapes: Annotated[Array, 2, MODES, WIDTH]
+    drive_stiffness: Annotated[Array, 2, WIDTH]
+    drive_damping: Annotated[Array, 2, WIDTH]
+    load_shapes: Annotated[Array, ANY, MODES, WIDTH]
+    Tx: Annotated[Array, NODES, MODES, WIDTH]
+    Ty: Annotated[Array, NODES, MODES, WIDTH]
+    gap: Annotated[Array, NODES, WIDTH]
+    sliding: Annotated[Array, NODES, WIDTH]
+    normal_parameters: Annotated[Array, NODES, ANY, WIDTH]
+    friction_parameters: Annotated[Array, NODES, ANY, WIDTH]
+    ground_motion_parameters: Annotated[Array, ANY, WIDTH]
+    drive_parameters: Annotated[Array, 2, ANY, WIDTH]
+    load_parameters: Annotated[Array, ANY, ANY, WIDTH]
+    normal: Annotated[Integers, NODES]
+    friction: Annotated[Integers, NODES]
+    drive: Annotated[Integers, 2]
     load: IntegerVector
     ground_motion: int
     steady: int
@@ -66,13 +71,13 @@ class LaneControl(NamedTuple):
     count as if it were that large, and the largest acceleration of the ground.
     """
 
-    displacement_scale: Matrix
-    slip_scale: Matrix
-    slow: Matrix
-    depth: Matrix
-    largest: Matrix
-    levels: Block
-    numbers: Matrix
+    displacement_scale: Annotated[Array, MODES, WIDTH]
+    slip_scale: Annotated[Array, NODES, WIDTH]
+    slow: Annotated[Array, NODES, WIDTH]
+    depth: Annotated[Array, NODES, WIDTH]
+    largest: Annotated[Array, MODES, WIDTH]
+    levels: Annotated[Array, ANY, NODES, WIDTH]
+    numbers: Annotated[Array, LIMITS, WIDTH]
 
 
 class LaneProgress(NamedTuple):
@@ -100,18 +105,18 @@ class LaneProgress(NamedTuple):
         Lanes, one bit each, whose rates and forces are not known yet.
     """
 
-    numbers: Matrix
-    state: Matrix
-    extremes: Matrix
-    rate: Matrix
-    forces: Block
-    places: Matrix
-    speeds: Matrix
-    ground: Vector
-    counts: IntegerMatrix
-    runs: IntegerVector
-    rows: IntegerVector
-    fresh: IntegerVector
+    numbers: Annotated[Array, NUMBERS, WIDTH]
+    state: Annotated[Array, 2 * MODES, WIDTH]
+    extremes: Annotated[Array, MODES, WIDTH]
+    rate: Annotated[Array, 2 * MODES, WIDTH]
+    forces: Annotated[Array, NODES, FORCES, WIDTH]
+    places: Annotated[Array, 2 * NODES, WIDTH]
+    speeds: Annotated[Array, 2 * NODES, WIDTH]
+    ground: Annotated[Array, WIDTH]
+    counts: Annotated[Integers, 2, WIDTH]
+    runs: Annotated[Integers, WIDTH]
+    rows: Annotated[Integers, WIDTH]
+    fresh: Annotated[Integers, 1]
 
 
 class LaneRoom(NamedTuple):
@@ -137,24 +142,24 @@ class LaneRoom(NamedTuple):
         Normal forces there.
     """
 
-    stages: Block
-    by_place: Block
-    by_speed: Block
-    work: Block
-    inverse: Block
-    answers: Block
-    stage: Matrix
-    right: Matrix
-    after: Matrix
-    base: Matrix
-    dense: Block
-    load: Matrix
-    time_rate: Matrix
-    places: Matrix
-    speeds: Matrix
-    forces: Block
-    inner: Block
-    inner_forces: Block
+    stages: Annotated[Array, tableau.STAGES, 2 * MODES, WIDTH]
+    by_place: Annotated[Array, MODES, MODES, WIDTH]
+    by_speed: Annotated[Array, MODES, MODES, WIDTH]
+    work: Annotated[Array, MODES, MODES, WIDTH]
+    inverse: Annotated[Array, MODES, MODES, WIDTH]
+    answers: Annotated[Array, MODES, MODES, WIDTH]
+    stage: Annotated[Array, 2 * MODES, WIDTH]
+    right: Annotated[Array, 2 * MODES, WIDTH]
+    after: Annotated[Array, 2 * MODES, WIDTH]
+    base: Annotated[Array, 2 * MODES, WIDTH]
+    dense: Annotated[Array, 3, 2 * MODES, WIDTH]
+    load: Annotated[Array, MODES, WIDTH]
+    time_rate: Annotated[Array, MODES, WIDTH]
+    places: Annotated[Array, 2 * NODES, WIDTH]
+    speeds: Annotated[Array, 2 * NODES, WIDTH]
+    forces: Annotated[Array, NODES, FORCES, WIDTH]
+    inner: Annotated[Array, 2, 2 * NODES, WIDTH]
+    inner_forces: Annotated[Array, NODES, FORCES, WIDTH]
 
 
 class LaneRuns(NamedTuple):
@@ -179,11 +184,11 @@ class LaneRuns(NamedTuple):
     parameters: Matrix
     starts: Matrix
     times: Matrix
-    states: Block
+    states: Annotated[Array, ANY, ANY, 2 * MODES]
     follows: IntegerVector
-    ends: IntegerMatrix
+    ends: Annotated[Integers, ANY, 4]
     queue: IntegerVector
-    counts: IntegerVector
+    counts: Annotated[Integers, 4]
 
 
 TAKEN, WAITING, OPEN, ATTEMPTS = range(4)
@@ -221,25 +226,14 @@ def lanes_for(
     laws: Sequence[Any], modes: int, nodes: int,
 ) -> Lanes:
     """Empty lanes for systems whose parameters have these shapes."""
-    m, n = modes, nodes
-
-    def zeros(*shape: int) -> NDArray[np.float64]:
-        return np.zeros((*shape, WIDTH))
-
+    sizes = {MODES: modes, NODES: nodes}
     shapes = [*system_shapes, *control_shapes]
     parameters = np.ones((_rows_of(shapes), WIDTH))
-    start = zeros(_rows_of(_progress_shapes(m)))
+    start = np.zeros((_rows_of(_progress_shapes(modes)), WIDTH))
     views: list[Any] = list(_views(parameters, shapes))
     counted = len(system_shapes)
-    numbers, state, extremes = _views(start, _progress_shapes(m))
-    progress = LaneProgress(
-        numbers, state, extremes, zeros(2 * m), zeros(n, FORCES), zeros(2 * n), zeros(2 * n),
-        zeros(), np.zeros((2, WIDTH), dtype=np.int64), np.full(WIDTH, -1, dtype=np.int64),
-        np.zeros(WIDTH, dtype=np.int64), np.zeros(1, dtype=np.int64))
-    square, state_room = zeros(5, m, m), zeros(4, 2 * m)
-    room = LaneRoom(
-        zeros(tableau.STAGES, 2 * m), square[0], square[1], square[2], square[3], square[4],
-        state_room[0], state_room[1], state_room[2], state_room[3], zeros(3, 2 * m), zeros(m),
-        zeros(m), zeros(2 * n), zeros(2 * n), zeros(n, FORCES), zeros(2, 2 * n), zeros(n, FORCES))
+    numbers, state, extremes = _views(start, _progress_shapes(modes))
+    progress = allocate(LaneProgress, sizes, numbers=numbers, state=state, extremes=extremes,
+                        runs=np.full(WIDTH, -1, dtype=np.int64))
     return Lanes(parameters, start, LaneSystem(*views[:counted], *laws),
-                 LaneControl(*views[counted:]), progress, room)
+                 LaneControl(*views[counted:]), progress, allocate(LaneRoom, sizes))

@@ -223,7 +223,7 @@ def start(
         from fecontact.integrate.nonsmooth.event_search import room_for
         from fecontact.integrate.nonsmooth.steps.small_systems import run_for
         run = partial(run_for(problem), problem, limits, course, output, workspace,
-                      room_for(problem, len(course.state)), found.watch)
+                      room_for(problem), found.watch)
     else:
         from fecontact.integrate.nonsmooth.space_contact import in_space
         from fecontact.integrate.nonsmooth.stepping_room import IN_PLANE

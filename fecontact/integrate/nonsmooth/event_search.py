@@ -10,12 +10,13 @@ Flights that have just begun, and forces of what holds, are looked at in
 :mod:`fecontact.integrate.nonsmooth.steps.releases`.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.records import FlagVector, Matrix, Vector
+from fecontact.core.records import Flags, allocate
+from fecontact.core.types import Array
 from fecontact.integrate.bernstein import (
     DEPTH,
     FINEST,
@@ -29,17 +30,24 @@ from fecontact.integrate.bernstein import (
     value,
 )
 from fecontact.integrate.nonsmooth.dop853 import PARTS, SLOPES
-from fecontact.integrate.nonsmooth.problem import OPEN, STICK, NonsmoothProblem
+from fecontact.integrate.nonsmooth.problem import (
+    CLUSTERS,
+    OPEN,
+    STICK,
+    WITH_WORK,
+    NonsmoothProblem,
+    sizes_of,
+)
 from fecontact.integrate.nonsmooth.steps.flights import (
     FLIGHT_FIELDS,
     SUNK,
     YOUNG,
     first_landing,
 )
-from fecontact.integrate.nonsmooth.steps.rates import nothing_given
+from fecontact.integrate.nonsmooth.steps.rates import GIVEN, nothing_given
 from fecontact.integrate.nonsmooth.steps.releases import QUARTERS, first_let_go
 from fecontact.laws.signatures import ground_at, normal_at
-from fecontact.system.nodes import ground_motion
+from fecontact.system.nodes import MODES, NODES, ground_motion
 
 # Rounding of a sum, relative to its parts.
 ROUNDING = 2e-15
@@ -90,48 +98,39 @@ class Room(NamedTuple):
         the acceleration and the height of one of them over the step.
     """
 
-    slopes: Matrix
-    parts: Matrix
-    new: Vector
-    state: Vector
-    rate: Vector
-    place: Vector
-    nested: Vector
-    bound: Vector
-    along: Vector
-    values: Vector
-    halves: Matrix
-    left: Matrix
-    scale: Vector
-    ends: Matrix
-    waiting: Matrix
-    past: FlagVector
-    fresh: FlagVector
-    released: FlagVector
-    arrived: FlagVector
-    held: FlagVector
-    touched: FlagVector
-    parting: FlagVector
-    given: Vector
-    loads: Vector
-    pushes: Vector
-    flights: Matrix
-    pull: Vector
-    heights: Vector
+    slopes: Annotated[Array, SLOPES, WITH_WORK]
+    parts: Annotated[Array, PARTS, WITH_WORK]
+    new: Annotated[Array, WITH_WORK]
+    state: Annotated[Array, WITH_WORK]
+    rate: Annotated[Array, WITH_WORK]
+    place: Annotated[Array, CLUSTERS + NODES]
+    nested: Annotated[Array, PARTS + 1]
+    bound: Annotated[Array, PARTS + 1]
+    along: Annotated[Array, PARTS + 1]
+    values: Annotated[Array, PARTS + 1]
+    halves: Annotated[Array, DEPTH, PARTS + 3]
+    left: Annotated[Array, QUARTERS + 2, 2 * CLUSTERS + NODES]
+    scale: Annotated[Array, 2 * CLUSTERS + NODES]
+    ends: Annotated[Array, 2, 2 * CLUSTERS + NODES]
+    waiting: Annotated[Array, DEPTH, 2]
+    past: Annotated[Flags, CLUSTERS + NODES]
+    fresh: Annotated[Flags, CLUSTERS + NODES]
+    released: Annotated[Flags, CLUSTERS]
+    arrived: Annotated[Flags, CLUSTERS]
+    held: Annotated[Flags, CLUSTERS]
+    touched: Annotated[Flags, NODES]
+    parting: Annotated[Flags, NODES]
+    given: Annotated[Array, GIVEN]
+    loads: Annotated[Array, MODES]
+    pushes: Annotated[Array, MODES]
+    flights: Annotated[Array, NODES, FLIGHT_FIELDS]
+    pull: Annotated[Array, SLOPES]
+    heights: Annotated[Array, PARTS + 2]
 
 
-def room_for(problem: NonsmoothProblem, size: int) -> Room:
-    """Room for a problem whose state is of this size."""
-    n, (k, m) = len(problem.cluster), problem.rows.shape
-    new, state, rate = np.zeros((3, size))
-    nested, bound, along, values = np.zeros((4, PARTS + 1))
-    return Room(np.zeros((SLOPES, size)), np.zeros((PARTS, size)), new, state, rate,
-                np.zeros(k + n), nested, bound, along, values, np.zeros((DEPTH, PARTS + 3)),
-                np.zeros((QUARTERS + 2, 2 * k + n)), np.zeros(2 * k + n), np.zeros((2, 2 * k + n)),
-                np.zeros((DEPTH, 2)),
-                *(np.zeros(count, dtype=bool) for count in (k + n, k + n, k, k, k, n, n)),
-                *(nothing_given(), *np.zeros((2, m)), np.zeros((n, FLIGHT_FIELDS)),
-                  np.zeros(SLOPES), np.zeros(PARTS + 2)))
+def room_for(problem: NonsmoothProblem) -> Room:
+    """Room for a problem."""
+    return allocate(Room, sizes_of(problem), given=nothing_given())
 
 
 @helper

@@ -1,13 +1,13 @@
 """What the kernels of set-valued contact share: the problem, room to work in, names of columns."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.records import IntegerVector, Matrix, Vector
-from fecontact.core.types import Array
-from fecontact.system.nodes import SystemArrays
+from fecontact.core.records import ANY, Size, Vector, allocate
+from fecontact.core.types import Array, Integers
+from fecontact.system.nodes import AXES, MODES, NODES, SystemArrays
 from fecontact.system.powers import POWER_COUNT
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
@@ -41,6 +41,11 @@ SIZES = 3
 SLIP_SIZE, RATE_SIZE, DEPTH_SIZE = range(SIZES)
 
 
+# Groups of nodes that slip as one, and what is told of a node; a state with the work after it.
+CLUSTERS, TOLD = Size("clusters"), Size("told of a node")
+WITH_WORK = 2 * MODES + NODES + POWER_COUNT
+
+
 class NonsmoothProblem(NamedTuple):
     """A system with set-valued friction, as the kernels see it.
 
@@ -58,16 +63,16 @@ class NonsmoothProblem(NamedTuple):
     """
 
     system: SystemArrays
-    static: Vector
-    cluster: IntegerVector
-    rows: Matrix
-    sliding: Vector
+    static: Annotated[Array, NODES]
+    cluster: Annotated[Integers, NODES]
+    rows: Annotated[Array, CLUSTERS, MODES]
+    sliding: Annotated[Array, CLUSTERS]
     tick: float
     rigid: int
-    restitution: Vector
-    tangential: Vector
+    restitution: Annotated[Array, NODES]
+    tangential: Annotated[Array, CLUSTERS]
     poisson: int
-    relief: Vector
+    relief: Annotated[Array, 3]
     steady: int
     derivative: int
     change: int
@@ -81,7 +86,7 @@ class Limits(NamedTuple):
     """
 
     stops: Vector
-    floor: Vector
+    floor: Annotated[Array, WITH_WORK]
     rtol: float
     longest: float
 
@@ -94,13 +99,13 @@ class Progress(NamedTuple):
     of implicit steps, in space (2 n,) along the first tangents and then along the second ones.
     """
 
-    clock: Vector
-    counts: IntegerVector
-    state: Vector
-    status: IntegerVector
-    closed: IntegerVector
-    largest: Vector
-    carried: Vector
+    clock: Annotated[Array, 4]
+    counts: Annotated[Integers, COUNTS]
+    state: Annotated[Array, WITH_WORK]
+    status: Annotated[Integers, CLUSTERS]
+    closed: Annotated[Integers, NODES]
+    largest: Annotated[Array, SIZES]
+    carried: Annotated[Array, NODES * (AXES - 1)]
 
 
 class Output(NamedTuple):
@@ -110,9 +115,9 @@ class Output(NamedTuple):
     """
 
     times: Vector
-    states: Matrix
-    friction: Matrix
-    normal: Matrix
+    states: Annotated[Array, ANY, WITH_WORK]
+    friction: Annotated[Array, ANY, NODES * (AXES - 1)]
+    normal: Annotated[Array, ANY, NODES]
 
 
 class Step(NamedTuple):
@@ -126,16 +131,16 @@ class Step(NamedTuple):
 class Workspace(NamedTuple):
     """Results per node and per cluster of the last evaluation, and room for small systems."""
 
-    nodes: Matrix
-    friction: Vector
-    total: Vector
-    limit: Vector
-    pressing: Vector
-    slip: Vector
-    matrix: Matrix
-    right: Vector
-    indices: IntegerVector
-    pivots: IntegerVector
+    nodes: Annotated[Array, NODES, TOLD]
+    friction: Annotated[Array, NODES]
+    total: Annotated[Array, CLUSTERS]
+    limit: Annotated[Array, CLUSTERS]
+    pressing: Annotated[Array, CLUSTERS]
+    slip: Annotated[Array, CLUSTERS]
+    matrix: Annotated[Array, NODES + CLUSTERS, NODES + CLUSTERS]
+    right: Annotated[Array, NODES + CLUSTERS]
+    indices: Annotated[Integers, NODES + CLUSTERS]
+    pivots: Annotated[Integers, NODES + CLUSTERS]
 
 
 def tangents(problem: NonsmoothProblem) -> int:
@@ -150,20 +155,21 @@ def node_columns(problem: NonsmoothProblem) -> int:
 
 def workspace_for(problem: NonsmoothProblem) -> Workspace:
     """Room for a problem."""
-    n, k = len(problem.cluster), len(problem.rows)
-    size = n + k
-    return Workspace(np.zeros((n, node_columns(problem))), np.zeros(n), np.zeros(k), np.zeros(k),
-                     np.zeros(k), np.zeros(k), np.zeros((size, size)), np.zeros(size),
-                     np.zeros(size, np.int64), np.zeros(size, np.int64))
+    return allocate(Workspace, sizes_of(problem))
+
+
+def sizes_of(problem: NonsmoothProblem) -> dict[Size, int]:
+    """Sizes of the records of a run."""
+    k, m = problem.rows.shape
+    return {MODES: m, NODES: len(problem.cluster), CLUSTERS: k, AXES: 1 + tangents(problem),
+            TOLD: node_columns(problem)}
 
 
 def progress_for(
     problem: NonsmoothProblem, rubbing: NDArray[np.bool_], state: Array, time: float, length: float
 ) -> Progress:
     """A run that is about to start; ``rubbing`` (k,) are the clusters that friction may stop."""
-    n = len(problem.cluster)
-    status = np.where(rubbing, OPEN, FIXED)
-    return Progress(
-        np.array([time, length, 0.0, 0.0]), np.zeros(COUNTS, dtype=np.int64),
-        np.concatenate([state, np.zeros(POWER_COUNT + n)]), status,
-        np.zeros(n, dtype=np.int64), np.zeros(SIZES), np.zeros(n * tangents(problem)))
+    made = allocate(Progress, sizes_of(problem), clock=np.array([time, length, 0.0, 0.0]),
+                    status=np.where(rubbing, OPEN, FIXED))
+    made.state[:len(state)] = state
+    return made

@@ -5,18 +5,25 @@ The same equations as :mod:`fecontact.system.kernels`, laid out for speed, by th
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.records import Block, Matrix
+from fecontact.core.records import Size
+from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system import kernels, nodes
+from fecontact.system.nodes import AXES, MEMORY, NODES
 
 # Entries of what is given in time: pulls of the drive along each axis, and their rates, travel and
 # speed of the ground's two motions.
 PULL, PULL_RATE, TRAVEL, SPEED, SECOND_TRAVEL, SECOND_SPEED = 0, 3, 6, 7, 8, 9
 GIVEN = 10
+
+
+# Length of what friction says of a node; it is longer in space, see
+# :func:`fecontact.system.nodes.force_room`.
+TOLD_OF_FRICTION = Size("told of friction")
 
 
 class Gradients(NamedTuple):
@@ -28,9 +35,9 @@ class Gradients(NamedTuple):
     In space (n, 4, 6), (n, 2 (4 + s)) and (n, s, 4 + s), of friction in two directions.
     """
 
-    partial: Block
-    force: Matrix
-    rates: Block
+    partial: Annotated[Array, NODES, AXES + 1, 2 * AXES]
+    force: Annotated[Array, NODES, TOLD_OF_FRICTION]
+    rates: Annotated[Array, NODES, MEMORY, AXES + 1 + MEMORY]
 
 
 @routine

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.constants import constants
+from fecontact.core.records import Size, shapes
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, step_loop
 from fecontact.integrate.rodas5p.blocks import Blocks, one_block
 from fecontact.integrate.rodas5p.variational import (
+    DIRECTIONS,
     Variation,
     Vary,
     propagate,
     propagate_in_parts,
-    variation_for,
 )
-from fecontact.integrate.shared_nodes.team import Team
-from fecontact.system.nodes import SystemArrays
-from fecontact.system.powers import NODE_POWERS, POWER_COUNT
+from fecontact.integrate.shared_nodes.team import ALONE, Team
+from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, SystemArrays
 
 # Modes and nodes.
 SIZES = tuple((modes, nodes) for modes in (1, 2, 3, 4) for nodes in (1, 2))
@@ -102,42 +102,33 @@ def compile_usual() -> None:
     _propagate(None, True)
 
 
+def sizes_of(modes: int, nodes: int) -> dict[Size, int]:
+    """Sizes of the records of small systems: plane ones without internal variables."""
+    return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: 0,
+            dynamics.TOLD_OF_FRICTION: 3}
+
+
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
-    """What is the same in all small systems of a size, for each type of tuples."""
-    m, n = modes, nodes
-    progress = state.progress_for(np.zeros(2 * m), 0.0, 0.0, m, n, 2)
-    blocks = one_block(np.zeros((m, 2 * n)), n)
-    room = state.room_for(m, n, 0, 2, blocks)
+    """What is the same in all small systems of a size, for each record."""
+    found = shapes(sizes_of(modes, nodes), state.Problem, state.Progress, state.Room, state.Output)
+    blocks = one_block(np.zeros((modes, 2 * nodes)), nodes)
     tables = {name: value for name, value in blocks._asdict().items() if name != "shapes"}
-    return {
-        SystemArrays: {
-            **dict.fromkeys(("stiffness", "damping", "modal_damping"), (m, m)),
-            **dict.fromkeys(("Tx", "Ty"), (n, m)), "T2": (0, m), "gap": (n,), "drive": (2,),
-            "drive_shapes": (2, m), "load_shapes": (None, m), "constant_load": (m,),
-            "memory": np.zeros(n, dtype=np.int64), "second_motion": 0},
-        Blocks: {"shapes": blocks.shapes.shape, **tables},
-        state.Control: {"largest": (m,), "memory_scale": (0,), "breaks": (None, 2),
-                        "levels": (None, n), "sliders": 0},
-        state.Progress: _shapes(progress),
-        state.Room: _shapes(room),
-        Team: {**_shapes(room.team), "most": 0},
-        stage_solver.Reduced: _shapes(room.reduced),
-        dynamics.Gradients: _shapes(progress.gradients),
-        state.Output: {"states": (None, 2 * m), "work": (None, POWER_COUNT + NODE_POWERS * n)},
-        Variation: {"columns": (0, None)},
-    }
+    found[Blocks] = {"shapes": blocks.shapes.shape, **tables}
+    found[SystemArrays] |= {"memory": np.zeros(nodes, dtype=np.int64), "second_motion": 0}
+    found[state.Control]["sliders"] = 0
+    found[Team] = {**_shapes(ALONE), "most": 0}
+    found[stage_solver.Reduced]["solver"] = (modes, 2 * modes)
+    found[Variation] = {"columns": (0, None)}
+    return found
 
 
 def values_of_derivatives(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """As :func:`fixed_values` for derivatives of steps, of any number of columns."""
-    room = _shapes(variation_for(2 * modes, modes, nodes, 0, 2, 0.0, 1.0, 1.0))
-    for name in ("columns", "after", "stages", "moved", "pushed", "right"):
-        room[name] = (None, *room[name][1:])
-    room["norms"], room["least"] = (2, None), (None,)
-    values = fixed_values(modes, nodes)
+    sizes = sizes_of(modes, nodes) | {DIRECTIONS: 4}
+    values = fixed_values(modes, nodes) | {Variation: shapes(sizes, Variation)[Variation]}
     # Of the nodes, and in the room for differences of all directions of each of them.
     gradients = {name: (None, *shape[1:]) for name, shape in values[dynamics.Gradients].items()}
-    return {**values, Variation: room, dynamics.Gradients: gradients}
+    return {**values, dynamics.Gradients: gradients}
 
 
 def _shapes(arrays: Any) -> dict[str, Any]:

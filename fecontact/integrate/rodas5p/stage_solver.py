@@ -14,16 +14,17 @@ u_v) / G leaves
     (G^2 - G Jv - Jq) u_v = G (r_v - sum_j Tx_j e_j r_z) + Jq r_q.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise_within, solve_within
-from fecontact.core.records import Block, IntegerVector, Matrix, Vector
+from fecontact.core.records import Matrix, allocate
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import block_at, within
 from fecontact.integrate.rodas5p.dynamics import project
-from fecontact.system.nodes import in_space
+from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, in_space
 
 
 class Reduced(NamedTuple):
@@ -35,15 +36,15 @@ class Reduced(NamedTuple):
     ``solver`` (m, 2 m) of :func:`set_solver`.
     """
 
-    J: Matrix
-    factors: Matrix
-    starts: IntegerVector
-    pivots: IntegerVector
-    inverse: Block
-    weights: Matrix
-    room: Vector
-    coefficients: Matrix
-    answers: Matrix
+    J: Annotated[Array, MODES, 2 * MODES]
+    factors: Annotated[Array, MODES, MODES]
+    starts: Annotated[Integers, MODES]
+    pivots: Annotated[Integers, MODES]
+    inverse: Annotated[Array, NODES, MEMORY, MEMORY]
+    weights: Annotated[Array, NODES, (AXES - 1) * MEMORY]
+    room: Annotated[Array, MODES]
+    coefficients: Annotated[Array, 2 * AXES, AXES * NODES]
+    answers: Annotated[Array, 2 * MODES, AXES * NODES]
     solver: Matrix
 
 
@@ -53,13 +54,8 @@ _FEW = 4
 
 def reduced_for(modes: int, nodes: int, states: int, dimension: int) -> Reduced:
     """Zeros for a system of so many modes, contact nodes and internal variables per node."""
-    columns = dimension * nodes
-    return Reduced(
-        np.zeros((modes, 2 * modes)), np.zeros((modes, modes)),
-        np.zeros(modes, dtype=np.int64), np.zeros(modes, dtype=np.int64),
-        np.zeros((nodes, states, states)), np.zeros((nodes, (dimension - 1) * states)),
-        np.zeros(modes), np.zeros((2 * dimension, columns)), np.zeros((2 * modes, columns)),
-        np.zeros((modes, 2 * modes) if modes <= _FEW else (0, 0)))
+    return allocate(Reduced, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension},
+                    solver=np.zeros((modes, 2 * modes) if modes <= _FEW else (0, 0)))
 
 
 @routine

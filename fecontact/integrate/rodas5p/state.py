@@ -1,11 +1,11 @@
 """What the compiled integrator works on: limits, the state of a run, room to work in."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.core.types import Array
+from fecontact.core.records import ANY, allocate
+from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
@@ -13,12 +13,17 @@ from fecontact.integrate.rodas5p.blocks import Blocks, near_blocks
 from fecontact.integrate.rodas5p.step_length import LAST_ROOT, STEP, TIME
 from fecontact.integrate.shared_nodes.team import ALONE, Team
 from fecontact.system.nodes import (
+    AXES,
     CONTACT_FIELDS,
+    MEMORY,
+    MODES,
+    NODES,
+    SIZE,
     TOLD,
     GroundMotion,
     SystemArrays,
 )
-from fecontact.system.powers import NODE_POWERS, POWER_COUNT
+from fecontact.system.powers import WORKS
 
 # Entries of Progress.numbers, after those of `step_length`. CAUTIOUS is the length of a step that
 # failed, while what made it fail may still lie ahead, else zero. ENERGY is the largest energy or
@@ -71,17 +76,17 @@ class Control(NamedTuple):
         Number of these elements of each node.
     """
 
-    displacement_scale: Vector
-    memory_scale: Vector
-    slip_scale: Vector
-    slow: Vector
-    stick_speed: Vector
-    depth: Vector
-    largest: Vector
-    untouched: Vector
-    breaks: Matrix
-    levels: Matrix
-    ground: Vector
+    displacement_scale: Annotated[Array, MODES]
+    memory_scale: Annotated[Array, NODES * MEMORY]
+    slip_scale: Annotated[Array, NODES]
+    slow: Annotated[Array, NODES]
+    stick_speed: Annotated[Array, NODES]
+    depth: Annotated[Array, NODES]
+    largest: Annotated[Array, MODES]
+    untouched: Annotated[Array, NODES]
+    breaks: Annotated[Array, ANY, 2]
+    levels: Annotated[Array, ANY, NODES]
+    ground: Annotated[Array, 5]
     rtol: float
     slip_part: float
     switch_part: float
@@ -91,7 +96,7 @@ class Control(NamedTuple):
     work: int
     unfelt: int
     sliders: int
-    slider_counts: IntegerVector
+    slider_counts: Annotated[Integers, NODES]
 
 
 class Problem(NamedTuple):
@@ -148,23 +153,23 @@ class Progress(NamedTuple):
         Signs of the normal forces: 1, 0 or -1.
     """
 
-    numbers: Vector
-    counts: IntegerVector
-    state: Vector
-    rate: Vector
-    extremes: Vector
-    work: Vector
-    power: Vector
+    numbers: Annotated[Array, NUMBERS]
+    counts: Annotated[Integers, COUNTS]
+    state: Annotated[Array, SIZE]
+    rate: Annotated[Array, SIZE]
+    extremes: Annotated[Array, MODES]
+    work: Annotated[Array, WORKS]
+    power: Annotated[Array, WORKS]
     gradients: motion.Gradients
-    signs: IntegerVector
+    signs: Annotated[Integers, NODES]
 
 
 class Output(NamedTuple):
     """Output times (N,), and states (N, size) and work (N, p + 2 n) there."""
 
-    times: Vector
-    states: Matrix
-    work: Matrix
+    times: Annotated[Array, ANY]
+    states: Annotated[Array, ANY, SIZE]
+    work: Annotated[Array, ANY, WORKS]
 
 
 class Room(NamedTuple):
@@ -183,33 +188,33 @@ class Room(NamedTuple):
     """
 
     near: Blocks
-    clearance: Vector
-    stages: Matrix
-    dense: Matrix
-    stage: Vector
-    right: Vector
-    base: Vector
-    time_rate: Vector
-    after: Vector
-    rate_after: Vector
-    nodes: Matrix
-    slots: Matrix
-    between: Matrix
-    given: Vector
-    load: Vector
-    pull_rate: Vector
-    power: Matrix
-    creeps: Matrix
+    clearance: Annotated[Array, NODES + 1]
+    stages: Annotated[Array, tableau.STAGES, SIZE]
+    dense: Annotated[Array, 3, SIZE]
+    stage: Annotated[Array, SIZE]
+    right: Annotated[Array, SIZE]
+    base: Annotated[Array, SIZE]
+    time_rate: Annotated[Array, SIZE]
+    after: Annotated[Array, SIZE]
+    rate_after: Annotated[Array, SIZE]
+    nodes: Annotated[Array, 3, AXES * NODES]
+    slots: Annotated[Array, 3, AXES * NODES]
+    between: Annotated[Array, 2, AXES * NODES]
+    given: Annotated[Array, motion.GIVEN]
+    load: Annotated[Array, MODES]
+    pull_rate: Annotated[Array, MODES]
+    power: Annotated[Array, 4, WORKS]
+    creeps: Annotated[Array, NODES, 4]
     reduced: stage_solver.Reduced
     scratch: motion.Gradients
     gradients_after: motion.Gradients
-    ends: Matrix
-    inner: Matrix
-    courses: Matrix
-    bound: Matrix
-    halves: Matrix
-    places: Vector
-    sums: Block
+    ends: Annotated[Array, 3, AXES * NODES]
+    inner: Annotated[Array, 3, SIZE]
+    courses: Annotated[Array, courses.DOUBT + 1, (2 * AXES - 1) * NODES]
+    bound: Annotated[Array, 3, courses.COEFFICIENTS]
+    halves: Annotated[Array, bernstein.DEPTH, courses.COEFFICIENTS + 1]
+    places: Annotated[Array, courses.MOST]
+    sums: Annotated[Array, 2, SIZE, tableau.STAGES]
     team: Team
 
 
@@ -221,46 +226,30 @@ def gradients_for(
     ``told`` is the length of what is told of a node in space; without derivatives they are not
     computed.
     """
-    length, width = (2 * (4 + states) + told, 4 + states) if dimension == 3 else (
-        3 + states, 3 + states)
-    return motion.Gradients(np.zeros((nodes, 1 + dimension, 2 * dimension)),
-                            np.zeros((nodes, length)), np.zeros((nodes, states, width)))
+    length = 2 * (4 + states) + told if dimension == 3 else 3 + states
+    return allocate(motion.Gradients, {NODES: nodes, MEMORY: states, AXES: dimension,
+                                       motion.TOLD_OF_FRICTION: length})
 
 
 def room_for(
     modes: int, nodes: int, states: int, dimension: int, blocks: Blocks, team: Team = ALONE,
 ) -> Room:
     """Room for a system of so many modes, contact nodes and internal variables per node."""
-    columns = dimension * nodes
-    size = 2 * modes + nodes * states
-    stage, right, base, time_rate, after, rate_after = np.zeros((6, size))
-    return Room(
-        near_blocks(blocks), np.zeros(nodes + 1),
-        np.zeros((tableau.STAGES, size)), np.zeros((3, size)),
-        stage, right, base, time_rate, after, rate_after,
-        np.zeros((3, columns)), np.zeros((3, columns)), np.zeros((2, columns)),
-        np.zeros(motion.GIVEN),
-        np.zeros(modes), np.zeros(modes),
-        np.zeros((4, POWER_COUNT + NODE_POWERS * nodes)), np.zeros((nodes, 4)),
-        stage_solver.reduced_for(modes, nodes, states, dimension),
-        gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1),
-        gradients_for(nodes, states, dimension),
-        np.zeros((3, columns)), np.zeros((3, size)),
-        np.zeros((courses.DOUBT + 1, (2 * dimension - 1) * nodes)),
-        np.zeros((3, courses.COEFFICIENTS)),
-        np.zeros((bernstein.DEPTH, courses.COEFFICIENTS + 1)), np.zeros(courses.MOST),
-        np.zeros((2, size, tableau.STAGES)), team)
+    return allocate(
+        Room, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension},
+        near=near_blocks(blocks), team=team,
+        reduced=stage_solver.reduced_for(modes, nodes, states, dimension),
+        scratch=gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1),
+        gradients_after=gradients_for(nodes, states, dimension))
 
 
 def progress_for(
     state: Array, time: float, step: float, modes: int, nodes: int, dimension: int
 ) -> Progress:
     """A run that is about to start."""
-    numbers = np.zeros(NUMBERS)
-    numbers[TIME], numbers[STEP] = time, step
-    size, powers = len(state), POWER_COUNT + NODE_POWERS * nodes
-    return Progress(
-        numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float), np.zeros(size),
-        np.zeros(modes), np.zeros(powers), np.zeros(powers),
-        gradients_for(nodes, (size - 2 * modes) // max(nodes, 1), dimension),
-        np.zeros(nodes, dtype=np.int64))
+    states = (len(state) - 2 * modes) // max(nodes, 1)
+    made = allocate(Progress, {MODES: modes, NODES: nodes, MEMORY: states},
+                    state=np.array(state, dtype=float),
+                    gradients=gradients_for(nodes, states, dimension))
+    made.numbers[TIME], made.numbers[STEP] = time, step
+    return made

@@ -14,7 +14,7 @@ ones but beside kinks: of the forces of each node, once a step along each direct
 Derivatives to p are differences between a system above and one below.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -24,18 +24,23 @@ from fecontact.core.compiled import (
     kernel,
     routine,
 )
-from fecontact.core.records import Block, Matrix, Vector
+from fecontact.core.records import Block, Size, allocate
+from fecontact.core.types import Array
 from fecontact.integrate import collocated_columns as collocation
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.system.nodes import SystemArrays, ground_motion
+from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, SIZE, SystemArrays, ground_motion
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5
 # Parts of a step, at most, and tries to find their number.
 _MOST_PARTS, _MOST_TRIES = 12, 6
+
+
+# Columns that are carried, and directions in which forces of a node change.
+COLUMNS, DIRECTIONS = Size("columns"), Size("directions")
 
 
 class Variation(NamedTuple):
@@ -75,26 +80,26 @@ class Variation(NamedTuple):
         the parameter, and their change along each direction of each node.
     """
 
-    columns: Matrix
-    after: Matrix
-    norms: Matrix
-    least: Vector
-    stages: Matrix
+    columns: Annotated[Array, COLUMNS, SIZE]
+    after: Annotated[Array, COLUMNS, SIZE]
+    norms: Annotated[Array, 2, COLUMNS]
+    least: Annotated[Array, COLUMNS]
+    stages: Annotated[Array, tableau.STAGES * COLUMNS, SIZE]
     tolerance: float
     faded: float
-    moved: Matrix
-    pushed: Matrix
-    right: Matrix
-    answers: Matrix
-    both: Matrix
-    solver: Matrix
-    vectors: Matrix
-    nodes: Matrix
-    given: Matrix
-    load: Matrix
-    none: Vector
-    forces: Vector
-    paths: Block
+    moved: Annotated[Array, COLUMNS, 2 * SIZE]
+    pushed: Annotated[Array, COLUMNS, MODES]
+    right: Annotated[Array, COLUMNS, SIZE]
+    answers: Annotated[Array, 4 * MODES, AXES * NODES]
+    both: Annotated[Array, MODES, 4 * MODES]
+    solver: Annotated[Array, MODES, 2 * MODES]
+    vectors: Annotated[Array, 7, SIZE]
+    nodes: Annotated[Array, 3, AXES * NODES]
+    given: Annotated[Array, 2, dynamics.GIVEN]
+    load: Annotated[Array, 2, MODES]
+    none: Annotated[Array, MODES]
+    forces: Annotated[Array, AXES * NODES]
+    paths: Annotated[Array, tableau.STAGES, DIRECTIONS, NODES]
     inside: dynamics.Gradients
     ahead: dynamics.Gradients
     behind: dynamics.Gradients
@@ -130,25 +135,21 @@ def variation_for(
 
     ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
     """
-    size = 2 * modes + nodes * states
     directions = 2 * dimension + states if columns else 1
-    room = [run_arrays.gradients_for(count, states, dimension)
-            for count in (*[nodes] * 5, directions * nodes)]
-    start = np.zeros((columns, size))
-    np.fill_diagonal(start, 1.0)
-    least = np.zeros(columns)
+    gradients = {
+        name: run_arrays.gradients_for(nodes, states, dimension)
+        for name in ("inside", "ahead", "behind", "usual", "between")}
+    made = allocate(
+        Variation, {COLUMNS: columns, DIRECTIONS: directions, MODES: modes, NODES: nodes,
+                    MEMORY: states, AXES: dimension},
+        tolerance=tolerance, faded=faded, **gradients,
+        bends=run_arrays.gradients_for(directions * nodes, states, dimension))
+    np.fill_diagonal(made.columns, 1.0)
     if width:
         # A tenth of the state's own sizes, if the parameter changed by all of its value.
-        least[-1] = 0.1 * MOVE * 2.0 / (width * faded)
-    return Variation(start, np.zeros((columns, size)), np.tile(least, (2, 1)), least,
-                     np.zeros((tableau.STAGES * columns, size)), tolerance, faded,
-                     np.zeros((columns, 2 * size)), np.zeros((columns, modes)),
-                     np.zeros((columns, size)), np.zeros((4 * modes, dimension * nodes)),
-                     np.zeros((modes, 4 * modes)), np.zeros((modes, 2 * modes)),
-                     np.zeros((7, size)),
-                     np.zeros((3, dimension * nodes)), np.zeros((2, dynamics.GIVEN)),
-                     np.zeros((2, modes)), np.zeros(modes), np.zeros(dimension * nodes),
-                     np.zeros((tableau.STAGES, directions, nodes)), *room)
+        made.least[-1] = 0.1 * MOVE * 2.0 / (width * faded)
+    made.norms[:] = made.least
+    return made
 
 
 @routine

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
-from fecontact.core.records import Block, IntegerMatrix, Matrix, Vector
+from fecontact.core.records import ANY, Matrix, Vector, allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.events import AnyEvent, ContactEvents
 from fecontact.integrate.series.polynomials import COEFFICIENTS, DEPTH
@@ -17,6 +17,7 @@ from fecontact.laws.pieces import PIECE, UPPER
 from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.nodes import MODES, NODES
 
 # Sizes up to which series are taken unasked; their cost grows with the square of the modes.
 MOST_MODES, MOST_NODES = 4, 4
@@ -65,24 +66,24 @@ class Series(NamedTuple):
         Room to work in; l is n + 1, or the number of nodes where that is more.
     """
 
-    pieces: Block
+    pieces: Annotated[Array, NODES, ANY, PIECE]
     constants: Vector
-    sines: Matrix
-    constant_force: Vector
-    sine_force: Matrix
-    cosine_force: Matrix
+    sines: Annotated[Array, ANY, 4]
+    constant_force: Annotated[Array, MODES]
+    sine_force: Annotated[Array, ANY, MODES]
+    cosine_force: Annotated[Array, ANY, MODES]
     longest: float
     tolerance: float
-    states: IntegerMatrix
-    q: Matrix
-    v: Matrix
-    forcing: Matrix
-    signal: Matrix
-    u: Matrix
-    F: Matrix
-    square: Matrix
-    cube: Matrix
-    powers: Matrix
+    states: Annotated[Integers, NODES, 3]
+    q: Annotated[Array, MODES, COEFFICIENTS]
+    v: Annotated[Array, MODES, COEFFICIENTS]
+    forcing: Annotated[Array, MODES, COEFFICIENTS]
+    signal: Annotated[Array, ANY, COEFFICIENTS]
+    u: Annotated[Array, NODES, COEFFICIENTS]
+    F: Annotated[Array, NODES, COEFFICIENTS]
+    square: Annotated[Array, NODES, COEFFICIENTS]
+    cube: Annotated[Array, NODES, COEFFICIENTS]
+    powers: Annotated[Array, SERIES_POWERS, COEFFICIENTS]
     line: Matrix
     room: Matrix
 
@@ -124,16 +125,15 @@ def _tables(
                          0.0 * arrays.load_shapes])
     number, amplitude, w = sines[:, 0].astype(int), sines[:, 1:2], sines[:, 2:3]
     m, n = system.basis.modes, system.basis.contact_nodes
-    q, v, forcing = np.zeros((3, m, COEFFICIENTS))
-    u, F, square, cube = np.zeros((4, n, COEFFICIENTS))
-    return Series(
-        pieces, constants, sines, arrays.constant_load + constants @ of_value,
-        amplitude * of_value[number], amplitude * w * of_rate[number],
-        np.inf if max_step is None else float(max_step), max(_PART * rtol, _ROUNDING),
-        _first_states(system, pieces, state), q, v, forcing,
-        np.zeros((len(parts) if work else 0, COEFFICIENTS)), u, F, square, cube,
-        np.zeros((SERIES_POWERS, COEFFICIENTS)), np.zeros((3, max(COEFFICIENTS, n))),
-        np.zeros((DEPTH + 3, COEFFICIENTS)))
+    return allocate(
+        Series, {MODES: m, NODES: n}, pieces=pieces, constants=constants, sines=sines,
+        constant_force=arrays.constant_load + constants @ of_value,
+        sine_force=amplitude * of_value[number],
+        cosine_force=amplitude * w * of_rate[number],
+        longest=np.inf if max_step is None else float(max_step),
+        tolerance=max(_PART * rtol, _ROUNDING), states=_first_states(system, pieces, state),
+        signal=np.zeros((len(parts) if work else 0, COEFFICIENTS)),
+        line=np.zeros((3, max(COEFFICIENTS, n))), room=np.zeros((DEPTH + 3, COEFFICIENTS)))
 
 
 def from_state(series: Series, system: ContactSystem, state: Array) -> Series:

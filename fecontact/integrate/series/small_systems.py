@@ -8,12 +8,11 @@ from functools import cache
 from typing import Any
 
 from fecontact.core.constants import constants
+from fecontact.core.records import shapes
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.integrate.rodas5p.state import Problem
 from fecontact.integrate.series.advance import advance
-from fecontact.integrate.series.branches import SERIES_POWERS, Series
-from fecontact.integrate.series.polynomials import COEFFICIENTS
-from fecontact.laws.pieces import PIECE
+from fecontact.integrate.series.branches import Series
 
 # Modes and nodes.
 SIZES = ((1, 1), (2, 1), (3, 1), (2, 2))
@@ -34,11 +33,5 @@ def _advance(modes: int, nodes: int) -> Any:
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all systems of a size, for each type of tuples."""
-    m, n = modes, nodes
-    return small_systems.fixed_values(m, n) | {Series: {
-        "pieces": (n, None, PIECE), "sines": (None, 4), "constant_force": (m,),
-        "sine_force": (None, m), "cosine_force": (None, m), "states": (n, 3),
-        **dict.fromkeys(("q", "v", "forcing"), (m, COEFFICIENTS)),
-        **dict.fromkeys(("u", "F", "square", "cube"), (n, COEFFICIENTS)),
-        "signal": (None, COEFFICIENTS), "powers": (SERIES_POWERS, COEFFICIENTS),
-    }}
+    return small_systems.fixed_values(modes, nodes) | shapes(
+        small_systems.sizes_of(modes, nodes), Series)

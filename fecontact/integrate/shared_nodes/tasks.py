@@ -13,7 +13,6 @@ from numba import types
 from numba.extending import intrinsic
 
 from fecontact.core.compiled import function_at, helper
-from fecontact.core.references import Reference
 from fecontact.integrate.rodas5p import state
 
 # Node forces and the rates at a stage; rates and gradients at the end of a step; rates in time; the
@@ -31,7 +30,6 @@ TICKET, DONE, LEAVE, YIELD, SLEEP, PAUSE = 0, _LINE, 2 * _LINE, 3 * _LINE, 3 * _
     3 * _LINE + 2)
 WORDS = 4 * _LINE
 
-_ARGUMENTS = (Reference(state.Problem), Reference(state.Progress), Reference(state.Room))
 SHARE = Callable[[int, float, state.Problem, state.Progress, state.Room], float]
 WORK = Callable[[int, int, int, state.Problem, state.Progress, state.Room], int]
 share_at, work_at = function_at(SHARE), function_at(WORK)

@@ -5,18 +5,17 @@ out for arrays of a known size.
 """
 
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.constants import constants
+from fecontact.core.records import shapes
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.event_driven import run_events
-from fecontact.integrate.nonsmooth.event_search import Room, room_for
+from fecontact.integrate.nonsmooth.event_search import Room
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.system.nodes import SystemArrays
-from fecontact.system.powers import POWER_COUNT
 
 # Modes and nodes.
 SIZES = ((1, 1), (2, 1), (3, 1), (2, 2))
@@ -41,26 +40,9 @@ def _run(modes: int, nodes: int) -> Any:
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all small systems of a size, for each type of tuples."""
-    m, n = modes, nodes
-    own, size = np.arange(n), 2 * m + POWER_COUNT + n
-    system = small_systems.fixed_values(m, n)[SystemArrays]
-    problem: dict[str, Any] = {"static": (n,), "cluster": own, "rows": (n, m), "sliding": (n,),
-                               "restitution": (n,), "tangential": (n,), "relief": (3,)}
-    plain = kinds.NonsmoothProblem(
-        SimpleNamespace(T2=()), np.zeros(n), own, np.zeros((n, m)), np.zeros(n), 0.0, 0,
-        np.zeros(n), np.zeros(n), 0, np.zeros(3), 0, 0, 0)
-    progress = kinds.progress_for(plain, own >= 0, np.zeros(2 * m), 0.0, 0.0)
-    return {
-        SystemArrays: system,
-        kinds.NonsmoothProblem: problem,
-        kinds.Limits: {"floor": (size,)},
-        kinds.Progress: _shapes(progress),
-        kinds.Output: {"states": (None, size), "friction": (None, n), "normal": (None, n)},
-        kinds.Workspace: _shapes(kinds.workspace_for(plain)),
-        Room: _shapes(room_for(plain, size)),
-    }
-
-
-def _shapes(arrays: Any) -> dict[str, Any]:
-    return {name: value.shape for name, value in arrays._asdict().items()
-            if isinstance(value, np.ndarray)}
+    sizes = small_systems.sizes_of(modes, nodes) | {
+        kinds.CLUSTERS: nodes, kinds.TOLD: kinds.NODE_COLUMNS}
+    found = shapes(sizes, kinds.NonsmoothProblem, kinds.Limits, kinds.Progress, kinds.Output,
+                   kinds.Workspace, Room)
+    found[kinds.NonsmoothProblem]["cluster"] = np.arange(nodes)
+    return found | {SystemArrays: small_systems.fixed_values(modes, nodes)[SystemArrays]}
