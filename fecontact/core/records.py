@@ -37,7 +37,6 @@ Flags = TypeAliasType("Flags", NDArray[np.bool_])
 ShortIntegers = TypeAliasType("ShortIntegers", NDArray[np.int32])
 
 
-
 @dataclass(frozen=True, repr=False)
 class Size:
     """A length that the annotations of records name, or a sum or product of such.

@@ -182,7 +182,6 @@ FLAT, _FLAT_LOST = 1e-8, 1e-4
 _RESOLVED = 10.0
 
 
-
 @kernel
 def multiplier_tests(mu: ComplexVector, trivial: int, out: Vector) -> None:
     """Fill out (3,) with the products of mu + 1, mu - 1 and, over pairs, mu_i mu_k - 1, scaled.

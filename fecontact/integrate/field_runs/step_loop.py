@@ -115,8 +115,6 @@ class _View(NamedTuple):
     y: Array
 
 
-
-
 @routine
 def _start(t, field, progress, room, output, watch):
     """Prepare the first step of a run, and write its first output."""

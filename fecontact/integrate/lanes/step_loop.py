@@ -5,7 +5,6 @@ its own. A lane whose run has ended takes the next one that waits. No lane has a
 another one computes, so that results do not depend on which runs are side by side.
 """
 
-
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
@@ -344,7 +343,6 @@ def advance(
     checks of single lanes. It is compiled for each size, in
     :mod:`fecontact.integrate.lanes.small_systems`.
     """
-    """As :func:`advance`, by references."""
     active = _fill(b, runs)
     for _ in range(most):
         if active != (1 << WIDTH) - 1:

@@ -308,8 +308,6 @@ def _stop_within(step, part, p, progress, output, w, room):
     progress.clock[TIME] = reached
 
 
-
-
 @kernel(nogil=True)
 def run_events(
     p: NonsmoothProblem, limits: Limits, progress: Progress, output: Output,

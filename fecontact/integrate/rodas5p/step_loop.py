@@ -1,6 +1,5 @@
 """The compiled time integrator: Rodas5P steps of variable size over given output times."""
 
-
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
@@ -361,7 +360,6 @@ def advance(
     put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
     What is watched for is noted in ``watch``; when that is full, the call returns.
     """
-    """As :func:`advance`, by references."""
     s, control, numbers, counts = (problem.system, problem.control, progress.numbers,
                                    progress.counts)
     n, blocks = len(s.gap), problem.blocks

@@ -4,7 +4,6 @@ The parts depend on the number of near nodes alone, and their sums are added in 
 are the same bit for bit for any number of threads, one too.
 """
 
-
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine

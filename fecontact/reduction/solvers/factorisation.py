@@ -131,7 +131,6 @@ def nested_dissection(matrix: Any, nodes: Integers) -> Integers:
     return np.argsort(place[numbers], kind="stable")
 
 
-
 # Columns per block: enough to vectorise, few enough for the cache.
 _BLOCK = 32
 

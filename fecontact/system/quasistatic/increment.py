@@ -16,7 +16,6 @@ radius phi F along its own direction a = R* / |R*|, with
     dR = c dg  where it sticks,     dR = phi a dF + phi F c / |R*| (I - a a^T) dg  where it slides.
 """
 
-
 import math
 
 import numpy as np

@@ -8,7 +8,6 @@ force of a slider takes the part b^2 / 4 of its loss more or less as work, and i
 itself.
 """
 
-
 import math
 from typing import NamedTuple
 

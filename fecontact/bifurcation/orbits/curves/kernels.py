@@ -38,8 +38,6 @@ def applied(matrices: Block, vectors: Matrix, out: Matrix) -> None:
             out[row, i] = total
 
 
-
-
 @kernel
 def multiplied(
     real: Block, imaginary: Block, sign: float, vectors: ComplexMatrix, out: ComplexMatrix,
