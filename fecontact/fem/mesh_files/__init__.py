@@ -26,7 +26,6 @@ from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_points
 from fecontact.fem.mesh_files.med import read_med
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
 
-
 _BYTES_OF_A_GRID_POINT = 200.0  # coordinates and a cell of eight nodes, with copies
 
 
