@@ -10,6 +10,7 @@ from fecontact.analysis.histories import History, Point, history
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.spectra import mean_frequency
 from fecontact.core.errors import ModelWarning
+from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
 from fecontact.integrate.trajectory import Trajectory
@@ -42,8 +43,10 @@ def fastest_period(trajectory: Trajectory) -> float:
     with at least a hundredth of the kinetic energy. Velocities and coordinates are samples of their
     own, so that outputs too far apart do not change their ratio.
     """
-    rates = trajectory.modal_velocities
-    moved = trajectory.modal_coordinates
+    # Squares of large numbers would overflow.
+    fast, far = magnitude(trajectory.modal_velocities), magnitude(trajectory.modal_coordinates)
+    rates = trajectory.modal_velocities / fast
+    moved = trajectory.modal_coordinates / far
     energy = np.square(rates).mean(axis=0)
     strong = energy > _STRONG * energy.max(initial=0.0)
     if not strong.any() or len(rates) < 3:
@@ -51,7 +54,7 @@ def fastest_period(trajectory: Trajectory) -> float:
     swing = np.square(moved - moved.mean(axis=0)).mean(axis=0)[strong]
     beats = np.square(rates - rates.mean(axis=0)).mean(axis=0)[strong]
     ratio = np.divide(beats, swing, out=np.zeros_like(beats), where=swing > 0.0)
-    highest = math.sqrt(float(ratio.max()))
+    highest = fast / far * math.sqrt(float(ratio.max()))
     return 2.0 * math.pi / highest if highest > 0.0 else math.inf
 
 

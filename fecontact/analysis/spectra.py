@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array, ArrayLike
 
 _EVEN = 1e-6  # largest deviation of times from even spacing, relative to the spacing
@@ -214,7 +215,13 @@ def power_spectral_density(
     t, x = evenly_sampled(time, values, resample=resample)
     step = float(t[1] - t[0])
     count = _piece(t, x, piece, 8.0)
-    f, density = welch(x, 1.0 / step, window, count, detrend="constant", scaling="density")
+    unit = magnitude(x)
+    f, density = welch(x / unit, 1.0 / step, window, count, detrend="constant", scaling="density")
+    with np.errstate(over="ignore"):
+        density = density * unit * unit
+    if not np.isfinite(density).all():
+        raise InputError(f"A power spectral density of values up to {np.abs(x).max():.3g} is "
+                         f"beyond the largest number; take an amplitude spectrum.")
     return Spectrum(f, density, "density", 1.0 / (count * step))
 
 
@@ -278,6 +285,7 @@ def mean_frequency(time: Array, values: Array) -> float:
     """
     step = np.diff(time)
     duration = float(time[-1] - time[0])
+    values = values / magnitude(values)  # squares of large numbers would overflow
     x = values - float(0.5 * (values[1:] + values[:-1]) @ step) / duration
     # Mean square of the straight lines between the samples.
     square = float((x[1:] ** 2 + x[1:] * x[:-1] + x[:-1] ** 2) @ step) / 3.0

@@ -17,6 +17,7 @@ from fecontact.core.resources.memory import (
     shown_memory,
 )
 
+_OVERFLOW = re.compile(r"overflow|invalid value|divide by zero")  # warnings of NumPy
 _MISSING = re.compile(r"Glyph (\d+) .* missing from")  # a warning of matplotlib
 
 
@@ -46,9 +47,10 @@ def execute(tokens: list[str]) -> int:
 def _show_warning(otherwise: Any) -> Any:
     """Print a warning as one line, without its place in the code.
 
-    Characters that the font of pictures lacks are named once.
+    Characters that the font of pictures lacks are named once, and numbers that overflow.
     """
     missing: list[str] = []
+    overflown: list[str] = []
 
     def show(message: Any, category: Any, *rest: Any, **more: Any) -> None:
         if issubclass(category, ModelWarning):
@@ -58,6 +60,11 @@ def _show_warning(otherwise: Any) -> Any:
                 note(f"warning: the font of pictures lacks '{chr(int(found[1]))}' and perhaps "
                      f"other characters of a name; boxes stand in their place.")
             missing.append(found[1])
+        elif issubclass(category, RuntimeWarning) and _OVERFLOW.search(str(message)):
+            if not overflown:
+                note(f"warning: some numbers of this result are too large or not finite "
+                     f"({message}); check loads, stiffnesses and the status of the run.")
+            overflown.append(str(message))
         else:
             otherwise(message, category, *rest, **more)
 

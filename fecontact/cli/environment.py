@@ -5,6 +5,7 @@ import os
 import sys
 from typing import Any
 
+from fecontact.core.checks import require_docstrings
 from fecontact.core.errors import InputError
 
 _ASCII = str.maketrans({
@@ -26,8 +27,9 @@ def prepare() -> None:
     Raises
     ------
     InputError
-        If NUMBA_NUM_THREADS is not a whole number of 1 or more.
+        If NUMBA_NUM_THREADS is not a whole number of 1 or more, or Python was started with -OO.
     """
+    require_docstrings()
     _open_descriptors()
     codecs.register_error("fecontact", _replace)
     for stream in (sys.stdout, sys.stderr):

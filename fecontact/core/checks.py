@@ -2,6 +2,7 @@
 
 import os
 import stat
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
@@ -9,12 +10,19 @@ from typing import Any, cast
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_positive, shown
+from fecontact.core.errors import LARGEST, InputError, require_positive, shown
 from fecontact.core.resources.memory import available_memory, shown_memory
 from fecontact.core.types import Array, Coordinates, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
 _LARGEST = 1e12  # factor of displacements, which are drawn in single precision
+
+
+def require_docstrings() -> None:
+    """Raise :class:`InputError` if Python runs without docstrings, which describe all keys."""
+    if sys.flags.optimize > 1:
+        raise InputError("Python was started with -OO, or with PYTHONOPTIMIZE=2, which removes the "
+                         "docstrings that fecontact reads; start it with -O at most.")
 
 
 def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> None:
@@ -137,6 +145,16 @@ def is_numeric(values: Any) -> bool:
     except InputError:
         return False
     return True
+
+
+def require_state(state: Array) -> None:
+    """Raise :class:`InputError` unless all values of an initial state are from -1e60 to 1e60."""
+    for wrong, remedy in ((~np.isfinite(state), "be finite"),
+                          (np.abs(state) > LARGEST, f"be from {-LARGEST:g} to {LARGEST:g}")):
+        if wrong.any():
+            index = int(np.argmax(wrong))
+            raise InputError(f"The initial state holds {state[index]:g} (value {index} of "
+                             f"{len(state)}); every value must {remedy}.")
 
 
 def as_pair(values: Any, what: str) -> tuple[float, float]:

@@ -1,18 +1,15 @@
 """Parameters of classes in their docstrings: reading them, and inheriting them."""
 
 import inspect
-import sys
 from functools import cache
 from typing import Any, ClassVar, get_origin
 
 from docstring_parser import Docstring, DocstringStyle, compose, parse
 from docstring_parser.common import DocstringParam
 
-from fecontact.core.errors import InputError
+from fecontact.core.checks import require_docstrings
 
-if sys.flags.optimize > 1:
-    raise InputError("Python was started with -OO, or with PYTHONOPTIMIZE=2, which removes the "
-                     "docstrings that fecontact reads; start it with -O at most.")
+require_docstrings()
 
 
 def documented(cls: type) -> list[tuple[tuple[str, ...], str]]:

@@ -7,8 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from fecontact.core.checks import as_floats, is_numeric, require_kind
-from fecontact.core.errors import InputError, choices, nearest, shown
+from fecontact.core.checks import as_floats, is_numeric, require_kind, require_state
+from fecontact.core.errors import InputError, choices, nearest, require_finite, shown
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.fem.faces.frames import turned
@@ -39,7 +39,7 @@ class RigidStart:
     Raises
     ------
     InputError
-        If either is not three or six finite numbers.
+        If either is not three or six numbers from -1e60 to 1e60.
     """
 
     displacement: RigidMotion = (0.0, 0.0, 0.0)
@@ -53,6 +53,8 @@ class RigidStart:
                 raise InputError(f"RigidStart: {name} = {shown(given)} must be three finite "
                                  f"numbers: x [m], y [m] and phi [rad], or their rates; of a solid "
                                  f"six: x, y, z, phi_x, phi_y and phi_z.")
+            for value in values.tolist():
+                require_finite("RigidStart", **{name: value})
             object.__setattr__(self, name, tuple(values.tolist()))
 
 
@@ -84,7 +86,7 @@ class PointStart:
     Raises
     ------
     InputError
-        If values are not finite numbers or None, or components are unknown.
+        If values are neither numbers from -1e60 to 1e60 nor None, or components are unknown.
     """
 
     displacements: Mapping[str | int, PointMotion] = field(default_factory=dict)
@@ -127,6 +129,8 @@ def _point_motion(given: Any, where: str) -> PointMotion:
         raise InputError(f"{where} = {shown(given)} must be two, three or six finite numbers (x, "
                          f"y, then phi in the plane, z, phi_x, phi_y, phi_z in space), None for "
                          f"those that are not prescribed, or a table such as {{x = 1e-3}}.")
+    for value in known:
+        require_finite("PointStart", **{where.partition(": ")[2]: value})
     if isinstance(given, Mapping):
         return {str(name): float(value) for name, value in given.items() if value is not None}
     if None not in values:
@@ -167,8 +171,8 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     Raises
     ------
     InputError
-        For an unknown kind, a state of wrong size or with NaN, or a rigid motion that the supports
-        prevent.
+        For an unknown kind, a state of wrong size or with values that are NaN or beyond 1e60, or a
+        rigid motion that the supports prevent.
     AnalysisError
         If there is no equilibrium to start from.
     """
@@ -199,8 +203,7 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
     if state.shape != (system.size,):
         raise InputError(f"The initial state must have {system.size} values [q, q', z], not shape "
                          f"{state.shape}.")
-    if not np.isfinite(state).all():
-        raise InputError("The initial state holds values that are not finite.")
+    require_state(state)
     return state
 
 

@@ -186,6 +186,9 @@ class BasisReport:
                               for share in mass[:, i])
             lines.append(f"{number:4d} {f:15.6g} {ratio} {shares}  {kind}")
             number += 1
+        if faces := [(name, count) for name, count in basis.groups if name not in basis.springs]:
+            nodes = ", ".join(f"{count} on '{name}'" for name, count in faces)
+            lines += ["", f"contact nodes: {nodes}"]
         error = self.contact_error
         if np.isfinite(error).all() and error.size and basis.rigid_modes < basis.modes:
             lines += ["", "missing static compliance at the contact nodes: "

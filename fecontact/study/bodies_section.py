@@ -232,6 +232,11 @@ def _body(table: Any, where: str) -> BodySections:
     if "geometry" not in table:
         raise InputError(f"{where} lacks the section {inner['geometry'].partition(': ')[2]}; give "
                          f"a shape and its dimensions, or the file of a mesh.")
+    if isinstance(basis := table.get("basis"), Mapping):
+        for key in ("contact", "contact_nodes"):
+            if key in basis:
+                raise InputError(f"{inner['basis']}: {key} = {shown(basis[key])} is for a single "
+                                 f"body; name the face in [interfaces.NAME] instead.")
     parts: dict[str, Any] = {name: from_table(kind, table[name], inner[name])
                              for name, kind in kinds.items() if kind and name in table}
     return BodySections(geometry_from_table(table["geometry"], inner["geometry"]), **parts)

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 
-from fecontact import InputError, Mesh, MeshError, read_mesh, write_mesh
+from fecontact import InputError, Mesh, MeshError, ModelWarning, read_mesh, write_mesh
 from fecontact.fem.mesh_files import write_fields
 
 # 3 x 2 cells of 0.1 m x 0.05 m: nodes 0 ... 3 along the bottom, 8 ... 11 along the top.
@@ -306,7 +306,8 @@ def test_abaqus_part_with_sets_and_surfaces(tmp_path: Path) -> None:
 )
 def test_abaqus_element_types(tmp_path: Path, kind: str, corners: int) -> None:
     path = tmp_path / "a.inp"
-    path.write_text("*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n"
+    corner = "4,0,1,0\n" if corners == 4 else ""
+    path.write_text(f"*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n{corner}"
                     f"*ELEMENT, TYPE={kind}\n1,{','.join('1234'[:corners])}\n")
     assert read_mesh(path).area == (1.0 if corners == 4 else 0.5)
 
@@ -316,7 +317,7 @@ def test_abaqus_element_types(tmp_path: Path, kind: str, corners: int) -> None:
 def test_abaqus_line_elements_are_boundaries(tmp_path: Path, kind: str, count: int) -> None:
     path = tmp_path / "a.inp"
     path.write_text("*NODE\n1,0,0\n2,1,0\n3,0,1\n4,0.5,0\n"
-                    "*ELEMENT, TYPE=SPRINGA, ELSET=Other\n7,1,2\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n"
+                    "*ELEMENT, TYPE=SPRINGA, ELSET=Other\n7,1,4\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n"
                     f"*ELEMENT, TYPE={kind}, ELSET=Foot\n2,{','.join('124'[:count])}\n")
     mesh = read_mesh(path)
     assert list(mesh.boundaries) == ["Foot"]
@@ -593,6 +594,9 @@ def test_requests_that_cannot_be_met(
         read_mesh(path, **arguments)
 
 
+ONE_TRIANGLE = "*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n"
+
+
 def nodes_and(cells: str) -> str:
     """Gmsh 2.2 with four nodes, the last one off the plane of the others."""
     count = cells.count("\n")
@@ -637,7 +641,21 @@ def nodes_and(cells: str) -> str:
         ("a.inp", "*INCLUDE, INPUT=b.inp\n", r"includes another one \(\*INCLUDE\)"),
         ("a.inp", "*PART, NAME=a\n*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n"
          "*PART, NAME=b\n*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n",
+         r"a line \*PART without a line \*END PART, so it may be cut off"),
+        ("a.inp", "*PART, NAME=a\n*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n"
+         "*END PART\n"
+         "*PART, NAME=b\n*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n*END PART\n",
          "holds 2 parts; choose one by part: 'a', 'b'"),
+        ("a.inp", f"{ONE_TRIANGLE}*NSET, NSET=N\n1, 2, 4\n",
+         "node set 'N' names node 4, which the file does not hold"),
+        ("a.inp", f"{ONE_TRIANGLE}*ELSET, ELSET=E, GENERATE\n1, 5, 1\n",
+         "element set 'E' names element 5, which the file does not hold"),
+        ("a.inp", f"{ONE_TRIANGLE}*SURFACE, NAME=S\n1, S1\n2, S1\n",
+         "surface 'S' names element 2, which the file does not hold"),
+        ("a.inp", f"{ONE_TRIANGLE}*NSET, NSET=N\n1, 2",
+         "last line, '1, 2', has no line break, so the file may be cut off"),
+        ("a.inp", f"{ONE_TRIANGLE}*SURFACE, NAME=S\n",
+         r"ends with the line '\*SURFACE, NAME=S' without its data, so it may be cut off"),
         ("a.inp", "*INSTANCE\n 0, 0.5, 0\n", r"displaces its part in \*INSTANCE"),
         ("a.inp", "*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n*NSET, NSET=N\nM\n",
          "refers to a set 'M' that it does not hold"),
@@ -693,6 +711,53 @@ def test_truncated_files_are_refused(tmp_path: Path) -> None:
             path.write_bytes(content[:int(part * len(content))])
             with pytest.raises(MeshError, match=r"The (file|mesh)"):
                 read_mesh(path)
+
+
+@pytest.mark.parametrize("file_format", ["vtk", "vtk42"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_a_cell_lost_at_the_end_is_noticed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], file_format: str, binary: bool
+) -> None:
+    """Every cut within the last block of a VTK file, at line breaks too."""
+    meshio.vtk.write(tmp_path / "a.vtk", meshio.Mesh(flat(), [("quad", QUADS)]),
+                     fmt_version="5.1" if file_format == "vtk" else "4.2", binary=binary)
+    capfd.readouterr()  # a remark of meshio on text
+    content = (tmp_path / "a.vtk").read_bytes()
+    for end in range(content.index(b"CELL_TYPES"), len(content.rstrip(b"\n"))):
+        (tmp_path / "a.vtk").write_bytes(content[:end])
+        with pytest.raises(MeshError, match=r"The (file|mesh)"):
+            read_mesh(tmp_path / "a.vtk")
+
+
+def test_a_grid_that_does_not_fit_into_memory_is_refused(tmp_path: Path) -> None:
+    """A file of 100 bytes may claim points without end."""
+    (tmp_path / "a.vtk").write_text(
+        "# vtk DataFile Version 4.2\nclaim\nASCII\nDATASET STRUCTURED_POINTS\n"
+        "DIMENSIONS 100000 100000 100000\nORIGIN 0 0 0\nSPACING 1 1 1\n")
+    with pytest.raises(MeshError, match="more data than fits into memory"):
+        read_mesh(tmp_path / "a.vtk")
+
+
+def test_elements_lost_at_the_end_of_a_deck_are_warned_of(tmp_path: Path) -> None:
+    """The format gives no counts; nodes without elements are its only trace."""
+    path = write_with_meshio(tmp_path / "a.inp", "abaqus")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:-1]))
+    with pytest.warns(ModelWarning, match=r"and 1 of 12 nodes belong to no element"):
+        assert len(read_mesh(path).cells) == 5
+    path.write_text("".join(lines))
+    assert len(read_mesh(path).cells) == 6
+
+
+def test_generated_sets_may_have_holes(tmp_path: Path) -> None:
+    """Only the ends of a range must exist; elements that are not read exist too."""
+    path = tmp_path / "a.inp"
+    path.write_text("*NODE\n1,0,0\n3,1,0\n7,0,1\n*ELEMENT, TYPE=CPS3\n1,1,3,7\n"
+                    "*ELEMENT, TYPE=MASS\n5,3\n*NSET, NSET=N, GENERATE\n1,7,1\n"
+                    "*ELSET, ELSET=E, GENERATE\n1,5,1\n*SURFACE, NAME=S\nE, S1\n")
+    mesh = read_mesh(path)
+    assert len(mesh.points["N"]) == 3
+    assert len(mesh.boundary("S")) == 1
 
 
 def test_elements_of_other_kinds_are_named(tmp_path: Path) -> None:

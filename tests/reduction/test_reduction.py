@@ -225,6 +225,7 @@ def test_report_says_what_to_do():
     poor = modal_basis(beam(), 6, contact_nodes=5)
     text = str(BasisReport(poor))
     assert "is missing. Complete the modes with reduction = \"residual\"" in text
+    assert "contact nodes: 5 on 'bottom'" in text
     good = modal_basis(beam(), 6, contact_nodes=5, reduction="residual", tolerance=0.02)
     assert "Static deflections of the contact nodes are right to" in str(BasisReport(good))
     assert BasisReport(good).time_step == pytest.approx(0.05 / good.frequencies_hz[-1])

@@ -283,6 +283,10 @@ simulation.stop "stick"
 simulation.initial "moving"
 simulation.initial {displacement=[0,0]} displacement
 simulation.initial {displacement=[nan,0,0]}
+simulation.initial {displacement=[1e70,0,0]} displacement
+simulation.initial {velocity=[0,0,-1e61]} velocity
+simulation.initial {displacements={B=[1e70,0]}} displacements
+simulation.initial {velocities={B={y=nan}}} velocities
 simulation.initial {foo=1} foo
 output.frames -1
 output.frames 1.5
@@ -611,8 +615,10 @@ def test_in_a_process_of_its_own(place):
         assert_kind(done.stderr)
 
 
-def test_python_without_docstrings_is_refused():
-    done = subprocess.run([sys.executable, "-OO", "-m", "fecontact", "keys"], text=True,
+@pytest.mark.parametrize("command", ["keys", "--version", "run"])
+def test_python_without_docstrings_is_refused(command):
+    """At once, before kernels are compiled."""
+    done = subprocess.run([sys.executable, "-OO", "-m", "fecontact", command], text=True,
                           capture_output=True, check=False)
     assert done.returncode == 1
     assert_kind(done.stderr)

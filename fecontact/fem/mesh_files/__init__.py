@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import math
 import re
 import tempfile
 import warnings
@@ -24,6 +25,8 @@ from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_points
 from fecontact.fem.mesh_files.med import read_med
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
+
+_BYTES_OF_A_GRID_POINT = 200.0  # coordinates and a cell of eight nodes, with copies
 
 
 def read_mesh(
@@ -199,10 +202,33 @@ def _read(reader: Callable[[Path], RawMesh], path: Path, format_name: str) -> Ra
 def _read_vtk(path: Path) -> RawMesh:
     # meshio fails on many types of data arrays, which follow the mesh in the file.
     mesh_alone = re.split(rb"\n(?:POINT_DATA|CELL_DATA) ", path.read_bytes(), maxsplit=1)[0]
+    grid = re.search(rb"\nDIMENSIONS[ \t]+(\d+)[ \t]+(\d+)[ \t]+(\d+)", mesh_alone)
+    if grid and math.prod(map(int, grid.groups())) * _BYTES_OF_A_GRID_POINT > available_memory():
+        raise MemoryError
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder, "mesh.vtk")
         copy.write_bytes(mesh_alone + b"\n")
-        return _read_by_meshio("vtk", copy)
+        found = _by_meshio("vtk", copy)
+    _require_declared_cells(found, mesh_alone)
+    return _raw_mesh(found)
+
+
+def _require_declared_cells(found: Any, content: bytes) -> None:
+    """Refuse a VTK file with fewer cells, or nodes of cells, than its line CELLS declares."""
+    declared = re.search(rb"\nCELLS[ \t]+(\d+)[ \t]+(\d+)[ \t\r]*\n", content)
+    if declared is None:
+        return
+    count, nodes = (int(number) for number in declared.groups())
+    # Version 5 declares the offsets, one more than cells; earlier ones count a size for each cell.
+    if re.match(rb"# vtk DataFile Version [5-9]", content):
+        count -= 1
+    else:
+        nodes -= count
+    held = sum(len(block.data) for block in found.cells)
+    nodes_held = sum(np.size(block.data) for block in found.cells)
+    if (held, nodes_held) != (count, nodes):
+        raise MeshError(f"The file declares {count} cells with {nodes} nodes in all, but holds "
+                        f"{held} with {nodes_held}; it is cut off or damaged, save it again whole.")
 
 
 def _read_vtu(path: Path) -> RawMesh:
@@ -214,7 +240,7 @@ def _read_vtu(path: Path) -> RawMesh:
     if pieces > 1:
         raise MeshError(f"The file holds {pieces} pieces, of which meshio reads the last; merge "
                         f"them into one.")
-    return _read_by_meshio("vtu", path)
+    return _raw_mesh(_by_meshio("vtu", path))
 
 
 def _read_nastran(path: Path) -> RawMesh:
@@ -227,11 +253,11 @@ def _read_nastran(path: Path) -> RawMesh:
     if not re.search(r"^ENDDATA", text, re.MULTILINE):
         raise MeshError("The file has no line ENDDATA, so it may be cut off; add one if it is "
                         "complete.")
-    return _read_by_meshio("nastran", io.StringIO(text))
+    return _raw_mesh(_by_meshio("nastran", io.StringIO(text)))
 
 
-def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
-    """Read a file by meshio, with the groups of line elements in Nastran files."""
+def _by_meshio(format_name: str, source: Path | io.StringIO) -> Any:
+    """Mesh of meshio read from a file, without what meshio prints."""
     import meshio
 
     with _silence() as printed:
@@ -244,6 +270,11 @@ def _read_by_meshio(format_name: str, source: Path | io.StringIO) -> RawMesh:
     if np.any(found.point_data.get("nastran:ref", 0)):
         raise MeshError("The file gives nodes in local coordinate systems; export them in the "
                         "basic one.")
+    return found
+
+
+def _raw_mesh(found: Any) -> RawMesh:
+    """Contents of a mesh of meshio, with the groups of line elements in Nastran files."""
     edges: dict[str, list[Integers]] = {}
     parts: dict[str, list[tuple[str, Integers]]] = {}
     references = found.cell_data.get("nastran:ref", [])

@@ -5,6 +5,7 @@ sets named on *ELEMENT, and surfaces.
 """
 
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fecontact.core.checks import whole_number
-from fecontact.core.errors import MeshError
+from fecontact.core.errors import MeshError, ModelWarning, shown
 from fecontact.core.types import Integers
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
@@ -27,6 +28,12 @@ _SOLID_KINDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 
 _FACES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
           8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))}
 
+# Numbers, ranges of numbers (GENERATE) and names of other sets.
+Members = list[int | range | str]
+
+_ENCLOSED = ("PART", "INSTANCE", "ASSEMBLY")  # each closed by *END PART and so on
+_WITH_DATA = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
+
 
 def read_inp(path: Path) -> RawMesh:
     """Nodes, elements, node sets, sets of line elements and element surfaces of an Abaqus file.
@@ -34,12 +41,20 @@ def read_inp(path: Path) -> RawMesh:
     Raises
     ------
     MeshError
-        If the file holds a displaced part, or an unknown line.
+        If the file is cut off, holds a displaced part, or names nodes, elements or sets that it
+        does not hold.
+
+    Warns
+    -----
+    ModelWarning
+        If the file ends with elements and some nodes belong to none of them.
     """
+    text = path.read_text(encoding="utf-8", errors="replace")
     part = _Part()
     parts = {"": part}
     in_part: dict[str | None, str] = {}
-    for keyword, options, rows in _blocks(path.read_text(encoding="utf-8", errors="replace")):
+    keyword = ""
+    for keyword, options, rows in _blocks(text):
         match keyword:
             case "NODE":
                 part.add_nodes(options, rows)
@@ -72,7 +87,31 @@ def read_inp(path: Path) -> RawMesh:
     found = {name: one for name, one in parts.items() if one.nodes and one.elements}
     if not found:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
-    return _joined({name: one.raw_mesh() for name, one in found.items()})
+    _require_end(text)
+    joined = _joined({name: one.raw_mesh() for name, one in found.items()})
+    if keyword == "ELEMENT" and (unused := part.unused_nodes):
+        warnings.warn(f"{path}: the file ends with *ELEMENT data, and {unused} of "
+                      f"{len(part.nodes)} nodes belong to no element; if the file is cut off, "
+                      f"elements are missing.", ModelWarning, stacklevel=4)
+    return joined
+
+
+def _require_end(text: str) -> None:
+    """Refuse a file that ends within a line, within a part, or before the data of a keyword."""
+    lines = [line.strip() for line in text.splitlines()]
+    if not text.endswith("\n") and lines[-1] and not lines[-1].startswith("**"):
+        raise MeshError(f"The last line, {shown(lines[-1])}, has no line break, so the file may be "
+                        f"cut off; end it with a line break if it is complete.")
+    lines = [line for line in lines if line and not line.startswith("**")]
+    keywords = [line[1:].partition(",")[0].strip().upper() for line in lines if line[0] == "*"]
+    for name in _ENCLOSED:
+        if keywords.count(name) > keywords.count(f"END {name}"):
+            raise MeshError(f"The file has a line *{name} without a line *END {name}, so it may be "
+                            f"cut off; add the line if the file is complete.")
+    nodes_of_elements = keywords[-1] == "NSET" and "ELSET" in lines[-1].upper()
+    if lines[-1].startswith("*") and keywords[-1] in _WITH_DATA and not nodes_of_elements:
+        raise MeshError(f"The file ends with the line {shown(lines[-1])} without its data, so it "
+                        f"may be cut off; remove the line if the file is complete.")
 
 
 def _joined(parts: dict[str, RawMesh]) -> RawMesh:
@@ -123,10 +162,19 @@ class _Part:
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
-    node_sets: dict[str, list[int | str]] = field(default_factory=dict)
-    element_sets: dict[str, list[int | str]] = field(default_factory=dict)
+    node_sets: dict[str, Members] = field(default_factory=dict)
+    element_sets: dict[str, Members] = field(default_factory=dict)
     surfaces: dict[str, list[list[str]]] = field(default_factory=dict)
+    # Numbers of the elements that are not read (masses, springs, wedges), and of their nodes.
+    other_elements: set[int] = field(default_factory=set)
+    other_nodes: set[int] = field(default_factory=set)
     in_assembly: bool = False
+
+    @property
+    def unused_nodes(self) -> int:
+        """Number of nodes that belong to no element."""
+        used = {node for _, nodes in self.elements.values() for node in nodes}
+        return len(self.nodes.keys() - used - self.other_nodes)
 
     def add_nodes(self, options: dict[str, str], rows: list[list[str]]) -> None:
         if self.in_assembly:
@@ -142,7 +190,13 @@ class _Part:
 
     def add_elements(self, options: dict[str, str], rows: list[list[str]]) -> None:
         kind = _kind(options["TYPE"].upper())
-        if self.in_assembly or kind is None:
+        if self.in_assembly:
+            return
+        if kind in (None, "solid"):
+            self.other_elements.update(int(row[0]) for row in rows)
+            self.other_nodes.update(number for row in rows for word in row[1:]
+                                    if (number := whole_number(word)) is not None)
+        if kind is None:
             return
         if kind == "solid":
             self.elements[0] = kind, []
@@ -158,7 +212,7 @@ class _Part:
             self.element_sets.setdefault(options["ELSET"], []).extend(numbers[::count])
 
     def add_set(
-        self, sets: dict[str, list[int | str]], name: str, options: dict[str, str],
+        self, sets: dict[str, Members], name: str, options: dict[str, str],
         rows: list[list[str]],
     ) -> None:
         if self.in_assembly and "INSTANCE" not in options:
@@ -171,7 +225,7 @@ class _Part:
             words = [word for word in row if word]
             if "GENERATE" in options:
                 first, last, *step = (int(word) for word in words)
-                members.extend(range(first, last + 1, *step))
+                members.append(range(first, last + 1, *step))
             else:
                 for word in words:
                     number = whole_number(word)
@@ -183,22 +237,43 @@ class _Part:
         self.surfaces.setdefault(name, []).extend(
             row for row in rows if not (several and self.in_assembly) or row[0].upper() in known)
 
-    def resolve(self, sets: dict[str, list[int | str]], name: str) -> list[int]:
+    def resolve(self, sets: dict[str, Members], name: str) -> list[int]:
         """The numbers in a set; names in it refer to sets defined before."""
         by_name = {key.upper(): key for key in sets}
-        pending: list[int | str] = [name]
+        pending: Members = [name]
         seen: set[str] = set()
         numbers: list[int] = []
         while pending:
             member = pending.pop()
             if isinstance(member, int):
                 numbers.append(member)
+            elif isinstance(member, range):
+                numbers.extend(member)
             elif member.upper() not in by_name:
                 raise MeshError(f"The file refers to a set '{member}' that it does not hold.")
             elif member.upper() not in seen:
                 seen.add(member.upper())
                 pending.extend(sets[by_name[member.upper()]])
         return numbers
+
+    def require_members(self) -> None:
+        """Refuse sets and surfaces that name nodes or elements which the file does not hold."""
+        elements = self.elements.keys() | self.other_elements
+        surfaces = {name: [number for row in rows if (number := whole_number(row[0])) is not None]
+                    for name, rows in self.surfaces.items()}
+        for title, one, groups, known in (
+                ("node set", "node", self.node_sets, self.nodes.keys()),
+                ("element set", "element", self.element_sets, elements),
+                ("surface", "element", surfaces, elements)):
+            for name, members in groups.items():
+                for member in members:
+                    ends = ((member,) if isinstance(member, int) else
+                            (member[0], member[-1]) if isinstance(member, range) and member else ())
+                    for number in ends:
+                        if number not in known:
+                            raise MeshError(
+                                f"The {title} '{name}' names {one} {number}, which the file does "
+                                f"not hold; the file may be cut off, save it again whole.")
 
     def surface(self, rows: list[list[str]]) -> list[list[int]]:
         """Edges or faces (Abaqus' node numbers) of ``set or element, S1`` rows."""
@@ -223,6 +298,7 @@ class _Part:
         index = {number: k for k, number in enumerate(self.nodes)}
         if not all(index.keys() >= set(nodes) for _, nodes in self.elements.values()):
             raise MeshError("The elements name nodes that the file does not hold.")
+        self.require_members()
         blocks: dict[str, list[list[int]]] = {}
         for kind, nodes in self.elements.values():
             if not kind.startswith("line"):

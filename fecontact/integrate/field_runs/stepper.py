@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.checks import require_state
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH
 from fecontact.integrate.courses import COEFFICIENTS
@@ -155,8 +155,7 @@ def start_field(
     InputError
         For a state that is not finite, and events that are none.
     """
-    if not np.isfinite(state).all():
-        raise InputError("The initial state holds values that are not finite.")
+    require_state(state)
     d, times, values = field.dimension, np.array(times, dtype=float), field.values
     kernel, function = field.kernel(), None
     if kernel is None:

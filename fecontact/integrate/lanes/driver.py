@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.checks import require_state
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.courses import QUICKEST
 from fecontact.integrate.lanes import arrays, step_loop
@@ -157,8 +157,7 @@ class SideBySide:
     def _start(self, run: int) -> None:
         """Let a run begin from its initial state."""
         state = self._state_of(run)
-        if not np.isfinite(state).all():
-            raise InputError("The initial state holds values that are not finite.")
+        require_state(state)
         self.runs.starts[run, arrays.NUMBERS : arrays.NUMBERS + len(state)] = state
 
     @property

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from fecontact.core.checks import require_state
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
@@ -120,7 +121,7 @@ def start(
     workers : int
         Threads that share the contact nodes; results do not depend on it.
     """
-    _require_finite(state)
+    require_state(state)
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)
@@ -176,7 +177,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
     assert not len(run.variation.variation.columns)
     assert not run.watch.note
     assert not control.work
-    _require_finite(state)
+    require_state(state)
     output = run.output
     return Run(
         run.problem, _progress(system, control, run.times, state), run.room,
@@ -195,11 +196,6 @@ def _team(modes: int, nodes: int, helpers: int) -> Team:
     from fecontact.integrate.shared_nodes.node_work import team_for
 
     return team_for(modes, nodes, helpers)
-
-
-def _require_finite(state: Array) -> None:
-    if not np.isfinite(state).all():
-        raise InputError("The initial state holds values that are not finite.")
 
 
 def _progress(system: ContactSystem, control: Control, times: Array, state: Array) -> Progress:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.ground.ground import Ground
@@ -15,6 +16,8 @@ from fecontact.output.files.contact_facets import contact_facets
 from fecontact.reduction.assembly.contact_faces import contact_directions
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
+
+LARGEST_DRAWN = 1e100  # of states and contact forces in pictures and pages
 
 
 def frame_indices(
@@ -66,6 +69,26 @@ def require_field(trajectory: Trajectory) -> ModeShapes:
     return field
 
 
+def drawable(trajectory: Trajectory, which: Any = slice(None)) -> NDArray[np.bool_]:
+    """Whether the state and the contact forces (F,) are finite and at most 1e100 at output times.
+
+    Lengths of larger vectors would overflow.
+    """
+    found = [trajectory.states[which], trajectory.normal_force[which],
+             trajectory.friction_force[which]]
+    return np.all([(np.abs(values) <= LARGEST_DRAWN).all(axis=1) for values in found], axis=0)
+
+
+def require_drawable(trajectory: Trajectory, which: Any) -> None:
+    """Raise InputError unless the run has numbers that can be drawn at some output times."""
+    bad = np.flatnonzero(~drawable(trajectory, which))
+    if len(bad):
+        raise InputError(f"This run cannot be drawn at t = {trajectory.time[which][bad[0]]:.6g} s: "
+                         f"its state or contact forces are not finite, or beyond "
+                         f"{LARGEST_DRAWN:g}; draw an earlier part (t_end), or check loads, "
+                         f"stiffnesses and supports.")
+
+
 def body_numbers(basis: ModalBasis) -> NDArray[np.int32]:
     """Number (N,) of the body of each mesh node, in the order of ``basis.parts``."""
     assert basis.mode_shapes is not None
@@ -78,18 +101,26 @@ def body_numbers(basis: ModalBasis) -> NDArray[np.int32]:
 def displacement(field: ModeShapes, q: Array) -> Array:
     """Displacements (F, N, d) of the nodes [m] at modal coordinates q (F, m)."""
     nodes, d, modes = field.shapes.shape
-    return np.asarray(q @ field.shapes.reshape(d * nodes, modes).T).reshape(len(q), nodes, d)
+    unit = magnitude(q)
+    found = (q / unit) @ field.shapes.reshape(d * nodes, modes).T
+    with np.errstate(over="ignore"):
+        return np.asarray(found * unit).reshape(len(q), nodes, d)
 
 
 def von_mises(field: ModeShapes, q: Array) -> Array:
     """Von Mises stress (F, N) at the nodes [Pa] at modal coordinates q (F, m)."""
     nodes, count, modes = field.stress.shape
     components = field.stress.transpose(1, 0, 2).reshape(count * nodes, modes)
-    xx, yy, zz, *shears = np.moveaxis((q @ components.T).reshape(len(q), count, nodes), 1, 0)
+    # Squares of large numbers would overflow.
+    unit = magnitude(q)
+    values = (q / unit) @ components.T
+    size = magnitude(values)
+    xx, yy, zz, *shears = np.moveaxis((values / size).reshape(len(q), count, nodes), 1, 0)
     square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
     for shear in shears:
         square = square + 3.0 * shear**2
-    return np.sqrt(square)
+    with np.errstate(over="ignore"):
+        return np.asarray(np.sqrt(square) * size * unit)
 
 
 def cell_stress(field: ModeShapes, q: Array) -> Array:
@@ -101,8 +132,10 @@ def cell_stress(field: ModeShapes, q: Array) -> Array:
     _, components, modes = field.stress.shape
     # Corner by corner: all at once would hold the stress of each cell several times.
     mean = sum(field.stress[field.cells[:, corner]] for corner in range(corners)) / corners
-    return np.asarray(q @ mean.reshape(components * count, modes).T).reshape(
-        len(q), count, components)
+    unit = magnitude(q)
+    found = (q / unit) @ mean.reshape(components * count, modes).T
+    with np.errstate(over="ignore"):
+        return np.asarray(found * unit).reshape(len(q), count, components)
 
 
 def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:

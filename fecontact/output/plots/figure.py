@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 from matplotlib import RcParams, rc_context, rc_params_from_file
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -134,14 +135,16 @@ def new_figure(
         For another suffix, or a file that cannot be written.
     """
     target = None if path is None else _target(path)
-    with rc_context({**STYLE, **_style.get()}):
+    # Margins beside the largest numbers overflow.
+    with rc_context({**STYLE, **_style.get()}), np.errstate(over="ignore"):
         figure = StyledFigure(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
     if target is not None:
         # Written at once: matplotlib loses the error of a full disk while it draws a PDF.
         drawn = BytesIO()
-        figure.savefig(drawn, format=target.suffix[1:].lower())
+        with np.errstate(over="ignore"):
+            figure.savefig(drawn, format=target.suffix[1:].lower())
         with replaced(target) as part:
             part.write_bytes(drawn.getbuffer())
 

@@ -19,7 +19,7 @@ from fecontact.core.files.atomic_write import beside, put, replaced, unwritable
 from fecontact.core.progress import counting_bar, held_back_interrupt, shown
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.wear import WearLaw
-from fecontact.output.files.frames import frame_indices, require_field
+from fecontact.output.files.frames import frame_indices, require_drawable, require_field
 from fecontact.output.render.frames_data import Colour, Motion
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Overlay
@@ -224,6 +224,7 @@ def _motion(
     trajectory: Trajectory, indices: NDArray[np.intp], colour: Colour, scale: float | None,
     view: View, wear: WearLaw | None,
 ) -> Motion:
+    require_drawable(trajectory, indices)
     if trajectory.system.basis.dimension == 3:
         return SolidMotion(trajectory, indices, colour, scale, view, wear)
     for name, given, usual in (("view", view, "above"), ("wear", wear, None)):

@@ -16,6 +16,7 @@ from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, quantity, round_125
 from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.output.files.frames import LARGEST_DRAWN, drawable
 from fecontact.output.files.stored_system import library_versions
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.scene import COLOUR_MAPS
@@ -107,7 +108,7 @@ def run_block(
         remarks.append(f"In this run {message}")
     if len(found.time) < len(run.time):
         remarks.append(f"Only the first {len(found.time)} of {len(run.time)} output times have a "
-                    f"motion of finite numbers.")
+                    f"motion of finite numbers up to {LARGEST_DRAWN:g}.")
     system = found.system
     drawn = system.basis.mode_shapes is not None
     if not drawn:
@@ -203,13 +204,14 @@ def _text(value: Any) -> str:
 
 
 def _finite(run: Trajectory) -> Trajectory:
-    """The run up to its last state of finite numbers."""
-    bad = np.flatnonzero(~np.isfinite(run.states).all(axis=1))
+    """The run up to its last output time that can be drawn."""
+    bad = np.flatnonzero(~drawable(run))
     if not len(bad):
         return run
     end = int(bad[0])
     if end < 2:
-        raise InputError("The run has no motion to report: its numbers are not finite.")
+        raise InputError(f"The run has no motion to report: its numbers are not finite, or beyond "
+                         f"{LARGEST_DRAWN:g}; check loads, stiffnesses and supports.")
     return run.between(None, float(run.time[end - 1]))
 
 
