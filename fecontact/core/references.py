@@ -158,6 +158,16 @@ def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return array._getvalue()
 
 
+@lower_cast(types.BaseTuple, Reference)
+def _reference(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
+    """A reference to a copy on the stack of what calls; arrays stay that one's."""
+    place = cgutils.alloca_once(builder, value.type)
+    _write(builder, value, place)
+    # No read may come before what is written here.
+    pointer = ir.FunctionType(place.type, [place.type])
+    return builder.asm(pointer, "", "=r,0,~{memory}", [place], True)
+
+
 @intrinsic
 def borrowed(typingctx: Any, array: Any) -> Any:
     """The same array, without reference counts, or a reference to a named tuple of arrays.
@@ -169,10 +179,6 @@ def borrowed(typingctx: Any, array: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         if not isinstance(array, types.BaseNamedTuple):
             return without_owner(context, builder, array, args[0])
-        place = cgutils.alloca_once(builder, args[0].type)
-        _write(builder, args[0], place)
-        # No read may come before what is written here.
-        pointer = ir.FunctionType(place.type, [place.type])
-        return builder.asm(pointer, "", "=r,0,~{memory}", [place], True)
+        return _reference(context, builder, array, signature.return_type, args[0])
 
     return (Reference(array) if isinstance(array, types.BaseNamedTuple) else array)(array), codegen
