@@ -230,7 +230,7 @@ def _hidden_change(step: Step, end: Solution, found: list[BranchPoint]) -> bool:
     """Return True if a fold at which multipliers are lost may hide a change of stability.
 
     Where a multiplier changes by many decades within rounding of the fold, it may pass -1 there
-    besides 1: up to two more or fewer directions are then unstable behind it.
+    besides 1: up to two more or fewer directions are then unstable after it.
     """
     change = int(end.values["unstable"]) - int(step.here.values["unstable"])
     return abs(change) <= _HIDDEN_CHANGE and any(

@@ -91,8 +91,7 @@ def orbit_branch(
         Parameter range that counts as one; by default that of the point's branch, or of the bounds.
     direction : float
         Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
-        its branch and -1 back, or to either side of a branch point or resonance. At a branch point
-        1 goes where the parameter grows or, at a fork, the largest change of a state is positive.
+        its branch and -1 back, or to either side of a branch point or resonance.
     both : bool
         Follow the branch in both directions, not from Hopf points and period doublings.
 
