@@ -41,6 +41,7 @@ from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.restored import over_first
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
+from fecontact.core.ties import first_largest, first_least
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
@@ -93,11 +94,12 @@ def _fold(
     about = (point.parameter - _ABOUT * width, point.parameter + _ABOUT * width)
     branch = equilibrium_branch(field, Equilibrium(field, values, rest[0]),
                                 point.branch.parameter_name, bounds=about, both=True, width=width)
-    hopf: list[HopfPoint] = sorted(branch.of_kind("Hopf"), key=lambda at: abs(
-        at.frequency_hz - float(point.values["frequency_hz"])))
+    hopf = branch.of_kind("Hopf")
     if not hopf:
         return None
-    orbits = orbit_branch(field, hopf[0], options=_SEARCH, bounds=about, width=width)
+    away = [abs(at.frequency_hz - float(point.values["frequency_hz"])) for at in hopf]
+    orbits = orbit_branch(field, hopf[first_least(away)], options=_SEARCH, bounds=about,
+                          width=width)
     end = orbits.points[-1]
     return end if isinstance(end, FoldPoint) else None
 
@@ -166,7 +168,7 @@ def _first(
     problem, u, _ = equilibrium_curve(begin, (first, parameter), square, width, None)
     tangent = tangent_at(problem, u, 1.0)
     if square == 0.0:
-        tangent = tangent * np.sign(tangent[field.dimension])
+        tangent = np.copysign(1.0, tangent[field.dimension]) * tangent
     beside = list(_along(problem, u, tangent, first, both=square != 0.0))
     # Tori of some zero-Hopf points lie across the other parameter alone.
     across = _across(tangent, first, parameter, width)
@@ -190,8 +192,8 @@ def _first(
 
 def _across(tangent: Array, first: str, second: str, width: Mapping[str, float]) -> str:
     """The parameter over which a curve with this tangent is crossed."""
-    steep = abs(tangent[-1]) / width[first] <= abs(tangent[-2]) / width[second]
-    return first if steep else second
+    along = abs(tangent[-2]) / width[second], abs(tangent[-1]) / width[first]
+    return (first, second)[first_largest(along)]
 
 
 def _along(

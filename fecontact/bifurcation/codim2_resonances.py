@@ -17,6 +17,7 @@ from fecontact.bifurcation.orbits.curves.resonant import (
 )
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import AnalysisError, FecontactError
+from fecontact.core.ties import first_largest, first_least
 from fecontact.system.fields.vector_field import VectorField
 
 # Width about such an orbit, and steps, for folds.
@@ -51,7 +52,7 @@ def folds_at_quarter(
                             f"normal form has |C / D| = {abs(C / D):.4g}, and must exceed 1; "
                             f"follow the orbits around it with orbit_branch(field, point).")
     towards = at.towards(-C)
-    place = int(abs(towards[0]) > abs(towards[1]))
+    place = first_least(np.abs(towards))
     turn = np.exp(0.25j * np.angle(D / C))
     last: FecontactError | None = None
     for away in AWAY:
@@ -86,7 +87,7 @@ def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> Fol
     last: FecontactError | None = None
     for angle in _ANGLES:
         towards = at.towards(at.c * np.exp(1j * angle))
-        place = int(abs(towards[1]) > abs(towards[0]))
+        place = first_largest(np.abs(towards))
         for away in AWAY:
             try:
                 branch = _followed(at, of_several(at, away * towards), place)
@@ -97,7 +98,8 @@ def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> Fol
                 continue
             found = branch.of_kind("fold")
             if found:
-                return min(found, key=lambda end: abs(end.parameter - float(at.u[place - 2])))
+                return found[first_least([abs(end.parameter - float(at.u[place - 2]))
+                                          for end in found])]
             break
     raise AnalysisError(f"{point.place}: no fold of orbits of three periods was found beside it; "
                         f"follow these with orbit_branch(field, point), which surround it as "

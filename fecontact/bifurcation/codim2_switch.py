@@ -7,6 +7,7 @@ from fecontact.bifurcation.continuation.points import DoubleHopfPoint, ZeroHopfP
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.ties import first_largest
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
@@ -84,6 +85,6 @@ def tangent_at(problem: Problem, u: Array, direction: float) -> Array:
         raise AnalysisError("The curve has no direction at its start: both parameters turn there. "
                             "Start from another point of it.")
     rates = [np.abs(tangent[-2:]) * np.sqrt(weights[-2:]) for tangent in found]
-    tangent = found[int(np.argmax([rate.max() for rate in rates]))]
+    tangent = found[first_largest([rate.max() for rate in rates])]
     first = abs(tangent[-1]) * np.sqrt(weights[-1]) > _RESTS
     return tangent * np.copysign(1.0, direction * tangent[-1 if first else -2])

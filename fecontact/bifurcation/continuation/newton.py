@@ -75,7 +75,10 @@ _LIKELY = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A converged point, with all that was made there."""
+    """A converged point, with all that was made there.
+
+    ``turns`` is the number of folds passed since the stability was last known.
+    """
 
     u: Array
     linearisation: Linearisation
@@ -83,6 +86,7 @@ class Solution:
     iterations: int
     values: Mapping[str, Any]
     tests: Mapping[str, float]
+    turns: int = 0
 
 
 class Tests(Mapping[str, float]):

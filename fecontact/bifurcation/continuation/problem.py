@@ -248,6 +248,15 @@ class Problem(Protocol):
         """Kinds whose tests change sign between two neighbouring points by rounding alone."""
         return ()
 
+    def uncertain_turn(
+        self, tangents: tuple[Array, Array], values: tuple[Mapping[str, Any], Mapping[str, Any]]
+    ) -> bool:
+        """Whether the parameter may turn between two neighbouring points by rounding alone.
+
+        A fold is then sought only where the parameter itself changes as its slopes say.
+        """
+        return False
+
 
 # Kinds of special points of the branches and curves of this package.
 KINDS = (

@@ -181,7 +181,7 @@ def _moved(
     """A solution on the mesh of a problem; with as many unknowns its equations still serve."""
     known = here.linearisation if len(u) == len(here.u) else problem.linearise(u)
     return problem, Solution(u, known, tangent / norm(problem, tangent), 0, here.values,
-                             here.tests)
+                             here.tests, here.turns)
 
 
 def _resolved(

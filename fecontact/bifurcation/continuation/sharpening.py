@@ -61,6 +61,9 @@ _FALLS = (1.0 / 32.0, 0.5)
 LEAST_FALL = 1e-3
 # Smallest error of a parameter, in widths of the diagram.
 _ROUNDING = 1e-13
+# The same where multipliers are lost in rounding: the folds of one branch on several meshes spread
+# by some parts of it.
+_HIDDEN = 1e-11
 # Largest number of mesh doublings to confirm a fold or a branch point, and largest relative
 # difference of its test function on two meshes that agree.
 _DOUBLINGS, _AGREEMENT = 2, 0.5
@@ -125,6 +128,8 @@ def sharpened(
     best, error = located.best()
     result = unresolved(best) if judged is None else with_details(best, **judged)
     if not np.isnan(error):
+        if problem.lost(best.values):
+            error = max(error, _HIDDEN * float(problem.scales[-1]))
         return with_details(result, parameter_error=error)
     if np.isnan(result.parameter_error) and not result.located:
         return with_details(result, parameter_error=reach(place))

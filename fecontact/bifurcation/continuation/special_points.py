@@ -20,6 +20,13 @@ _JUMP = 1e-3
 _BOUND = 1e-12
 # Part of a step to which the end of a branch is located.
 _END = 1e-9
+# Relative size of the last Newton step at solutions whose parameters are compared.
+_EXACT = 1e-11
+# Largest change of the number of unstable directions that one fold hides.
+_HIDDEN_CHANGE = 2
+# Slope of the parameter, in widths of the diagram, which rounding and errors of the mesh do not
+# reach where multipliers are lost.
+_STEEP = 1e-6
 # Distance within which a fold belongs to a branch point, in the precision of either.
 _BESIDE = 30.0
 
@@ -66,13 +73,17 @@ def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPo
                            max(1e-4, _BESIDE * precision) * step.length)
     if step.options.locate:
         count = counted(step.problem, step.here, end, found, step.options.events)
+        if count is None and _hidden_change(step, end, found):
+            count = int(end.values["unstable"])
         if count is None and strict:
             return None
         if count is None:
             found.append(_jump_of_stability(replace(step, there=end)))
         else:
-            end = with_count(end, count)
-            found += _change_behind(step, end)
+            turns = step.here.turns + sum(point.kind == "fold" for point in found)
+            lost = step.problem.lost(end.values)
+            end = replace(with_count(end, count), turns=turns if lost else 0)
+            found += _change_behind(step, end, turns)
     found.sort(key=lambda point: step.along(point.u))
     if on_bound or ended is not None:
         found.append(BranchPoint(end.u, end.tangent, end.values, None if on_bound else ended))
@@ -80,13 +91,20 @@ def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPo
 
 
 def _zeros(step: Step, strict: bool) -> list[BranchPoint] | None:
-    """Zeros of test functions, checked by the problem; None if the end is on another sheet."""
+    """Zeros of test functions, checked by the problem.
+
+    None if the end is on another sheet, or lies where rounding hides a turn of the parameter.
+    """
     problem, here, there = step.problem, step.here, step.there
     rounding = set(problem.unresolved((here.tangent, there.tangent), (here.values, there.values),
                                       (here.tests, there.tests)))
     found = []
     for name in _changed(here, there):
         if name in rounding or name in problem.ends:
+            continue
+        if name == "fold" and not (turns := _parameter_turns(step)):
+            if turns is None and strict:
+                return None
             continue
         event = name in step.options.events
         zero = step.zero(_test_value(name), problem.event_precision if event else problem.precision,
@@ -108,6 +126,38 @@ def _zeros(step: Step, strict: bool) -> list[BranchPoint] | None:
                 rest |= {"located": False, "parameter_error": bracket * step.parameter_rate()}
             found.append(special_point(at.u, at.tangent, at.values, kind, rest))
     return found
+
+
+def _parameter_turns(step: Step) -> bool | None:
+    """Whether the parameter turns on a step on which its slope changes sign; None if unclear.
+
+    Where that may be rounding, both ends are solved exactly. The change of the parameter on either
+    side of the turn must then be s l / 2 to a factor of two, with the slope s at that end and the
+    length l, and the larger slope must not be tiny. It is unclear where that holds on the longer
+    side alone.
+    """
+    ends = step.here, step.there
+    if not step.problem.uncertain_turn((ends[0].tangent, ends[1].tangent),
+                                       (ends[0].values, ends[1].values)):
+        return True
+    exact = replace(step, options=replace(step.options, tolerance=_EXACT))
+    here, there = exact.solution(0.0), exact.solution(step.length)
+    if here is None or there is None:
+        return False
+    first, last = (float(end.tangent[-1]) / float(step.row @ end.tangent) for end in (here, there))
+    if first * last >= 0.0:
+        return False
+    at = step.length * first / (first - last)
+    steep = max(abs(first), abs(last)) * np.sqrt(step.problem.weights()[-1]) > _STEEP
+    turn = exact.solution(at) if steep else None
+    if turn is None:
+        return False
+    expected = 0.5 * np.array([first * at, last * (step.length - at)])
+    off = np.abs(np.diff([end.u[-1] for end in (here, turn, there)]) - expected)
+    agrees = off <= 0.5 * np.abs(expected)
+    if agrees.all():
+        return True
+    return None if agrees[np.argmax(np.abs(expected))] else False
 
 
 def _turn(step: Step) -> tuple[Solution, float]:
@@ -159,17 +209,32 @@ def _bound_met(step: Step) -> tuple[Solution, bool] | None:
     return end, on_bound
 
 
-def _change_behind(step: Step, end: Solution) -> list[BranchPoint]:
-    """A change of stability since it was last known, where it is known again; empty if none."""
+def _change_behind(step: Step, end: Solution, turns: int) -> list[BranchPoint]:
+    """A change of stability since it was last known, where it is known again; empty if none.
+
+    At each of the ``turns``, the folds in between, the number of unstable directions may have
+    changed by one.
+    """
     problem, here = step.problem, step.here
     if not problem.lost(here.values) or problem.lost(end.values):
         return []
     before, after = (int(at.values["unstable"]) for at in (here, end))
-    if before == after:
+    if abs(after - before) <= turns:
         return []
     error = abs(float(end.u[-1] - here.u[-1])) + step.length * step.parameter_rate()
     return [special_point(here.u, here.tangent, here.values, UNRESOLVED, {
         "unstable_before": before, "unstable_after": after, "parameter_error": error})]
+
+
+def _hidden_change(step: Step, end: Solution, found: list[BranchPoint]) -> bool:
+    """Return True if a fold at which multipliers are lost may hide a change of stability.
+
+    Where a multiplier changes by many decades within rounding of the fold, it may pass -1 there
+    besides 1: up to two more or fewer directions are then unstable after it.
+    """
+    change = int(end.values["unstable"]) - int(step.here.values["unstable"])
+    return abs(change) <= _HIDDEN_CHANGE and any(
+        point.kind == "fold" and step.problem.lost(point.values) for point in found)
 
 
 def _jump_of_stability(step: Step) -> BranchPoint:

@@ -69,7 +69,8 @@ def equilibrium_branch(
         Range of the parameter, in place of that of the options.
     direction : float
         Sign of the first change of the parameter; from a point, 1 goes forward along its branch and
-        -1 back.
+        -1 back. From a branch point 1 goes where the parameter grows or, at a fork, the state that
+        changes most.
     both : bool, optional
         Whether to go to both sides; by default only from a branch point.
     scales : (d,) sequence, optional

@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.fields.multilinear_forms import Bend, bend
 from fecontact.core.errors import AnalysisError
+from fecontact.core.ties import first_largest, oriented
 from fecontact.core.types import Array, ComplexArray
 from fecontact.system.fields.vector_field import VectorField
 
@@ -53,8 +54,8 @@ def critical_pair(
 ) -> tuple[complex, ComplexArray, ComplexArray]:
     """Eigenvalue with positive imaginary part, q, and p.
 
-    ``J q = l q``, ``J^T p = conj(l) p``, ``|q| = 1``, ``conj(p) q = 1``. It is the one nearest to
-    the imaginary axis, or nearest to a given number.
+    ``J q = l q``, ``J^T p = conj(l) p``, ``|q| = 1``, ``conj(p) q = 1``; the largest component of q
+    is real and positive. It is the one nearest to the imaginary axis, or nearest to a given number.
 
     Raises
     ------
@@ -69,8 +70,9 @@ def critical_pair(
         raise AnalysisError("All eigenvalues are real; there is no Hopf point here.")
     distance = np.abs(eigenvalues[pairs].real if near is None else eigenvalues[pairs] - near)
     at = pairs[np.argmin(distance)]
-    q = right[:, at] / np.linalg.norm(right[:, at])
-    p = left[:, at]
+    q, p = right[:, at], left[:, at]
+    largest = q[first_largest(np.abs(q))]
+    q = q * (largest.conj() / abs(largest)) / np.linalg.norm(q)
     return complex(eigenvalues[at]), q, p / np.conj(np.vdot(p, q))
 
 
@@ -123,9 +125,12 @@ def _first_lyapunov(
 
 
 def null_vectors(J: Array) -> tuple[Array, Array]:
-    """Right and left singular vectors (d,) of the smallest singular value, of length one."""
+    """Right and left singular vectors (d,) of the smallest singular value, of length one.
+
+    The largest component of the right one is positive.
+    """
     U, _, V = np.linalg.svd(J)
-    return V[-1], U[:, -1]
+    return oriented(V[-1]), U[:, -1]
 
 
 def fold_coefficient(field: VectorField, x: Array, values: Array, scales: Array) -> float:

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.equilibrium import (
@@ -140,7 +141,7 @@ class EquilibriumProblem(Problem):
         if kind == "branch point":
             other = branching_tangents(self.field, x, values, self.index, self.scales, tangent)
             return {"null_vector": v, **crossing_form(self.field, x, values, self.scales)} | (
-                {} if other is None else {"other_tangent": other})
+                {} if other is None else {"other_tangent": heading(other, self._weights)})
         return {}
 
     def _hopf(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any] | None:

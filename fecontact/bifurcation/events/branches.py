@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch, regular, shortened
+from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.newton import corrected, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
@@ -26,8 +27,8 @@ from fecontact.integrate.solvers import SetValued
 # First steps beyond a border, in those of the branch, and the largest residual there.
 _BEYOND, FITS = (0.1, 0.01, 1e-3), 1e-5
 # What is left of a condition at a border counts as nothing below this; at most so many borders are
-# met at once.
-_NOTHING, _DEPTH = 1e-5, 4
+# met at once, and below the second value what is left is rounding.
+_NOTHING, _EQUAL, _DEPTH = 1e-5, 1e-8, 4
 # Ranges of the states below this part of the largest one are those of a system at rest.
 _STILL, _NONE = 1e-10, 1e-200
 # Most borders on one branch.
@@ -257,13 +258,12 @@ def nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
     return sorted((condition for condition in found
                    if abs(condition.left) < max(_NOTHING, 10.0 * least)),
                   key=lambda condition: (condition.what != STRIKE, condition.what != DURATION,
-                                         abs(condition.left)))
+                                         max(abs(condition.left), _EQUAL, 10.0 * least)))
 
 
 def _null_vector(problem: EventOrbit, matrix: Array) -> Array:
     sizes = 1.0 / np.sqrt(problem.weights())
-    vector = np.linalg.svd(matrix * sizes)[2][-1] * sizes
-    return np.asarray(vector / norm(problem, vector))
+    return heading(np.linalg.svd(matrix * sizes)[2][-1] * sizes, problem.weights())
 
 
 def _starts(

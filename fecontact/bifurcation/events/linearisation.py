@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.events.conditions import Condition, Course, conditions
 from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, scales_of
-from fecontact.bifurcation.orbits.floquet import Floquet
+from fecontact.bifurcation.orbits.floquet import Floquet, by_falling_modulus
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
@@ -290,7 +290,7 @@ class EventLinearisation:
         if not np.isfinite(scaled).all():
             raise AnalysisError("The multipliers grow beyond all numbers there.")
         found[:rank] = np.linalg.eigvals(image.T @ scaled @ image)
-        found = found[np.argsort(-np.abs(found), kind="stable")]
+        found = by_falling_modulus(found)
         trivial = None if self.problem.forced else int(np.argmin(np.abs(found - 1.0)))
         return Floquet(found, trivial)
 

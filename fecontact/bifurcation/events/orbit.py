@@ -14,6 +14,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.shooting import run_from
 from fecontact.core.errors import AnalysisError
+from fecontact.core.ties import first_largest
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.integrate.solvers import SetValued
@@ -222,7 +223,7 @@ def anchor(problem: EventOrbit, u: Array) -> tuple[int, float]:
         moving = [any(status != STICK for status in phase.status) or (
             problem.solver.restitution is not None and not all(phase.closed))
             for phase in problem.phases]
-        i = int(np.argmax(durations * (1.0 + 1e6 * np.array(moving))))
+        i = first_largest(durations * (1.0 + 1e6 * np.array(moving)))
         return i, 0.5 * float(durations[i])
     begins, T = problem.begins(u), problem.period(u)
     time = T * np.ceil(begins[0] / T)

@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import (
@@ -87,7 +88,7 @@ def beyond(
         _, tangent = starts.with_more(problem, tangent, method)
         problem, u = starts.with_more(problem, u, method)
         own = method
-    tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
+    tangent = np.copysign(1.0, direction) * heading(tangent, problem.weights())
     failed: FecontactError = InputError("There is nothing to start from.")
     for part in _FIRST_STEPS:
         step = max(part * options.step, options.smallest_step)

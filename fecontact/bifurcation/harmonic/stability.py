@@ -16,7 +16,12 @@ from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.motion_transitions import integrals, motion_transitions
 from fecontact.bifurcation.linalg.transition_matrices import transitions
-from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of, floquet_of_product
+from fecontact.bifurcation.orbits.floquet import (
+    Floquet,
+    by_falling_modulus,
+    floquet_of,
+    floquet_of_product,
+)
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
 
@@ -137,7 +142,7 @@ def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
     if not np.abs(products[1:]).max(initial=0.0) < _LARGEST:
         return floquet_of_product(M, False)
     found = np.asarray(eigvals(products[-1]), dtype=np.complex128)
-    return Floquet(found[np.argsort(-np.abs(found))], None)
+    return Floquet(by_falling_modulus(found), None)
 
 
 @cache
@@ -187,7 +192,6 @@ def koopman_hill(J: Array, period: float, order: int) -> NDArray[np.float64]:
 def by_hill(problem: Balance, u: Array, J: Array) -> Floquet:
     """Multipliers by the Koopman-Hill projection with K = 2 H; J (N, d, d) at the samples."""
     monodromy = koopman_hill(J, problem.period(u), 2 * problem.harmonics)
-    found = np.asarray(np.linalg.eigvals(monodromy), dtype=np.complex128)
-    found = found[np.argsort(-np.abs(found))]
+    found = by_falling_modulus(np.asarray(np.linalg.eigvals(monodromy), dtype=np.complex128))
     trivial = int(np.argmin(np.abs(found - 1.0))) if problem.autonomous else None
     return Floquet(found, trivial)

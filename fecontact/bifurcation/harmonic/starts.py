@@ -30,6 +30,8 @@ Start = tuple[HarmonicProblem, Array, Array]
 _CORRECTIONS = 40
 # Mesh on which a motion is sampled before it becomes a series.
 _INTERVALS, _DEGREE = 200, 4
+# Least size of an equation, in that of the largest one, by which it is divided at a branch point.
+_ZERO_ROW = 1e-8
 
 
 def problem_for(
@@ -219,7 +221,10 @@ def crossing(problem: HarmonicProblem, u: Array, incoming: Array) -> Start:
     """
     row = problem.weights() * incoming
     equations = problem.linearise(u).condensed
-    _, _, vectors = np.linalg.svd(equations / np.abs(equations).max(axis=1)[:, None])
+    sizes = np.abs(equations).max(axis=1)
+    # One of the equations may be zero but for rounding.
+    sizes = np.maximum(sizes, _ZERO_ROW * sizes.max())
+    _, _, vectors = np.linalg.svd(equations / sizes[:, None])
     first, second = vectors[-2:]
     return problem, u, (row @ second) * first - (row @ first) * second
 

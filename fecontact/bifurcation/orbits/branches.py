@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import HopfPoint, require_no_family
 from fecontact.bifurcation.continuation.problem import (
@@ -345,7 +346,7 @@ def _beyond(
     intervals = usual.intervals * (2 if point.kind == "period doubling" else 1)
     chosen = method if isinstance(method, Collocation) else replace(usual, intervals=intervals)
     problem, u, tangent = _on_own_intervals(found, chosen)
-    tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
+    tangent = np.copysign(1.0, direction) * heading(tangent, problem.weights())
 
     # At the point both branches are indistinguishable, and the new one may bend strongly: step off
     # it, by less if the corrector fails.

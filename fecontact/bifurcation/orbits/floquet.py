@@ -171,10 +171,24 @@ def floquet_of_product(M: Array, autonomous: bool) -> Floquet:
     except ArithmeticError as error:
         raise AnalysisError(f"The Floquet multipliers were not found ({error}); use more "
                             f"intervals.") from None
+    multipliers = by_falling_modulus(multipliers)
     trivial = int(np.argmin(np.abs(multipliers - 1.0))) if autonomous else None
     return Floquet(multipliers, trivial)
 
 
+def by_falling_modulus(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Multipliers (d,), the largest modulus first; of a pair the one with Im mu > 0 first."""
+    found = multipliers[np.lexsort((-multipliers.imag, -np.abs(multipliers)))]
+    one, other = found[:-1], found[1:]
+    with np.errstate(invalid="ignore"):
+        turned = (one.imag < 0.0) & (np.abs(one - other.conj()) <= _PAIR * np.abs(one))
+    for place in np.flatnonzero(turned).tolist():
+        found[[place, place + 1]] = found[[place + 1, place]]
+    return found
+
+
+# Relative distance of a multiplier from the conjugate of another one up to which they are a pair.
+_PAIR = 1e-6
 # Slope of the parameter along a branch, in widths of the diagram, below which its sign is rounding,
 # and below which it may be where multipliers are lost.
 FLAT, _FLAT_LOST = 1e-8, 1e-4
@@ -224,7 +238,7 @@ def unresolved(
     Towards a homoclinic orbit, on a canard and in a conservative family the parameter changes by
     less than round-off: its turns are no folds, and sign changes in the test for branch points no
     crossings. In a conservative family a second multiplier equals one throughout. Where multipliers
-    are lost nothing of them counts, and turns of the parameter only where it changes much.
+    are lost nothing of them counts; see :func:`uncertain_turn` for turns of the parameter.
 
     Parameters
     ----------
@@ -243,11 +257,20 @@ def unresolved(
         found.add("branch point")
     if any(lost(stored) for stored in values):
         found.add("branch point")
-        if min(abs(slope) for slope in slopes) < _FLAT_LOST:
-            found.add("fold")
         if any(float(stored["trivial_error"]) > _LOST for stored in values):
             found |= {"period doubling", "torus"}
     return found
+
+
+def uncertain_turn(
+    slopes: tuple[float, float], values: tuple[Mapping[str, Any], Mapping[str, Any]]
+) -> bool:
+    """Return True if a sign change of the slope between two orbits may be due to round-off.
+
+    Where multipliers are lost, tangents have errors that a small slope may not exceed.
+    """
+    return (any(lost(stored) for stored in values)
+            and min(abs(slope) for slope in slopes) < _FLAT_LOST)
 
 
 def resting(tangents: tuple[Array, Array], width: float) -> set[str]:
@@ -282,16 +305,29 @@ class FloquetTests:
     def note(self, points: Sequence[BranchPoint]) -> str:
         """Where multipliers are lost, if anywhere."""
         places = [point.parameter for point in points if lost(point.values)]
+        folds = [f"{point.parameter:.10g}" for point in points
+                 if point.kind == "fold" and lost(point.values)]
         if not places:
             return ""
-        return (f"Multipliers of {len(places)} orbits are lost in rounding, at parameters from "
-                f"{min(places):.10g} to {max(places):.10g}: nothing is known of their stability, "
-                f"and special points are not sought among them.")
+        said = (f"Multipliers of {len(places)} orbit{'s' if len(places) > 1 else ''} are lost in "
+                f"rounding, at parameters from {min(places):.10g} to {max(places):.10g}: nothing "
+                f"is known of their stability, and of special points only folds are sought among "
+                f"them.")
+        return said if not folds else (
+            f"{said} Beside the fold{'s' if len(folds) > 1 else ''} at {', '.join(folds)} a period "
+            f"doubling may be hidden.")
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
+        return unresolved(self._slopes(tangents), values, tests)
+
+    def uncertain_turn(self, tangents: Any, values: Any) -> bool:
+        """See :func:`fecontact.bifurcation.orbits.floquet.uncertain_turn`."""
+        return uncertain_turn(self._slopes(tangents), values)
+
+    def _slopes(self, tangents: Any) -> tuple[float, float]:
         first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
-        return unresolved((first, last), values, tests)
+        return first, last
 
 
 def require_same(

@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
@@ -21,6 +22,7 @@ from fecontact.bifurcation.orbits.shooting import (
 )
 from fecontact.bifurcation.orbits.starts import Start, from_samples
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.ties import first_largest
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.solvers import SetValued, Solver
 from fecontact.system.fields.vector_field import VectorField
@@ -184,7 +186,7 @@ def _to_fastest(
     if len(last) == 0 or times[last[0]] - times[0] < period:
         return times, states
     speeds = np.linalg.norm(states[last, modes : 2 * modes] / sizes[:modes], axis=1)
-    end = last[np.argmax(speeds)] + 1
+    end = last[first_largest(speeds)] + 1
     return times[:end], states[:end]
 
 
@@ -236,7 +238,7 @@ def doubled(
                              f"out.")
         problem = replace(problem, rtol=how[1], derivative_rtol=how[2])
     twice, start, tangent = _doubled(problem, u)
-    tangent = np.copysign(1.0, direction) * tangent
+    tangent = np.copysign(1.0, direction) * heading(tangent, twice.weights())
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     twice, start, tangent = twice.adapted(start + options.step * tangent, tangent)
     found = continue_branch(twice, start, replace(options, stop_at=[*stops, HALVING]),
@@ -333,7 +335,7 @@ def _doublings_near(
 
 
 def _doubled(problem: ShootingProblem, u: Array) -> tuple[_Doubled, Array, Array]:
-    """The orbit traversed twice, and the unit direction in which its halves separate."""
+    """The orbit traversed twice, and the direction in which its halves separate."""
     starts = problem.starts(u)
     rounds = [run.monodromy for run in ShootingLinearisation(problem, u).runs]
     around = np.eye(starts.shape[1])
@@ -356,4 +358,4 @@ def _doubled(problem: ShootingProblem, u: Array) -> tuple[_Doubled, Array, Array
                      2 * problem.periods, problem.rtol, problem.derivative_rtol,
                      problem.solver)
     tangent = np.concatenate([shape, -shape, np.zeros(problem.common)])
-    return twice, start, tangent / np.sqrt(twice.weights() @ tangent**2)
+    return twice, start, tangent

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.linalg.bordered import open_side, open_solution
 from fecontact.bifurcation.orbits.curves.singularity import at_points
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
+from fecontact.core.ties import first_largest
 
 Array = NDArray[Any]
 Powers = tuple[int, ...]
@@ -146,7 +147,7 @@ class _Closing:
     def critical(self) -> Linear:
         """The critical vector."""
         if abs(self._closing.imag) < _SAME:
-            place = int(np.argmax(np.abs(self._null)))
+            place = first_largest(np.abs(self._null))
             self._null = self._null * np.exp(-1j * np.angle(self._null[place]))
         nothing = np.zeros_like(self._of.x, dtype=complex)
         h, _, _ = self._expanded(nothing, self._null)
