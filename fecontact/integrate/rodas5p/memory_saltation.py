@@ -22,6 +22,9 @@ from fecontact.system.nodes import (
     node_motion,
 )
 
+# Part of the penetration scale within which a penetration is at a level.
+_NEAR = 1e-6
+
 
 @helper
 def _change(row, motion, s):
@@ -34,11 +37,11 @@ def _change(row, motion, s):
 
 
 @helper
-def _passes_level(j, before, after, levels):
-    """Whether the penetration passes one of the ``levels`` (l, n) at which node j touches down."""
-    passes = False
-    for level in levels[:, j]:
-        passes = passes or (before - level) * (after - level) <= 0.0
+def _passes_level(j, before, after, control):
+    """Whether the penetration passes a level at which the normal force of node j may begin."""
+    passes, near = False, _NEAR * control.depth[j]
+    for level in control.levels[:, j]:
+        passes = passes or (before - level) * (after - level) <= 0.0 or abs(before - level) < near
     return passes
 
 
@@ -50,26 +53,10 @@ def _touch(j, step, acceleration, problem, progress, room, vary, row):
     """
     s, v, y = problem.system, vary.variation, room.after
     force, rates = v.inside.force[j], v.inside.rates[j]
-    moved, z = ground_motion(step.latest, s), memory_of(j, y, s)
+    now = min(step.target, step.latest)
+    moved, z = ground_motion(now, s), memory_of(j, y, s)
     before = node_forces(j, node_motion(j, progress.state, s), step.moved, z, s, force, rates)[2]
-    contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)[2]
-    varied, at_level = 0.0, _passes_level(j, before.penetration, contact.penetration,
-                                          problem.control.levels)
-    if vary.width != 0.0:
-        F, _, above = node_forces(j, node_motion(j, y, s), ground_motion(step.latest, vary.above),
-                                  z, vary.above, force, rates)
-        other, _, below = node_forces(j, node_motion(j, y, s), ground_motion(
-            step.latest, vary.below), z, vary.below, force, rates)
-        # The force is zero on one side of the parameter.
-        varied = (above.penetration - below.penetration if at_level else 2.0 * (F - other)) / (
-            vary.width)
-    if at_level:
-        for k in range(len(row)):
-            row[k] = 0.0
-        row[0], row[1] = contact.slope, -1.0
-        if in_space(s):
-            row[4] = contact.slope_across
-        return contact.rate, varied
+    own, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
     for k in range(len(row)):
         row[k] = room.gradients_after.partial[j, 0, k]
     rate = _change(row, node_motion(j, room.rate_after, s), s)
@@ -78,7 +65,24 @@ def _touch(j, step, acceleration, problem, progress, room, vary, row):
     if in_space(s):
         rate -= (row[4] * moved_across(j, moved.speed, moved.second_speed, s)
                  + row[5] * moved_across(j, acceleration[0], acceleration[1], s))
-    return rate, varied
+    # A force that jumps is cut off at a penetration.
+    by_depth = abs(own) > 2.0 * abs(rate) * step.h or _passes_level(
+        j, before.penetration, contact.penetration, problem.control)
+    if by_depth:
+        for k in range(len(row)):
+            row[k] = 0.0
+        row[0], row[1], rate = contact.slope, -1.0, contact.rate
+        if in_space(s):
+            row[4] = contact.slope_across
+    if vary.width == 0.0:
+        return rate, 0.0
+    F, _, above = node_forces(j, node_motion(j, y, s), ground_motion(now, vary.above), z,
+                              vary.above, force, rates)
+    other, _, below = node_forces(j, node_motion(j, y, s), ground_motion(now, vary.below), z,
+                                  vary.below, force, rates)
+    # The force is zero on one side of the parameter.
+    change = above.penetration - below.penetration if by_depth else 2.0 * (F - other)
+    return rate, change / vary.width
 
 
 @routine
