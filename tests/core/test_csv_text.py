@@ -12,10 +12,11 @@ from fecontact.core.files.csv_text import csv_text, read_cell, safe_cell
 from fecontact.sweeps.table import SweepTable, read_table
 
 FORMULAS = ["=1+1", '=HYPERLINK("http://x")', "+cmd", "-2+3", "@SUM(A1)", "\t=1", "'=1", "''@x"]
+CONTROLS = ["pad\x1b[2J\x07", "\x9b2J", r"C:\x1bfolder", r"\x5cx1b", "=\x001", "\x1b=1"]
 TEXTS = ["", "x", "a=b", "'quoted'", "a,b", 'say "no"', "-1.5", "-inf", "+3", "1e-3"]
 
 
-@pytest.mark.parametrize("text", [*FORMULAS, *TEXTS])
+@pytest.mark.parametrize("text", [*FORMULAS, *CONTROLS, *TEXTS])
 def test_cells_read_back_and_none_is_a_formula(text):
     (cell, *rest), = csv.reader(io.StringIO(csv_text([[text, 1]]), newline=""))
     assert rest == ["1"]
@@ -24,6 +25,8 @@ def test_cells_read_back_and_none_is_a_formula(text):
         float(cell)
     except ValueError:
         assert not cell.startswith(("=", "+", "-", "@", "\t", "\r"))
+    assert "\x1b" not in cell
+    assert "\x9b" not in cell
 
 
 def test_numbers_stay_numbers():

@@ -17,7 +17,7 @@ from synthetic import basis, run
 from fecontact import Beam, InputError, generate, read_case, render, write_case, write_mesh
 from fecontact.cli import execute
 from fecontact.core.files import atomic_write
-from fecontact.core.files.atomic_write import clear_leftovers, replaced, replaced_folder
+from fecontact.core.files.atomic_write import clear_leftovers, name_part, replaced, replaced_folder
 from fecontact.io import export_csv, export_pvd
 from fecontact.output.files.hdf5 import new_file
 from fecontact.plot import rendering_problem
@@ -357,3 +357,11 @@ def test_the_mesh_of_a_study_is_not_written_over(tmp_path, capsys):
     assert execute(["mesh", str(tmp_path / "part.toml"), "-o", str(tmp_path)]) == 1
     assert "part.msh is the mesh that the study names" in capsys.readouterr().err
     assert (tmp_path / "part.msh").read_bytes() == before
+
+
+@pytest.mark.parametrize(("name", "part"), [
+    ("pad", "pad"), ("a/b", "a_b"), ("../../up", ".._.._up"), ("x\x1b[2J", "x_[2J"),
+    ('<s>|"', "_s___"), ("\u6f22\u5b57", "\u6f22\u5b57"), ("n" * 1000, "n" * 40)])
+def test_names_of_bodies_in_names_of_files(name, part):
+    """No folder is left or looked for, and no name is too long for a file."""
+    assert name_part(name) == part

@@ -108,7 +108,7 @@ def modes(
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import interfaces_of, read_study
     from fecontact.cli.tables import complex_table, compliance_table
-    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import name_part, output_folder
     from fecontact.core.units import quantity
     from fecontact.reduction.report import BasisReport
 
@@ -125,7 +125,7 @@ def modes(
                 echo(f"\n{name}:")
             touched = tuple(face.name for face in interfaces if name in face.bodies)
             echo(str(BasisReport(one, touched if name else None)))
-            picture = folder / f"{described.name}{'-' * bool(name)}{name}-modes.png"
+            picture = folder / f"{described.name}{'-' * bool(name)}{name_part(name)}-modes.png"
             plot_modes(one, path=picture)
             echo_written(picture)
         if interfaces:

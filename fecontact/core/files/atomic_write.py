@@ -24,6 +24,7 @@ _MARK = b"a file is being written by fecontact\n"
 _NAME = re.compile(r"\..+\.[0-9]+\.part")
 _MOST = 1000  # writers of one name at a time
 _LONGEST = 200  # bytes of the name used for the folder
+_LONGEST_PART = 40  # characters of a name of a body in that of a file
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -278,6 +279,12 @@ def output_folder(folder: Path) -> Iterator[Path]:
         yield folder
     finally:
         _remove_empty(made)
+
+
+def name_part(name: str) -> str:
+    """Part of the name of a file from any name: what file systems do not allow becomes ``_``."""
+    allowed = "".join(letter if letter.isprintable() else "_" for letter in name)
+    return re.sub(r'[/\\:*?"<>|]', "_", allowed)[:_LONGEST_PART]
 
 
 def write_text(path: Path, text: str) -> None:

@@ -142,6 +142,8 @@ def _passage(
     def rates(state: Array) -> Array:
         out = np.empty(len(y))
         kernels.right_hand_side(time, state, arrays, out)
+        # Steps carry the derivatives of internal variables over the passage themselves.
+        out[2 * m :] = 0.0
         return out
 
     # Both sides up to the level.

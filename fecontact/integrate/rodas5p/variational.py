@@ -31,6 +31,7 @@ from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
+from fecontact.integrate.rodas5p.memory_saltation import switch_memory
 from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, SIZE, SystemArrays, ground_motion
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
@@ -243,6 +244,9 @@ def _largest_error(scale, v):
             before = max(before, abs(v.columns[c, k]) / scale[k])
             after = max(after, abs(v.after[c, k]) / scale[k])
             error = max(error, abs(last[k]) / scale[k])
+            # Comparisons with NaN are false.
+            if not abs(v.after[c, k]) < np.inf:
+                return np.inf
         size = max(before, after)
         v.norms[1, c] = max(v.norms[0, c], size)
         if error > 0.0:
@@ -299,6 +303,8 @@ def propagate(
             columns.one_by_one(i, step.h, G, s, blocks, gradients, reduced, forced, varies, v)
         else:
             columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
+    if size > 2 * m:
+        switch_memory(step, acceleration, problem, progress, room, vary)
     return _largest_error(room.right, v)
 
 

@@ -28,6 +28,8 @@ from fecontact.system.space_nodes import contact_in_space, laws_of
 _LARGE = 2000
 # Differences are taken over this part of the scales of the laws.
 _PART = 1e-4
+# Shorter ones, as of internal variables that have decayed, would overflow the quotients.
+_SHORTEST = 1e-200
 # Differences of larger parts of the usual size of a derivative are jumps.
 _JUMP = 3.0 * _PART
 # The same of differences to parameters, which may be a tenth of the smoothing of friction wide.
@@ -79,7 +81,10 @@ def set_paths(step, acceleration, s, blocks, stages, v):
 
 @helper
 def _reach(direction, j, control, v):
-    """Distance along a direction that is small against the law's scale, and against the stages."""
+    """Distance along a direction that is small against the law's scale, and against the stages.
+
+    Zero where no stage moves the node.
+    """
     motions = v.inside.partial.shape[2]
     reach = 0.0
     for i in range(tableau.STAGES):
@@ -91,7 +96,7 @@ def _reach(direction, j, control, v):
     elif direction >= motions:
         states = v.paths.shape[1] - motions
         reach = min(reach, control.memory_scale[j * states + direction - motions])
-    return _PART * reach
+    return _PART * reach if _PART * reach > _SHORTEST else 0.0
 
 
 @helper

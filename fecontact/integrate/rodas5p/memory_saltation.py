@@ -1,0 +1,116 @@
+r"""Derivatives of internal variables of friction where nodes touch down and lift off.
+
+Internal variables z of an open node decay to zero within 1e-7 s, and their derivatives with them.
+A node touches down where its penetration passes a level e, or where its normal force e begins
+because a dashpot had kept it from acting. A motion beside it, whose e differs by de, touches down
+earlier by de / e', and z follows its rate z' in contact for so much longer (saltation):
+
+.. math:: dz = z'\, de / e', \qquad de = \nabla e \cdot dy + (\partial e / \partial p) dp
+
+Elastic Coulomb elements do not decay; :mod:`fecontact.integrate.rodas5p.sliders` has theirs.
+"""
+
+from fecontact.core.compiled import helper, routine
+from fecontact.integrate.rodas5p import tableau
+from fecontact.system.kernels import node_forces
+from fecontact.system.nodes import (
+    ground_motion,
+    in_space,
+    memory_of,
+    moved_across,
+    moved_along,
+    node_motion,
+)
+
+# Part of the penetration scale within which a penetration is at a level.
+_NEAR = 1e-6
+
+
+@helper
+def _change(row, motion, s):
+    """Change of a quantity of a node by its motion, with the derivatives ``row`` to it."""
+    change = (row[0] * motion.along + row[1] * motion.height + row[2] * motion.along_rate
+              + row[3] * motion.height_rate)
+    if in_space(s):
+        change += row[4] * motion.across + row[5] * motion.across_rate
+    return change
+
+
+@helper
+def _passes_level(j, before, after, control):
+    """Whether the penetration passes a level at which the normal force of node j may begin."""
+    passes, near = False, _NEAR * control.depth[j]
+    for level in control.levels[:, j]:
+        passes = passes or (before - level) * (after - level) <= 0.0 or abs(before - level) < near
+    return passes
+
+
+@routine
+def _touch(j, step, acceleration, problem, progress, room, vary, row):
+    """Rate e' and derivative to the parameter of what begins the force of node j in a step.
+
+    Fills ``row`` with the derivatives of e to the motion of the node.
+    """
+    s, v, y = problem.system, vary.variation, room.after
+    force, rates = v.inside.force[j], v.inside.rates[j]
+    now = min(step.target, step.latest)
+    moved, z = ground_motion(now, s), memory_of(j, y, s)
+    before = node_forces(j, node_motion(j, progress.state, s), step.moved, z, s, force, rates)[2]
+    own, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+    for k in range(len(row)):
+        row[k] = room.gradients_after.partial[j, 0, k]
+    rate = _change(row, node_motion(j, room.rate_after, s), s)
+    rate -= (row[0] * moved_along(j, moved.speed, moved.second_speed, s)
+             + row[2] * moved_along(j, acceleration[0], acceleration[1], s))
+    if in_space(s):
+        rate -= (row[4] * moved_across(j, moved.speed, moved.second_speed, s)
+                 + row[5] * moved_across(j, acceleration[0], acceleration[1], s))
+    # A force that jumps is cut off at a penetration.
+    by_depth = abs(own) > 2.0 * abs(rate) * step.h or _passes_level(
+        j, before.penetration, contact.penetration, problem.control)
+    if by_depth:
+        for k in range(len(row)):
+            row[k] = 0.0
+        row[0], row[1], rate = contact.slope, -1.0, contact.rate
+        if in_space(s):
+            row[4] = contact.slope_across
+    if vary.width == 0.0:
+        return rate, 0.0
+    F, _, above = node_forces(j, node_motion(j, y, s), ground_motion(now, vary.above), z,
+                              vary.above, force, rates)
+    other, _, below = node_forces(j, node_motion(j, y, s), ground_motion(now, vary.below), z,
+                                  vary.below, force, rates)
+    # The force is zero on one side of the parameter.
+    change = above.penetration - below.penetration if by_depth else 2.0 * (F - other)
+    return rate, change / vary.width
+
+
+@routine
+def switch_memory(step, acceleration, problem, progress, room, vary):
+    """Set the columns of internal variables of nodes that are open at the end of a step.
+
+    So are those of nodes that touch down in it. ``acceleration`` is that of the ground's motions.
+    """
+    s, v = problem.system, vary.variation
+    n, m = len(s.gap), len(v.none)
+    states, columns = v.inside.rates.shape[1], len(v.columns)
+    for j in range(n):
+        opened = room.nodes[2, n + j] == 0.0
+        if s.memory[j] == 0 or problem.control.slider_counts[j] > 0 or not (
+                opened or progress.signs[j] == 0):
+            continue
+        first, row = 2 * m + j * states, v.inside.partial[j, 0]
+        rate, varied = 1.0, 0.0
+        if not opened:
+            rate, varied = _touch(j, step, acceleration, problem, progress, room, vary, row)
+        for c in range(columns):
+            earlier = 0.0
+            if not opened:
+                earlier = _change(row, node_motion(j, v.after[c], s), s)
+                if c == columns - 1:
+                    earlier += varied
+                earlier /= rate
+            last = v.stages[tableau.STAGES * c + tableau.STAGES - 1]
+            for k in range(first, first + s.memory[j]):
+                v.after[c, k] = earlier * room.rate_after[k] if not opened else 0.0
+                last[k] = 0.0
