@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.reduction.modal_basis import ModalBasis
@@ -23,6 +24,7 @@ _RATES = ("", "/s", "/s^2")
 _CHUNK = 2_000_000  # matrix entries processed at a time
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Receptance:
     """Complex response to harmonic forces, ``response = values . force exp(i w t)``.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.contact_quantities import ContactQuantities
@@ -59,6 +60,7 @@ def output_part(t: Array, t_start: float | None, t_end: float | None) -> slice:
     return chosen
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Energies:
     """Energies, work put in and energy lost, each (N,) [J]; work and losses count from the start.
@@ -152,6 +154,7 @@ class Energies:
         return error / max(float(np.abs(term).max()) for term in self.terms.values())
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Results of a solver at N output times; of a run that ended early, also the last state.
@@ -191,6 +194,7 @@ class Solution:
     events: Events | None = None
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(ContactQuantities, Summarised):
     """Motion of a contact system at N output times.
