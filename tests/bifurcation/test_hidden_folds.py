@@ -100,9 +100,9 @@ def test_folds_of_doubled_orbits_of_the_friction_oscillator():
     for fold, place in zip(branch.of_kind("fold"), expected, strict=True):
         assert abs(fold.parameter - place) <= 1.5 * fold.parameter_error + 2e-11
         assert fold.parameter_error < 1e-8
-    # Each is where the parameter turns.
+    # Each is where the parameter turns; points next to it are known to 1e-10 alone.
     for index, point in enumerate(branch.points):
         if point.kind == "fold":
-            before, after = (branch.points[at].parameter for at in (index - 1, index + 1))
+            before, after = (branch.points[at].parameter for at in (index - 3, index + 3))
             assert (before - point.parameter) * (after - point.parameter) > 0.0
     assert "Multipliers of " in branch.message
