@@ -206,6 +206,22 @@ def test_scipy_agrees_with_the_exact_solution():
     assert np.abs(run.states[:, :2] - exact_motion(springs, limits, times)).max() < 1e-5
 
 
+def test_scipy_returns_elements_of_every_node():
+    """Two masses: one at rest, and that of the exact solution on the second node."""
+    _, springs, limits = LAWS["jenkins"]
+    rows = np.zeros((2, 3, 2))
+    rows[0, 0, 0] = rows[1, 0, 1] = 1.0
+    basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows, "B": rows[1]})
+    system = fc.ContactSystem(
+        basis, normal=PrescribedForce((1.0, 1.0)), friction=JenkinsFriction((0.5, 0.5), 1.0),
+        drive=fc.Drive(stiffness_x=K, damping_x=C, amplitude_x=1.0, angular_frequency=W))
+    times = np.linspace(0.0, 5.0 * T, 101)
+    exact = exact_motion(springs, limits, times)[:, 0]
+    run = fc.simulate(system, times[-1], outputs=times, rtol=1e-7, solver=fc.integrate.Scipy())
+    assert np.abs(run.displacement(1)[:, 0] - exact).max() < 1e-5 * np.abs(exact).max()
+    assert np.abs(run.displacement(0)).max() < 1e-9
+
+
 def test_shooting_finds_the_settled_amplitude():
     bifurcation = fc.bifurcation
     system = mass(JenkinsFriction(0.5, 1.0))
