@@ -55,7 +55,7 @@ def beam(folder: Path) -> dict[str, Path]:
     picture(run, made["beam_on_wavy_ground"], time=SHOWN_AT, size=how.size, colour=how.colour,
             scale=how.scale, title=how.title)
     plot_contact_map(run, path=made["contact_map"])
-    page = report(run, folder / "run.html", title=how.title, study=study.to_toml())
+    page = report(run, folder / "run.html", title=how.title, study=study.to_toml(defaults=False))
     if not _photographed(page, made["report"]):
         del made["report"]
     return made
@@ -73,7 +73,7 @@ def solid(folder: Path) -> dict[str, Path]:
     made = {name: folder / f"{name}.png" for name in ("solid_on_belt", "report-solid")}
     picture(run, made["solid_on_belt"], time=0.45 * run.time[-1], size=how.size,
             colour="von_mises", scale=how.scale, title=how.title)
-    page = report(run, folder / "run.html", title=how.title, study=study.to_toml())
+    page = report(run, folder / "run.html", title=how.title, study=study.to_toml(defaults=False))
     if not _photographed(page, made["report-solid"], "below"):
         del made["report-solid"]
     return made

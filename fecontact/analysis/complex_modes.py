@@ -8,6 +8,7 @@ from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.complex_modes import ComplexModes as ComplexModes
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.linearised import linearised
 from fecontact.system.quasistatic.prestressed_modes import prestressed_modes as prestressed_modes
 
 
@@ -24,7 +25,9 @@ def complex_modes(
     dashpots of its drive and the Jacobian of the contact. Skew parts, of friction in the
     contact, of damping that rotates or of Coriolis forces, make the shapes complex: the points of
     the body do not move in phase, and a movie (:func:`fecontact.plot.render_mode`) shows
-    travelling waves.
+    travelling waves. Elastic Coulomb elements (Jenkins, Iwan) are springs where they stick, and
+    their forces follow the limit where they slide: their deflections are no states, and their
+    entries in the shapes are zero. In space those across the direction of sliding are states.
 
     Parameters
     ----------
@@ -47,7 +50,8 @@ def complex_modes(
     if linearised_at is not None:
         if not isinstance(body, ContactSystem):
             raise InputError("A modal basis has no contact to be linearised; give a ContactSystem.")
-        return ComplexModes.of(body.jacobian(time, initial_state(body, linearised_at, time)))
+        matrix, within = linearised(body, time, initial_state(body, linearised_at, time))
+        return ComplexModes.of(matrix, within=within)
     if isinstance(body, ContactSystem):
         stiffness, damping = body.arrays.stiffness, body.arrays.damping
     else:

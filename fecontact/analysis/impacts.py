@@ -11,6 +11,7 @@ from fecontact.analysis.contact_phases import ContactMotion, Nodes
 from fecontact.analysis.periodicity import drive_period
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_not_negative, require_positive
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 
@@ -19,6 +20,7 @@ _PARTS = 0.5 + 0.5 * np.array([-1.0, -math.sqrt(3.0 / 7.0), 0.0, math.sqrt(3.0 /
 _WEIGHTS = np.array([0.05, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 0.05])
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Impacts:
     """Contact phases in the order of their touch-down, each (k,).

@@ -11,6 +11,7 @@ from fecontact.analysis.histories import Point
 from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
@@ -32,6 +33,7 @@ def drive_period(system: ContactSystem) -> float:
     return 1.0 / frequency
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Strobe:
     """States of a motion on a Poincare section: once per period, or at maxima of a displacement.

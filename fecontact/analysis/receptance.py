@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.linearised import linearised
 
 Place = tuple[str | int, str]
 Kind = Literal["receptance", "mobility", "accelerance"]
@@ -22,6 +24,7 @@ _RATES = ("", "/s", "/s^2")
 _CHUNK = 2_000_000  # matrix entries processed at a time
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Receptance:
     """Complex response to harmonic forces, ``response = values . force exp(i w t)``.
@@ -142,11 +145,10 @@ def receptance(
         if not isinstance(body, ContactSystem):
             raise InputError("A modal basis has no contact to be linearised; give a ContactSystem.")
         state = initial_state(body, linearised_at, 0.0)
-        matrix = body.jacobian(0.0, state)
-        into = np.zeros((len(matrix), len(inputs)))
-        into[m : 2 * m] = pushed.T
-        out = np.zeros((len(outputs), len(matrix)))
-        out[:, :m] = seen
+        jacobian, within = linearised(body, 0.0, state)
+        matrix = within.T @ jacobian @ within
+        into = within[m : 2 * m].T @ pushed.T
+        out = seen @ within[:m]
         terms: tuple[Array, Array, Array | None] = (-matrix, np.eye(len(matrix)), None)
         growing = _growing(matrix)
     else:

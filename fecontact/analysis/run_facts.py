@@ -6,7 +6,7 @@ from fecontact.core.units import quantity
 from fecontact.integrate.contact_quantities import ContactState
 from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
-from fecontact.reduction.assembly.contact_faces import contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
 
 ROUGH_SLOPE = 0.3  # of the ground, above which friction along x is a rough assumption
 
@@ -28,14 +28,13 @@ def run_facts(trajectory: Trajectory) -> list[tuple[str, str]]:
 
 
 def _contact_rows(trajectory: Trajectory) -> list[tuple[str, str]]:
-    """Shares of the contact states, of several bodies for each interface with its nodes."""
+    """Bodies, if there are several, and shares of the contact states, for each interface."""
     basis = trajectory.system.basis
-    faces = contact_faces(basis)
-    if not faces[0].name:
-        shares = contact_shares(trajectory)
+    if not several_bodies(basis):
+        shares = contact_shares(trajectory) if basis.contact_nodes else {}
         return [(f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()]
     rows = [("bodies", dict(basis.summary()).get("bodies", "1"))]
-    for face in faces:
+    for face in contact_faces(basis) if basis.contact_nodes else ():
         if face.spring:
             force = np.abs(trajectory.normal_force[:, face.nodes]).max()
             rows.append((face.title, f"nonlinear spring, at most {quantity(float(force), 'N')}"))

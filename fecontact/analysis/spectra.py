@@ -8,6 +8,7 @@ import numpy as np
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.magnitude import magnitude
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 
 _EVEN = 1e-6  # largest deviation of times from even spacing, relative to the spacing
@@ -26,6 +27,7 @@ class Peak(NamedTuple):
     value: float
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """One-sided spectrum of a real history.
@@ -75,6 +77,7 @@ class Spectrum:
         return found
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Spectrogram:
     """Amplitude spectra of successive segments of a history.

@@ -45,7 +45,7 @@ def write_branch_results(
     from fecontact.output.plots.bifurcation_diagram import plot_branches
     from fecontact.output.plots.stability import plot_eigenvalues
     from fecontact.output.report.branch_report import report_branches
-    from fecontact.study.study import without_defaults
+    from fecontact.study.study import with_given_keys
 
     files = [write_branches(folder / f"{name}-branch.h5", result.found, study=study, root=root,
                             system=result.contact_field.system())]
@@ -56,11 +56,11 @@ def write_branch_results(
     show = wanted.show if beneath is None else "section"
     files.append(folder / f"{name}-branch.png")
     plot_branches(
-        several, f"observed_{show}", y_label=_label(show, *result.observe),
-        names=list(result.found), beneath=beneath, observe=result.observe, path=files[-1])
+        several, f"observed_{show}", names=list(result.found), beneath=beneath,
+        observe=result.observe, path=files[-1])
     files.append(report_branches(
         result.found, result.contact_field, folder / f"{name}-branch.html", observe=result.observe,
-        y=f"observed_{show}", title=name, study=without_defaults(study),
+        y=f"observed_{show}", title=name, study=with_given_keys(study),
         usable_hz=usable_hz))
     if wanted.kind != "orbits":
         files.append(folder / f"{name}-stability.png")
@@ -158,9 +158,3 @@ def _what_changes(point: BranchPoint) -> str:
     criticality = point.criticality or ""
     return _BORN.get(criticality, "") if isinstance(point, HopfPoint) else criticality
 
-
-def _label(show: str, point: str | int, component: str) -> str:
-    what = {"maximum": "largest displacement", "minimum": "smallest displacement",
-            "amplitude": "amplitude", "section": "displacement once per period,"}[show]
-    where = point if isinstance(point, str) else f"contact node {point}"
-    return f"{what} {component} of {where} [m]"

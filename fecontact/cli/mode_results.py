@@ -112,14 +112,14 @@ def write_mode_results(
     from fecontact.output.files.branches import write_mode
     from fecontact.output.plots.responses.nonlinear_modes import plot_nonlinear_mode
     from fecontact.output.report.mode_report import report_modes
-    from fecontact.study.study import without_defaults
+    from fecontact.study.study import with_given_keys
 
     system, text, name = study.system(), study.to_toml(), f"{study.name}-mode-{mode.number}"
     files = [folder / f"{name}.{ending}" for ending in ("h5", "csv", "png", "html")]
     write_mode(files[0], mode, system=system, study=text, root=study.folder)
     write_text(files[1], mode_csv(mode))
     plot_nonlinear_mode(mode, path=files[2])
-    report_modes(mode, system, files[3], observe=observe, study=without_defaults(text),
+    report_modes(mode, system, files[3], observe=observe, study=with_given_keys(text),
                  title=f"{study.name}, nonlinear mode {mode.number}")
     return files
 

@@ -194,7 +194,7 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
     from fecontact.output.report.branch_report import report_branches
     from fecontact.output.report.mode_report import report_modes
     from fecontact.output.report.response_report import report_response
-    from fecontact.study.study import without_defaults
+    from fecontact.study.study import with_given_keys
 
     named, model = read_branches(file), read_model(file, trust)
     first = next(iter(named.values()))
@@ -207,13 +207,13 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
         shown: Any = (response_of(named) if "level" in first.attributes
                       else [mode_of(one) for one in named.values()])
         return Path(write(shown, model.system, target, title=title, observe=(place, component),
-                          study=without_defaults(model.study)))
+                          study=with_given_keys(model.study)))
     settings = tomllib.loads(model.study or "").get("branch", {})
     basis, point = model.system.basis, settings.get("point")
     if point is None:
         point = usual_point(basis)
     return report_branches(named, field_of(first, model), target, title=title,
-                           study=without_defaults(model.study),
+                           study=with_given_keys(model.study),
                            observe=(point, settings.get("component", "x")),
                            y=f"observed_{settings.get('show', 'maximum')}")
 

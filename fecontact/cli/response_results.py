@@ -43,16 +43,16 @@ def write_response_results(
     """
     from fecontact.output.plots.responses.response import plot_response
     from fecontact.output.report.response_report import report_response
-    from fecontact.study.study import without_defaults
+    from fecontact.study.study import with_given_keys
 
     name = f"{study.name}-response"
     files = [keep_response(study, response, folder),
              *(folder / f"{name}.{ending}" for ending in ("csv", "png", "html"))]
     usable = study.usable_hz
     write_text(files[1], response_csv(response, usable))
-    plot_response(response, system=study.system(), usable_hz=usable, path=files[2])
+    plot_response(response, usable_hz=usable, path=files[2])
     report_response(response, study.system(), files[3], observe=observe, title=study.name,
-                    study=without_defaults(study.to_toml()), usable_hz=usable)
+                    study=with_given_keys(study.to_toml()), usable_hz=usable)
     return files
 
 
@@ -104,8 +104,7 @@ def response_table(
     unit = "rad" if response.observed.rpartition(" ")[2].startswith("phi") else "m"
     # An angular frequency is told in Hz; the frequency of the response is then the same.
     over_frequency = response.parameter_name.endswith("angular_frequency")
-    name, texts = ("", [""]) if response.level_name is None else level_texts(
-        response.level_name, response.levels, system)
+    name, texts = ("", [""]) if response.level_name is None else level_texts(response)
     rows = []
     for level, branch in enumerate(response.branches):
         amplitude, peak = response.amplitude(level), response.peak(level)

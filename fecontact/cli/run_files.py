@@ -345,11 +345,11 @@ def movie(
 def write_report(stored: StoredRun, name: str, target: Path) -> Path:
     """Write the report of a run, with title, points and magnification as its study has them."""
     from fecontact.output.report.run_report import report
-    from fecontact.study.study import without_defaults
+    from fecontact.study.study import with_given_keys
 
     output = tomllib.loads(stored.study or "").get("output", {})
     return report(stored.trajectory, target, title=stored.settings.title or name,
-                  study=without_defaults(stored.study), points=tuple(output.get("points", ())),
+                  study=with_given_keys(stored.study), points=tuple(output.get("points", ())),
                   scale=stored.settings.scale, versions=stored.versions or None)
 
 

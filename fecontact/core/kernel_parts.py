@@ -6,21 +6,32 @@ called anew in each caller. A part is left as intermediate code, and optimised w
 
 from collections.abc import Callable
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 from llvmlite.binding import Linkage, parse_assembly
+from numba import types
 from numba.core import ir
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.ir_utils import build_definitions, mk_unique_var
 from numba.core.registry import CPUDispatcher
+from numba.core.typeconv.rules import default_type_manager
 from numba.core.untyped_passes import FixupArgs
 
 from fecontact.core.records import holds_arrays
 from fecontact.core.references import borrowed
 
 _NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+# Kernels are compiled for writeable arrays. Python may hand them read-only ones of results too, to
+# which they must not write; without a conversion numba would refuse them as another type.
+for _kind, _dimensions in product(
+        (types.float64, types.int64, types.int32, types.complex128, types.boolean), range(1, 5)):
+    _array = types.Array(_kind, _dimensions, "C")
+    default_type_manager.set_unsafe_convert(_array.copy(readonly=True), _array)
 
 
 class _NoMachineCode:

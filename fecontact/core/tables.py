@@ -177,7 +177,8 @@ def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
     instance : Any
         A dataclass instance.
     defaults : bool
-        Whether to include fields that have their default value; those that are None are left out.
+        Whether to include fields that have their default value, also of dataclasses within; those
+        that are None are left out.
     """
     name = _kinds.name_of(instance)
     table: dict[str, Any] = {} if name is None else {"law": name}
@@ -185,8 +186,32 @@ def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
         value = getattr(instance, entry.name)
         default = entry.default_factory() if callable(entry.default_factory) else entry.default
         if value is not None and (defaults or default is MISSING or value != default):
-            table[entry.name] = plain(value)
+            table[entry.name] = plain(value, defaults=defaults)
     return table
+
+
+def key_tree(table: Any) -> Any:
+    """Return a table with None in place of values, also in tables and lists of tables within."""
+    if isinstance(table, Mapping):
+        return {str(key): key_tree(value) for key, value in table.items()}
+    if isinstance(table, list | tuple) and any(isinstance(item, Mapping) for item in table):
+        return [key_tree(item) for item in table]
+    return None
+
+
+def with_keys(some: Any, every: Any, keys: Any) -> Any:
+    """Return table ``some`` with those further keys of table ``every`` that are in ``keys``.
+
+    ``keys`` is what :func:`key_tree` returns; the order is that of ``every``.
+    """
+    if isinstance(every, dict) and isinstance(keys, Mapping):
+        some = some if isinstance(some, dict) else {}
+        return {name: with_keys(some.get(name), value, keys.get(name))
+                for name, value in every.items() if name in some or name in keys}
+    if isinstance(every, list) and isinstance(keys, list) and len(every) == len(keys):
+        some = some if isinstance(some, list) else [None] * len(every)
+        return [with_keys(*items) for items in zip(some, every, keys, strict=True)]
+    return every if some is None else some
 
 
 def require_known(key: str, valid: Mapping[str, Any] | Sequence[str], where: str) -> None:
@@ -339,14 +364,18 @@ def _words(hint: Any, plural: bool) -> list[str]:
     return [f"{'tables' if plural else 'a table'} of {content}"]
 
 
-def plain(value: Any) -> Any:
-    """A value for TOML: dataclasses and mappings as tables, sequences as lists."""
+def plain(value: Any, *, defaults: bool = True) -> Any:
+    """A value for TOML: dataclasses and mappings as tables, sequences as lists.
+
+    Without ``defaults``, fields of dataclasses that have their default value are left out.
+    """
     if is_dataclass(value) and not isinstance(value, type):
-        return to_table(value)
+        return to_table(value, defaults=defaults)
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items() if item is not None}
+        return {str(key): plain(item, defaults=defaults) for key, item in value.items()
+                if item is not None}
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
+        return [plain(item, defaults=defaults) for item in value]
     return value

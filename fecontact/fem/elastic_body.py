@@ -16,6 +16,7 @@ from fecontact.core.errors import (
     require_finite,
     require_positive,
 )
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, quantity, span
@@ -79,6 +80,7 @@ class Material:
 _MATERIALS = {"steel": (2.1e11, 0.3, 7850.0), "aluminium": (7.0e10, 0.33, 2700.0)}
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class ElasticBody(Summarised):
     """A linear elastic body, plane or solid, of quadratic (or linear) finite elements.

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.checks import as_place
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity, span
 from fecontact.fem.elastic_body import ElasticBody
@@ -16,6 +17,7 @@ from fecontact.fem.elements.refinement import PARTS
 from fecontact.fem.interpolation import element_kind, interpolation
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class BodyFields(Summarised):
     """Displacement and stress over a body in one state.

@@ -9,6 +9,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, MeshError, choices, nearest
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
 from fecontact.fem.elements.cell_geometry import (
@@ -25,6 +26,7 @@ from fecontact.fem.elements.refinement import refined
 _FLAT = 1e-12  # area of a degenerate cell, relative to its squared sides
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Summarised):
     """A mesh of a plane body or of a solid, with named boundaries and points.

@@ -15,6 +15,7 @@ from fecontact.core.errors import (
     require_not_negative,
     require_positive,
 )
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.fem.contact_face import check_faces_down, face_nodes, face_segments
@@ -43,6 +44,7 @@ _COUNT = "pair_faces: nodes"
 _FINER = 0.999  # ratio of spacings from which a face is finer than another
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class Pairing(Summarised):
     """Contact nodes on a face of one body, each with its foot on another body or on the ground.
@@ -95,6 +97,7 @@ class Pairing(Summarised):
         return (self,)
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class TwoPassPairing(Summarised):
     """Two faces paired twice, with contact nodes on either; one interface.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, count, listed, quantity
 from fecontact.fem.face_curve import Closest, Face
@@ -15,6 +16,7 @@ SAME = 1e-9  # of an edge: gaps and lengths below this are round-off
 _TINY = 1e-12  # [m], less than an atom: shown as zero
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class PairingReport(Summarised):
     """What came of the pairing of two faces.

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.laws.wear import WearLaw
 from fecontact.system import kernels
@@ -22,6 +23,7 @@ class ContactState(IntEnum):
     SLIP = 2
 
 
+@read_only_arrays
 class ContactQuantities:
     """What follows at the contact nodes from states, or is held by a run of set-valued contact."""
 

@@ -20,6 +20,7 @@ from fecontact.core.checks import as_count, as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike, Integers
@@ -42,6 +43,7 @@ from fecontact.system.forcing_period import forcing_period
 _MOST_PERIODS = 10**15
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(Summarised):
     """States of E runs at K times each.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_flags
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import InputError, choices, nearest, require_choice, require_finite
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.event_kernels import EVENT, FIRST_OWN
 from fecontact.reduction.modal_basis import COMPONENTS, Component
@@ -211,6 +212,7 @@ def quantity_row(
     return row
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Events:
     """Events of a run in chronological order.

@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.collocation.room import chosen_collocation
@@ -46,6 +47,7 @@ _SLIDERS = 1e-4
 _BETWEEN = 16
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
     """A motion at K times, and its derivatives.

@@ -3,7 +3,7 @@
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from numbers import Real
 from typing import Any, overload
 
@@ -192,7 +192,7 @@ def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
                            if (value := getattr(run, name)) is not None})
     with np.errstate(over="ignore", invalid="ignore"):
         energies = part.energies
-        amounts = np.array([getattr(energies, entry.name) for entry in fields(energies)])
+        amounts = np.array(list(energies.terms.values()))
         if not (np.isfinite(amounts).all() and np.isfinite(part.normal_force).all()
                 and np.isfinite(part.friction_forces).all()
                 and np.isfinite(run.states).all() and np.isfinite(run.work).all()):
@@ -214,7 +214,7 @@ def _warn_of_active_friction(run: Trajectory, rtol: float) -> None:
     j = int(given.argmax())
     exchanged = np.trapezoid(np.abs(run.slip_power), run.time, axis=0)
     if (given[j] > max(_GIVEN, 1e3 * rtol) * exchanged.max()
-            and given[j] > rtol * run.energies.stored.max()):
+            and given[j] > max(rtol * run.energies.stored.max(), run.energies.rounding)):
         law = next(law for nodes, _, law in run.system.law_groups("friction")
                    if nodes.start <= j < nodes.stop)
         warnings.warn(f"{type(law).__name__} gave {given[j]:.3g} J to the motion at contact node "

@@ -1,6 +1,6 @@
 """Results of a run: modal histories and quantities derived from them."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
 from numbers import Real
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.contact_quantities import ContactQuantities
@@ -59,6 +60,7 @@ def output_part(t: Array, t_start: float | None, t_end: float | None) -> slice:
     return chosen
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Energies:
     """Energies, work put in and energy lost, each (N,) [J]; work and losses count from the start.
@@ -82,6 +84,8 @@ class Energies:
     modal_damping, dashpots, contact_damping, friction : (N,) arrays
         Lost: in the modes, in the dashpots at B, in the contact's normal damping, by friction
         between body and ground.
+    rounding : float
+        Largest error of the balance that rounding of forces and places may leave [J].
     """
 
     kinetic: Array
@@ -99,6 +103,13 @@ class Energies:
     dashpots: Array
     contact_damping: Array
     friction: Array
+    rounding: float = 0.0
+
+    @property
+    def terms(self) -> dict[str, Array]:
+        """All energies, works and losses by name, each (N,) [J]."""
+        return {one.name: getattr(self, one.name) for one in fields(self)
+                if one.name != "rounding"}
 
     @property
     def stored(self) -> Array:
@@ -118,15 +129,16 @@ class Energies:
 
     @property
     def imbalance(self) -> float:
-        """Largest error of the balance of energies, relative to the largest energy in it."""
-        error = float(np.abs(self._unexplained).max())
-        return error / self._scale if self._scale > 0.0 else 0.0
+        """Largest error of the balance of energies, relative to the largest energy in it.
+
+        Zero within rounding.
+        """
+        return self._relative(float(np.abs(self._unexplained).max()))
 
     @property
     def growth(self) -> float:
         """Largest gain that the balance does not explain, relative to the largest energy in it."""
-        error = max(float(self._unexplained.max()), 0.0)
-        return error / self._scale if self._scale > 0.0 else 0.0
+        return self._relative(max(float(self._unexplained.max()), 0.0))
 
     @property
     def _unexplained(self) -> Array:
@@ -135,12 +147,14 @@ class Energies:
             put_in = self.work - self.lost
             return self.stored - self.stored[0] - (put_in - put_in[0])
 
-    @property
-    def _scale(self) -> float:
-        terms = [getattr(self, name) for name in self.__dataclass_fields__]
-        return max(float(np.abs(term).max()) for term in terms)
+    def _relative(self, error: float) -> float:
+        """Error [J] over the largest energy; 0 within rounding."""
+        if error <= self.rounding < np.inf:
+            return 0.0
+        return error / max(float(np.abs(term).max()) for term in self.terms.values())
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Results of a solver at N output times; of a run that ended early, also the last state.
@@ -180,6 +194,7 @@ class Solution:
     events: Events | None = None
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(ContactQuantities, Summarised):
     """Motion of a contact system at N output times.
@@ -349,4 +364,27 @@ class Trajectory(ContactQuantities, Summarised):
                                                       "load", "circulatory")},
             **{name: put[name] for name in ("modal_damping", "dashpots", "contact_damping",
                                             "friction")},
+            rounding=self._rounding(),
         )
+
+    def _rounding(self) -> float:
+        """Energy that rounding of the largest modal forces p leaves undetermined [J].
+
+        It is eps p (q + a), with the largest q of each modal displacement and what the force would
+        move in the time T of the run, a = p min(T^2 / 2, 2 / w^2), and the energy of the contact at
+        the rounding of places.
+        """
+        system, arrays = self.system, self.system.arrays
+        force = np.abs(arrays.constant_load)
+        springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
+        for rows, signals in ((springs, system.drive.motions),
+                              (arrays.load_shapes, system.load.signals.values())):
+            for row, signal in zip(rows, signals, strict=False):
+                force = force + signal.largest * np.abs(row)
+        stiffness = np.abs(np.diag(arrays.stiffness))
+        compliance = np.full(len(force), 0.5 * float(self.time[-1] - self.time[0]) ** 2)
+        np.divide(2.0, stiffness, out=compliance, where=compliance * stiffness > 2.0)
+        eps, largest = np.finfo(float).eps, np.abs(self.modal_coordinates).max(axis=0)
+        depth = eps * np.abs(system.basis.contact_T) @ largest
+        pressed = system.stored_energy(depth.max(axis=1)[None])
+        return float(eps * force @ (largest + compliance * force) + pressed[0])

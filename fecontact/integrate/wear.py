@@ -15,6 +15,7 @@ from fecontact.core.errors import (
     require_positive,
 )
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.initial_state import Initial, initial_state
@@ -30,6 +31,7 @@ from fecontact.system.forcing_period import forcing_period
 _UNEVEN = 0.5
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class WearHistory(Summarised):
     """Wear of a contact face over B blocks of cycles.

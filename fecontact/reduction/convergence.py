@@ -7,12 +7,14 @@ import numpy as np
 
 from fecontact.core.checks import as_count, require_kind
 from fecontact.core.progress import counting_bar, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.report import BasisReport
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class ModeConvergence:
     """Effect of mesh refinement and of further modes; ``str(...)`` is a table.

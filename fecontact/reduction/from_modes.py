@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.eigenmodes import fixed_signs
@@ -18,6 +19,7 @@ from fecontact.reduction.restriction import stack_restriction
 _EQUAL = 1e-4
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Normalisation:
     """Scaling and mass-orthogonality of mode shapes.

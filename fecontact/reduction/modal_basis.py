@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Summarised, count, listed, quantity, span
 from fecontact.fem.faces.frames import tangents_of
@@ -27,6 +28,7 @@ Component = Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"]
 COMPONENTS = get_args(Component)
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class ModalBasis(Summarised):
     """Mass-normalised modes ``q`` of a body, or several, and the motion of points of interest.

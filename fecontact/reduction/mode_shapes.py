@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.fem.interpolation import interpolation
 from fecontact.fem.points import rotating_rows
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class ModeShapes:
     """Mode shapes over the whole body, for plots and for loads at any point.
@@ -57,6 +59,7 @@ class ModeShapes:
         return np.asarray(rows @ self.shapes.reshape(self.nodes.size, -1))
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class ReductionQuality:
     """Quality of a basis compared with its finite-element body.

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.errors import choices
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
 from fecontact.reduction.modal_basis import ModalBasis
@@ -36,6 +37,7 @@ def beyond_basis(frequency_hz: float | None, usable_hz: float) -> str:
     return f"beyond {quantity(usable_hz, 'Hz')}, where the basis ends"
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class BasisReport:
     """Figures of merit of a basis; ``str(report)`` is a table with a recommendation.

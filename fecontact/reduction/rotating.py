@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.rotation import (
@@ -15,6 +16,7 @@ from fecontact.fem.rotation import (
 from fecontact.reduction.eigenmodes import FreeSystem
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class ModalRotation:
     """Rotation of a body in its modes: what a basis adds to damping, stiffness and load.

@@ -1,5 +1,6 @@
 """Studies: TOML files that describe a model from its geometry to the run and its plots."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,12 +13,14 @@ from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.tables import (
     convert,
     from_table,
+    key_tree,
     located,
     parsed,
     plain,
     require_readable,
     shown,
     to_table,
+    with_keys,
 )
 from fecontact.core.units import Summarised, listed, quantity
 from fecontact.integrate.events import ContactEvents
@@ -60,6 +63,9 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import Crown
 from fecontact.system.model_limits import PlannedBodies, implausible_bodies, warn_of_limits
 from fecontact.system.quasistatic.history import LoadHistory
+
+# Begins the last line of a study with every key, which lists those that its file gives, as JSON.
+_KEYS_GIVEN = "# Keys given: "
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
@@ -139,6 +145,7 @@ class Study(Summarised, StudyModels):
     bodies: Mapping[str, BodySections] = field(default_factory=dict)
     links: Mapping[str, LinkSettings] = field(default_factory=dict)
     path: Path | None = field(default=None, compare=False)
+    _keys: Mapping[str, Any] = field(default_factory=dict, compare=False)  # those of the file
 
     def summary(self) -> list[tuple[str, str]]:
         """Short description: file, geometry, modes, laws and duration of the run."""
@@ -188,7 +195,11 @@ class Study(Summarised, StudyModels):
         """Read a study from TOML text; ``path`` is the file it stands for, see :meth:`read`."""
         path = None if path is None else as_path(path, "a study")
         require_kind(_title(path), str, text=text)
-        return cls.from_tables(parsed(text, _title(path)), path)
+        study = cls.from_tables(parsed(text, _title(path)), path)
+        last = text.rstrip().rpartition("\n")[2]
+        if not last.startswith(_KEYS_GIVEN):
+            return study
+        return replace(study, _keys=json.loads(last.removeprefix(_KEYS_GIVEN)))
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
@@ -232,7 +243,7 @@ class Study(Summarised, StudyModels):
             if "sweep" in tables else None,
             preload=from_table(PreloadSettings, tables["preload"], f"{title}: [preload]")
             if "preload" in tables else None,
-            path=path,
+            path=path, _keys=key_tree(tables),
             **{name: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items() if name in tables or name not in LAWS},
         )
@@ -258,7 +269,16 @@ class Study(Summarised, StudyModels):
         return self.simulation.t_end
 
     def tables(self, *, defaults: bool = True) -> dict[str, Any]:
-        """All sections as tables for TOML, with or without values equal to the defaults."""
+        """All sections as tables for TOML.
+
+        With ``defaults`` every key that has a value, else those that the file gives or that differ
+        from their defaults.
+        """
+        every = self._tables(True)
+        return every if defaults else with_keys(self._tables(False), every, self._keys)
+
+    def _tables(self, defaults: bool) -> dict[str, Any]:
+        """All sections as tables, with or without values equal to their defaults."""
         sections = {name: to_table(getattr(self, name), defaults=defaults)
                     for name in _SECTIONS
                     if getattr(self, name) is not None
@@ -283,13 +303,18 @@ class Study(Summarised, StudyModels):
                    if table or defaults or name in LAWS}}
 
     def to_toml(self, *, defaults: bool = True) -> str:
-        """The resolved study as TOML text, with every key, or without those of default value.
+        """The study as TOML text: every key that has a value, or those of :meth:`tables`.
 
+        A comment at the end of the text with every key lists those that the file gives.
         ``Study.from_toml(study.to_toml(), study.path) == study``.
         """
         import tomli_w
 
-        return tomli_w.dumps(self.tables(defaults=defaults))
+        given = self.tables(defaults=False)
+        if not defaults:
+            return tomli_w.dumps(given)
+        keys = json.dumps(key_tree(given), sort_keys=True)
+        return f"{tomli_w.dumps(self.tables())}\n{_KEYS_GIVEN}{keys}\n"
 
     def with_(self, **changes: Any) -> "Study":
         """Copy of the study with other values, given by dotted keys of the file.
@@ -430,8 +455,8 @@ def _gap(value: Any, title: str) -> Gap:
     return gap
 
 
-def without_defaults(text: str | None) -> str | None:
-    """Study as TOML text without keys of default value, as far as that runs no code of its author.
+def with_given_keys(text: str | None) -> str | None:
+    """Study as TOML text with the keys that its file gives, if that runs no code of its author.
 
     Text that names laws in Python files, or that this version cannot read, is returned unchanged.
     """

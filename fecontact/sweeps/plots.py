@@ -11,12 +11,13 @@ from fecontact.core.errors import InputError, choices, require_choice
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.parameter_labels import name_axis
 from fecontact.output.plots.style import COLOURS, distinct_colours
 from fecontact.study.study import Study
 from fecontact.sweeps.statistics import SobolIndices
 from fecontact.sweeps.summaries import unit_of
 from fecontact.sweeps.table import SweepTable, is_numeric
+from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,9 +117,9 @@ def _curves(
                       linewidth=0.9, marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
                       label=None if by is None else f"{_shown(value)}")
         _mark_failed(axes, table, x)
-        _named(axes, parameter, x, labels)
+        _named(axes, table.label(parameter), x, labels)
         if by is not None:
-            figure.legend(title=parameter_label(by, Study), loc="outside right upper")
+            figure.legend(title=table.label(by), loc="outside right upper")
     return figure
 
 
@@ -158,7 +159,7 @@ def plot_strobed(
                   markeredgewidth=0, rasterized=True)
         _mark_failed(axes, table, x)
         axes.set_ylabel(f"displacement once per period [{unit}]")
-        _named(axes, parameter, x, labels)
+        _named(axes, table.label(parameter), x, labels)
     return figure
 
 
@@ -195,8 +196,8 @@ def _map(
         bar = figure.colorbar(drawn, ax=axes, pad=0.02)
         bar.set_label(_with_unit(name, unit))
         bar.outline.set_visible(False)
-        name_axis(axes, "x", parameter_label(first, Study), x)
-        name_axis(axes, "y", parameter_label(second, Study), y)
+        name_axis(axes, "x", table.label(first), x)
+        name_axis(axes, "y", table.label(second), y)
         for axis, points, log in zip((axes.xaxis, axes.yaxis), (x, y), logs, strict=True):
             # Of few cells each is named, if the numbers are short.
             if not log and len(points) <= _MOST_TICKS and all(
@@ -222,7 +223,7 @@ def _scatter(
                       markersize=float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0)),
                       alpha=0.7)
             _mark_failed(axes, table, x)
-            _named(axes, parameter, x, labels)
+            _named(axes, table.label(parameter), x, labels)
         last = grid[len(parameters)]
         known = table.values[name][np.isfinite(table.values[name])]
         if len(known):
@@ -312,15 +313,15 @@ def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
-def _named(axes: "Axes", parameter: str, x: Array, labels: list[str] | None) -> None:
+def _named(axes: "Axes", label: str, x: Array, labels: list[str] | None) -> None:
     """Label the axis of a parameter, logarithmic for values of equal ratios."""
     if labels is not None:
         axes.set_xticks(range(len(labels)), labels)
-        axes.set_xlabel(parameter_label(parameter, Study))
+        axes.set_xlabel(label)
         return
     if _is_geometric(np.unique(x)):
         _logarithmic(axes, "x")
-    name_axis(axes, "x", parameter_label(parameter, Study), x)
+    name_axis(axes, "x", label, x)
 
 
 def _logarithmic(axes: "Axes", which: str) -> None:

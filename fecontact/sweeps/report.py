@@ -11,7 +11,6 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, quantity, suitable_unit
 from fecontact.output.files.stored_system import library_versions
-from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 from fecontact.output.report.run_report import colour_maps, require_page, study_tables
@@ -56,7 +55,8 @@ def report_sweep(
     if not len(table):
         raise InputError("The sweep has no cases to report.")
     title, payload = path.stem if title is None else title, Payload()
-    columns = [_parameter(name, values) for name, values in table.parameters.items()]
+    columns = [_parameter(table.label(name), values)
+               for name, values in table.parameters.items()]
     varied = [k for k, column in enumerate(columns) if len(set(column["values"])) > 1] or [0]
     columns += [_summary(name, values) for name, values in table.values.items()]
     first = min(len(table.parameters), len(columns) - 1)
@@ -85,17 +85,17 @@ def report_sweep(
     return write_page(path, title, payload.block(header), "sweep")
 
 
-def _parameter(name: str, values: Sequence[Any]) -> dict[str, Any]:
+def _parameter(label: str, values: Sequence[Any]) -> dict[str, Any]:
     """A column of a parameter; texts and tables are numbered, geometric series by their powers."""
     if not is_numeric(values):
         texts = [str(value) for value in values]
         labels = list(dict.fromkeys(texts))
-        return {"title": name, "values": [labels.index(text) for text in texts], "labels": labels}
+        return {"title": label, "values": [labels.index(text) for text in texts], "labels": labels}
     found = sorted({float(value) for value in values})
     if len(found) > 2 and found[0] > 0.0 and np.ptp(np.diff(np.log(found))) < 1e-6:
-        return {"title": f"log10 of {parameter_label(name)}",
+        return {"title": f"log10 of {label}",
                 "values": [math.log10(value) for value in values]}
-    return {"title": parameter_label(name), "values": [float(value) for value in values]}
+    return {"title": label, "values": [float(value) for value in values]}
 
 
 def _summary(name: str, values: Any) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 from fecontact.sweeps.table import SweepTable
 
@@ -23,6 +24,7 @@ class Estimate:
     high: float
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class SobolIndices:
     """Sobol indices of d parameters.

@@ -27,6 +27,7 @@ from fecontact.sweeps.shared_bases import Bases
 from fecontact.sweeps.store import Store, write_whole
 from fecontact.sweeps.summaries import functions_for
 from fecontact.sweeps.table import SweepTable
+from fecontact.system.parameter_labels import parameter_label
 
 Progress = Callable[[int, int, int], None]
 
@@ -185,7 +186,8 @@ class _Work:
             [case.key for case in self.cases],
             [None if row is None else row["reason"] for row in found],
             shape=self.plan.shape, folder=folder, strobed=self._strobed(found),
-            warnings=["" if row is None else row.get("warning", "") for row in found])
+            warnings=["" if row is None else row.get("warning", "") for row in found],
+            labels={name: parameter_label(name, Study, self.study) for name in self.plan.names})
 
     def require_points(self, rows: Mapping[str, Row]) -> None:
         """Raise InputError if a stored case has another number of points than is kept of each."""

@@ -15,9 +15,12 @@ import numpy as np
 from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, MissingLibraryError, choices, nearest
 from fecontact.core.files.csv_text import csv_text, read_cell
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, html_table, listed, span
+from fecontact.study.study import Study
 from fecontact.sweeps.store import write_whole
+from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     import pandas
@@ -27,6 +30,7 @@ _BEFORE, _AFTER = ("case", "key"), ("status", "reason", "warning")
 _SHOWN_CASES = 12  # in a notebook
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepTable(Summarised):
     """Parameters and summaries of the N cases of a sweep.
@@ -49,6 +53,8 @@ class SweepTable(Summarised):
         Displacements once per period, for stroboscopic sweeps; NaN for failed cases.
     warnings : (N,) sequence of str
         Where runs exceed the limits of the model; empty for runs within them.
+    labels : mapping of dotted name to str
+        Labels of parameters for axes, where the study says more of them than their names.
     """
 
     parameters: Mapping[str, Sequence[Any]]
@@ -59,6 +65,7 @@ class SweepTable(Summarised):
     folder: Path | None = field(default=None, compare=False)
     strobed: Array | None = None
     warnings: Sequence[str] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -95,6 +102,10 @@ class SweepTable(Summarised):
     def missing(self) -> list[int]:
         """Indices of the cases not computed yet."""
         return [k for k, reason in enumerate(self.reasons) if reason is None]
+
+    def label(self, parameter: str) -> str:
+        """Label of a parameter for axes, with its unit: ``force at B x [N]``."""
+        return self.labels.get(parameter) or parameter_label(parameter, Study)
 
     def changes(self, case: int) -> dict[str, Any]:
         """Changes of a case to the study, for ``study.with_(**table.changes(3)).run()``."""

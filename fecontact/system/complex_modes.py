@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, span
 from fecontact.reduction.modal_basis import ModalBasis
@@ -16,6 +17,7 @@ _REPEATED = 1e-9
 _DEFECTIVE = 1e-14
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class ComplexModes(Summarised):
     """Complex modes of x' = A x, one for each pair l = -D w +- i w sqrt(1 - D^2).

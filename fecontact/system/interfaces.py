@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import listed, quantity
@@ -186,6 +187,7 @@ class MotionSource:
         return self.motion is not None or self.speed != 0.0
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class PrescribedMotion:
     """Motion of the other sides of all contact nodes.

@@ -206,6 +206,22 @@ def test_scipy_agrees_with_the_exact_solution():
     assert np.abs(run.states[:, :2] - exact_motion(springs, limits, times)).max() < 1e-5
 
 
+def test_scipy_returns_elements_of_every_node():
+    """Two masses: one at rest, and that of the exact solution on the second node."""
+    _, springs, limits = LAWS["jenkins"]
+    rows = np.zeros((2, 3, 2))
+    rows[0, 0, 0] = rows[1, 0, 1] = 1.0
+    basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows, "B": rows[1]})
+    system = fc.ContactSystem(
+        basis, normal=PrescribedForce((1.0, 1.0)), friction=JenkinsFriction((0.5, 0.5), 1.0),
+        drive=fc.Drive(stiffness_x=K, damping_x=C, amplitude_x=1.0, angular_frequency=W))
+    times = np.linspace(0.0, 5.0 * T, 101)
+    exact = exact_motion(springs, limits, times)[:, 0]
+    run = fc.simulate(system, times[-1], outputs=times, rtol=1e-7, solver=fc.integrate.Scipy())
+    assert np.abs(run.displacement(1)[:, 0] - exact).max() < 1e-5 * np.abs(exact).max()
+    assert np.abs(run.displacement(0)).max() < 1e-9
+
+
 def test_shooting_finds_the_settled_amplitude():
     bifurcation = fc.bifurcation
     system = mass(JenkinsFriction(0.5, 1.0))
@@ -230,3 +246,29 @@ def test_segalmans_parameters():
         phi_max * (power / (chi + 2.0) + S))
     with pytest.raises(fc.InputError, match="must be zero or above"):
         FourParameterIwanFriction.from_distribution(chi, phi_max, R, -1.0, F)
+
+
+def test_normal_force_that_jumps_at_touch():
+    """An element begins at zero where a contact closes, though the force of its dashpot jumps.
+
+    A mass falls on a spring and a dashpot over a belt: z = V t from the touch on, within mu F / k.
+    """
+    c, d, g, drop, speed, mu, stiffness = 4e3, 40.0, 9.81, 1e-3, 0.02, 0.5, 4e3
+    rows = np.array([[0.0], [1.0], [0.0]])
+    basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "C": rows})
+    system = fc.ContactSystem(
+        basis, normal=LinearContact(c, d), load=fc.Load(g), ground=fc.Ground(speed=-speed),
+        friction=JenkinsFriction(stiffness, mu))
+    touch, step = np.sqrt(2.0 * drop / g), 5e-5
+    times = np.append(0.0, touch + step * np.arange(1, 401))
+    run = fc.simulate(system, times[-1], outputs=times, rtol=1e-8, initial=[drop, 0.0, 0.0])
+    motion = expm(step * np.array([[0.0, 1.0, 0.0], [-c, -d, g], [0.0, 0.0, 0.0]]))
+    fall, forces, z = np.array([0.0, g * touch, 1.0]), [0.0], [0.0]
+    for _ in times[1:]:
+        fall = motion @ fall
+        forces.append(max(0.0, c * fall[0] + d * fall[1]))
+        z.append(min(z[-1] + speed * step, mu * forces[-1] / stiffness))
+    assert run.normal_force[:, 0] == pytest.approx(np.array(forces), abs=1e-5 * max(forces))
+    assert run.states[:, 2] == pytest.approx(np.array(z), abs=1e-5 * max(z))
+    assert forces[1] > 0.1 * max(forces)
+    assert z[-1] > 0.1 * max(z)

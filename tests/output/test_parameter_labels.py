@@ -6,18 +6,19 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
+from systems import mass_in_y
 
 from fecontact import Load, PointLoad, Study
+from fecontact.bifurcation import Branch, contact_field, equilibrium_branch, observe
 from fecontact.core.docstrings import documented
-from fecontact.laws import Harmonic
+from fecontact.io import read_branches, write_branches
+from fecontact.laws import Constant, Harmonic
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import (
-    _classes,
-    _units_of,
-    name_axis,
-    parameter_label,
-)
+from fecontact.output.plots.parameter_labels import branch_label, name_axis
 from fecontact.output.plots.responses.response import frequency_axis, level_texts
+from fecontact.plot import plot_branches, plot_eigenvalues, plot_sweep
+from fecontact.sweeps import SweepTable
+from fecontact.system.parameter_labels import _classes, _units_of, parameter_label
 
 
 @pytest.mark.parametrize(("name", "label"), [
@@ -39,7 +40,8 @@ def test_labels(name, label):
 
 def test_forces_are_named_by_their_place_and_direction():
     forces = (PointLoad("B", "x", signal=Harmonic(3.0, 10.0)),
-              PointLoad("C", "phi", signal=Harmonic(3.0, 10.0)))
+              PointLoad("C", "phi", signal=Harmonic(3.0, 10.0)),
+              PointLoad(3, "y", signal=Harmonic(3.0, 10.0)))
     system = SimpleNamespace(load=Load(forces=forces))
     name = "load.forces.0.signal"
     assert parameter_label(f"{name}.amplitude", system=system) == "force at B x [N]"
@@ -47,11 +49,45 @@ def test_forces_are_named_by_their_place_and_direction():
         "angular frequency of the force at B x [rad/s]")
     assert parameter_label("load.forces.1.signal.amplitude", system=system) == (
         "moment at C phi [N m]")
-    assert parameter_label(f"{name}.amplitude") == "force 0"
-    assert frequency_axis(f"{name}.angular_frequency", system) == (
-        2.0 * np.pi, "frequency of the force at B x [Hz]")
-    assert level_texts(f"{name}.amplitude", np.array([0.5, 2e3]), system) == (
-        "force at B x", ["0.0005 kN", "2 kN"])
+    assert parameter_label(f"{name}.amplitude") == "amplitude of force 0"
+    assert parameter_label("load.forces.2.signal.amplitude", system=system) == (
+        "force at contact node 3 y [N]")
+    response = SimpleNamespace(
+        parameter_name=f"{name}.angular_frequency", level_name=f"{name}.amplitude",
+        levels=np.array([0.5, 2e3]), branches=[Branch(f"{name}.angular_frequency", (), attributes={
+            "labels": ("angular frequency of the force at B x [rad/s]",),
+            "level_label": "force at B x [N]"})])
+    assert frequency_axis(response) == (2.0 * np.pi, "frequency of the force at B x [Hz]")
+    assert level_texts(response) == ("force at B x", ["0.0005 kN", "2 kN"])
+
+
+def test_branches_know_the_labels_of_what_they_show(tmp_path):
+    """The place of a force, what was observed, the second parameter; also those of files."""
+    forces = (PointLoad("C", "y", signal=Constant(-20.0)),)
+    name = "load.forces.0.signal.value"
+    system = mass_in_y(spring=1e4, load=Load(forces=forces))
+    field = contact_field(system, [name])
+    branch = observe(field, equilibrium_branch(field, parameter=name, bounds=(-30.0, -10.0)),
+                     "C", "y")
+    stored = read_branches(write_branches(tmp_path / "one.h5", {"rest": branch}))["rest"]
+    for one in (branch, stored):
+        axis = plot_branches(one, "observed_amplitude").axes[0]
+        assert axis.get_xlabel() == "force at C y [N]"
+        assert axis.get_ylabel() == "amplitude of displacement y of C [m]"
+        assert plot_eigenvalues(one).axes[1].get_xlabel() == "force at C y [N]"
+        assert branch_label(one, "period") == "period [s]"
+        assert branch_label(one, "state_error") == "state error"
+    plain = Branch("a", (), attributes={"parameters": ("ground.speed", "load.normal")})
+    assert branch_label(plain) == "ground speed [m/s]"
+    assert branch_label(plain, "load.normal") == "load normal [N]"
+
+
+def test_sweeps_know_the_places_of_forces():
+    table = SweepTable({"load.forces.0.signal.amplitude": (1.0, 2.0)}, {"amplitude_x": np.ones(2)},
+                       ["0", "1"], ["", ""], shape=(2,),
+                       labels={"load.forces.0.signal.amplitude": "force at B x [N]"})
+    assert plot_sweep(table, "amplitude_x").axes[0].get_xlabel() == "force at B x [N]"
+    assert table.label("ground.speed") == "ground speed [m/s]"
 
 
 def test_ticks_are_in_a_unit_that_suits_the_values():

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ from fecontact.integrate import SetValued
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.solvers import SOLVERS
 from fecontact.laws import ExponentialFriction, RoughSurface
-from fecontact.study.study import without_defaults
+from fecontact.study.study import with_given_keys
 from fecontact.system.model_limits import (
     Planned,
     PlannedBodies,
@@ -124,20 +124,43 @@ def test_resolved_study_reads_back_the_same(text):
     assert Study.from_toml(resolved).to_toml() == resolved
 
 
-def test_keys_that_differ_from_their_defaults():
-    """What a study gives stays, what it leaves out is not there; the study is the same."""
-    text = template("block")
+@pytest.mark.parametrize("shape", TEMPLATES)
+def test_keys_that_a_study_gives(shape):
+    """What a study gives stays, also defaults; what it leaves out is not there."""
+    text = template(shape)
     study = Study.from_toml(text)
-    short = without_defaults(study.to_toml())
+    short = with_given_keys(study.to_toml())
+    assert Study.from_toml(short) == study
+    assert flattened(tomllib.loads(short)) == flattened(study.tables(defaults=False))
+    assert set(flattened(tomllib.loads(short))) == set(flattened(tomllib.loads(text)))
+
+
+def test_given_keys_with_their_default_value_are_kept():
+    text = template("block") + '\n[[load.forces]]\nsignal = { law = "constant" }\ncomponent = "y"\n'
+    study = Study.from_toml(text)
+    given = flattened(tomllib.loads(with_given_keys(study.to_toml())))
+    assert given["load.forces"] == [{"component": "y", "signal": {"law": "constant"}}]
+    assert "damping_y" not in study.tables(defaults=False)["drive"]
+    changed = study.with_(**{"drive.damping_y": study.drive.damping_y})
+    again = Study.from_toml(changed.to_toml())
+    for one in (changed, again):
+        assert one == study
+        assert one.tables(defaults=False)["drive"]["damping_y"] == study.drive.damping_y
+
+
+def test_a_study_made_in_python_gives_what_differs_from_the_defaults():
+    text = template("block")
+    study = replace(Study.from_toml(text), _keys={})
+    short = with_given_keys(study.to_toml())
     assert Study.from_toml(short) == study
     given = flattened(tomllib.loads(text))
     kept = flattened(tomllib.loads(short))
     assert set(kept) <= set(given)
     assert {"ground.speed", "drive.stiffness_x", "load.normal"} <= set(kept)
     named = short + '\n[friction]\nlaw = "own.py:Law"\n'
-    assert without_defaults(named) == named
-    assert without_defaults("[geometry]\nshape = 3\n") == "[geometry]\nshape = 3\n"
-    assert without_defaults(None) is None
+    assert with_given_keys(named) == named
+    assert with_given_keys("[geometry]\nshape = 3\n") == "[geometry]\nshape = 3\n"
+    assert with_given_keys(None) is None
 
 
 

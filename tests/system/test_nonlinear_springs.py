@@ -16,7 +16,6 @@ from fecontact.bifurcation import contact_field, equilibrium_branch
 from fecontact.integrate import PointStart, SetValued
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import ConstantFriction, LinearContact
-from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.reduction import (
     CubicSpring,
     PiecewiseSpring,
@@ -27,6 +26,7 @@ from fecontact.reduction import (
     reduce_bodies,
 )
 from fecontact.reduction.assembly.contact_faces import contact_sides
+from fecontact.system.parameter_labels import parameter_label
 
 UP = (0.0, 1.0)
 

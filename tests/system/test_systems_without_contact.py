@@ -18,6 +18,7 @@ from fecontact import (
     write_case,
 )
 from fecontact.analysis import complex_modes
+from fecontact.analysis.run_facts import run_facts
 from fecontact.bifurcation import (
     contact_field,
     equilibrium_branch,
@@ -26,6 +27,9 @@ from fecontact.bifurcation import (
 from fecontact.cli import execute
 from fecontact.integrate import SetValued
 from fecontact.laws import ConstantFriction, Harmonic, LinearContact
+from fecontact.output.files.dataset import variables
+from fecontact.plot import rendering_problem
+from fecontact.reduction.assembly.contact_faces import contact_faces
 
 MASS, DAMPING = 2.0, 0.1
 STIFFNESS = np.array([8.0, 18.0])
@@ -168,3 +172,71 @@ def test_commands_take_a_study_without_contact(tmp_path, capsys):
     file.write_text(LINEAR + "\n[friction]\nlaw = \"constant\"\nfriction_coefficient = 0.3\n")
     assert execute(["run", str(file)]) == 1
     assert "[friction] is a law of contact nodes" in " ".join(capsys.readouterr().err.split())
+
+
+TWO_BODIES = """
+[bodies.left.geometry]
+shape = "block"
+width = 0.12
+height = 0.06
+element_size = 0.03
+[bodies.left.body]
+material = "steel"
+thickness = 0.1
+fixed = { left = "xy" }
+[bodies.left.basis]
+modes = 2
+B = "right"
+damping = 0.02
+[bodies.right.geometry]
+shape = "block"
+width = 0.12
+height = 0.06
+element_size = 0.03
+[bodies.right.placement]
+shift = [0.2, 0.0]
+[bodies.right.body]
+material = "steel"
+thickness = 0.1
+fixed = { right = "xy" }
+[bodies.right.basis]
+modes = 2
+C = "left"
+damping = 0.02
+[links.spring]
+kind = "spring"
+first = "left.B"
+second = "right.C"
+direction = [1.0, 0.0]
+stiffness = 1e6
+[drive]
+stiffness_x = 1e6
+amplitude_x = 1e-4
+angular_frequency = 3e4
+[simulation]
+t_end = 2e-3
+outputs = 101
+[output]
+frames = 2
+[render]
+frames = 2
+size = [320, 240]
+"""
+
+
+@pytest.mark.long
+def test_commands_take_a_study_of_two_bodies_without_contact(tmp_path, capsys):
+    file = tmp_path / "linked.toml"
+    file.write_text(TWO_BODIES)
+    results = tmp_path / "results"
+    assert execute(["run", str(file)]) == 0
+    assert "left, right" in capsys.readouterr().out
+    assert execute(["plot", str(file), "history"]) == 0
+    assert execute(["report", str(results / "linked.vtkhdf")]) == 0
+    if rendering_problem() is None:
+        assert execute(["render", str(results / "linked.vtkhdf")]) == 0
+    run = read_case(results / "linked.vtkhdf").trajectory
+    assert contact_faces(run.system.basis)[0].nodes == slice(0, 0)
+    assert ("bodies", "left, right") in run_facts(run)
+    assert not [name for name, _ in run_facts(run) if name.startswith("contact")]
+    assert "displacement" in variables(run)

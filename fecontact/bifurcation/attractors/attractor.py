@@ -7,12 +7,14 @@ from typing import Literal
 import numpy as np
 
 from fecontact.bifurcation.attractors.labels import Motions, Settled, label_runs
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 
 Kind = Literal["equilibrium", "periodic", "aperiodic"]
 _KINDS: tuple[Kind, ...] = ("equilibrium", "periodic", "aperiodic")  # in the order of their numbers
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Attractor:
     """A motion that others settle on.

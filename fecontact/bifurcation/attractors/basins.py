@@ -19,6 +19,7 @@ from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensemble import ensemble, strobe
@@ -67,6 +68,7 @@ class Axis:
         return quantity_row(in_time("Axis", system), self.point, self.component, self.of)
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Basins:
     """Which attractor each start leads to.

@@ -18,6 +18,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -39,6 +40,7 @@ _LOST = 1e-13
 _KEPT = 10.0
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class LyapunovExponents:
     """Mean rates at which small differences grow along a motion.

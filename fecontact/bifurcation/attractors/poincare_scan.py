@@ -17,6 +17,7 @@ from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensemble import ensemble, is_many, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
@@ -34,6 +35,7 @@ _TOGETHER = 8  # chains of a block
 Change = str | Callable[[Any, float], Moving]
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class PoincareScan:
     """States once per period of the excitation, or on a section, over a parameter.

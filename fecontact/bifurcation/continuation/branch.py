@@ -29,6 +29,7 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices, require_finite, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, span
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -45,6 +46,7 @@ _REACHED = 1e-9
 __all__ = ["Branch", "BranchStatus"]
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch(Summarised):
     """Solutions over a parameter, in their order along the branch.

@@ -1,6 +1,6 @@
 """Continuation of a whole branch, to one side or to both."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -44,7 +44,7 @@ def continue_branch(
         If there is no solution near the start.
     """
     require_finite("A branch", direction=direction)
-    header = BranchHeader(name, attributes or {})
+    header = BranchHeader(name, labelled(problem, name, attributes or {}))
     points, end = _collected(problem, u, options, tangent, direction, header)
     if both and end.status not in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
         start = start_of(problem, u, options, tangent, direction)
@@ -59,6 +59,12 @@ def continue_branch(
     branch = Branch(name, tuple(points), end.status, end.message, header.attributes)
     message = " ".join(filter(None, (end.message, problem.note(branch.points))))
     return replace(branch, message=message)
+
+
+def labelled(problem: Problem, name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes of a branch with the labels of its parameters, in their order."""
+    names = [str(one) for one in attributes.get("parameters", (name,))]
+    return {**attributes, "labels": problem.labels(names)}
 
 
 def regular(points: Iterable[BranchPoint]) -> int:

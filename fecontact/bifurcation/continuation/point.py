@@ -14,6 +14,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -34,6 +35,7 @@ _NORMAL_FORMS: Mapping[str, tuple[str, ...]] = {
                     ("p11", "p12", "p21", "p22"))}
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class BranchHeader:
     """Parameter and attributes of a branch, known to all its points.
@@ -50,6 +52,7 @@ class BranchHeader:
     attributes: Mapping[str, Any]
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchPoint(Summarised):
     """One solution on a branch.

@@ -158,6 +158,11 @@ class Problem(Protocol):
         """Whether nothing can be told of the stability of a point, from its stored values."""
         return False
 
+    def labels(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Labels of parameters for axes, which the field of the equations gives, or their names."""
+        field = getattr(self, "field", None)
+        return tuple(name if field is None else field.parameter_label(name) for name in names)
+
     def note(self, points: Any) -> str:
         """What is to be told of the points of a branch besides its end."""
         return ""

@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.system.complex_modes import ComplexModes
@@ -46,6 +47,7 @@ _DIFFERENCES = (
 )
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
     """An equilibrium, and the linear motion about it.

@@ -15,12 +15,15 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.progress import progress_bar, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.core.units import Summarised, span
 from fecontact.system.fields.vector_field import VectorField, require_field
+from fecontact.system.parameter_labels import parameter_label
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class StabilityMap(Summarised):
     """Eigenvalues of an equilibrium over a grid of two parameters.
@@ -37,6 +40,8 @@ class StabilityMap(Summarised):
         Eigenvalue with the largest real part, of a pair the one with positive frequency [1/s].
     unstable : (n1, n2) array of int
         Number of eigenvalues with positive real part; -1 where there is no equilibrium.
+    labels : (str, str)
+        Labels of the parameters for axes, by default their names.
     """
 
     names: tuple[str, str]
@@ -45,6 +50,11 @@ class StabilityMap(Summarised):
     states: Array
     critical: ComplexArray
     unstable: Integers
+    labels: tuple[str, str] = ("", "")
+
+    def __post_init__(self) -> None:
+        if not all(self.labels):
+            object.__setattr__(self, "labels", tuple(map(parameter_label, self.names)))
 
     def summary(self) -> list[tuple[str, str]]:
         """The parameters, and how much of the map is unstable at which frequencies."""
@@ -145,7 +155,9 @@ def stability_map(
     unstable = unstable_count(np.where(beyond, 0.0, eigenvalues))
     lost = np.isnan(states[..., 0])
     critical[lost], unstable[lost] = np.nan, -1
-    return StabilityMap((names[0], names[1]), axes[0], axes[1], states, critical, unstable)
+    labels = field.parameter_label(names[0]), field.parameter_label(names[1])
+    return StabilityMap((names[0], names[1]), axes[0], axes[1], states, critical, unstable,
+                        labels)
 
 
 def _equilibrium(

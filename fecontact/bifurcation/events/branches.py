@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch, regular, shortened
+from fecontact.bifurcation.continuation.follow import continue_branch, labelled, regular, shortened
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.newton import corrected, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
@@ -117,6 +117,7 @@ def followed(
         If there is no orbit near the start.
     """
     ahead = _side(problem, u, options, name, tangent, direction)
+    attributes = labelled(problem, name, attributes)
     if not both or ahead.status in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
         return Branch(name, tuple(ahead.points), ahead.status, ahead.message, attributes)
     kept = max(options.points // 2 + 1, 2)

@@ -17,6 +17,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.forcing_period import common_period, drive_sets_period
 from fecontact.system.nodes import SystemArrays
+from fecontact.system.parameter_labels import parameter_label
 
 # Relative step of differences in a parameter.
 _STEP = 2e-4
@@ -65,6 +66,10 @@ class ContactField(VectorField):
             If a value is out of its parameter's range.
         """
         return self._family.system(self.values if values is None else values)
+
+    def parameter_label(self, name: str) -> str:
+        """Label of a parameter, such as ``force at B x [N]`` for ``load.forces.0...amplitude``."""
+        return parameter_label(name, system=self.system())
 
     def in_time(self) -> ContactSystem:
         """The contact system for the base values."""

@@ -45,6 +45,7 @@ from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
@@ -60,6 +61,7 @@ _POINTS, _LARGEST = 2000, 0.03
 _FREQUENCY = "drive.angular_frequency"
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class FrequencyResponse(Summarised):
     """Responses over a frequency, or another parameter, one branch for each level.
@@ -202,7 +204,7 @@ def frequency_response(
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:
-            further = _told(observed, level_name, float(value))
+            further = _told(field, observed, level_name, float(value))
             both = low < first < high
             if method is None or isinstance(method, HarmonicBalance):
                 branch = branch_of_response(
@@ -491,9 +493,13 @@ def _require_observable(layout: Layout, row: Array) -> None:
                          "or a velocity.")
 
 
-def _told(observed: str, level_name: str | None, level: float) -> dict[str, Any]:
+def _told(
+    field: VectorField, observed: str, level_name: str | None, level: float
+) -> dict[str, Any]:
     """Attributes of a branch of responses."""
-    return {"observed": observed, "level": level, "level_name": level_name or ""}
+    label = field.parameter_label(level_name) if level_name else ""
+    return {"observed": observed, "level": level, "level_name": level_name or "",
+            "level_label": label}
 
 
 def response_of(branches_by_name: Mapping[str, Branch]) -> FrequencyResponse:

@@ -10,6 +10,7 @@ from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.observed import OBSERVED, observed_of_orbits
 from fecontact.bifurcation.harmonic.series import differentiated
+from fecontact.core.read_only import read_only
 from fecontact.core.types import Array
 
 _ERRORS, _EXTREMES = ("truncation_error", "residual"), ("minimum", "maximum")
@@ -99,7 +100,7 @@ class StoredValues(Mapping[str, Any]):
         self._orbits, self._index = orbits, index
 
     def __getitem__(self, name: str) -> Any:
-        return self._orbits.column(name)[self._index]
+        return read_only(self._orbits.column(name)[self._index])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._orbits.names())

@@ -11,6 +11,7 @@ from fecontact.bifurcation.nonlinear_modes.given_force import given_force, requi
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, quantity, span
@@ -44,6 +45,7 @@ class Resonance:
         return 2.0 * np.pi * self.frequency
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class ModeResponse(Summarised):
     """Forced responses near the resonance of one nonlinear mode.

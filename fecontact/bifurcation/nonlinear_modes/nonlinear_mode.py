@@ -32,6 +32,7 @@ from fecontact.bifurcation.nonlinear_modes.mode_problem import PERIOD_SCALE, Mod
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ComplexArray
 from fecontact.core.units import Summarised, listed, span
@@ -57,6 +58,7 @@ _SAME, _MET, _MOST_BETWEEN = 1e-12, 1e-6, 200
 _ENDS = ("largest amplitude", "smallest amplitude")
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class NonlinearMode(Summarised):
     """A periodic motion of a system without excitation, over its amplitude.

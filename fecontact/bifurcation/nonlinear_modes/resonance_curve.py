@@ -25,6 +25,7 @@ from fecontact.bifurcation.harmonic.response import (
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
@@ -41,6 +42,7 @@ _WINDOW, _SAMPLES = 0.05, 4
 _CONDITIONS = ("amplitude", "phase")
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class ResonanceCurve(Summarised):
     """Resonances of forced responses over a parameter.

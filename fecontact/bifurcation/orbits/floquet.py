@@ -15,6 +15,7 @@ from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError, ModelWarning
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.records import ComplexVector, Vector
 from fecontact.core.types import Array
 
@@ -28,6 +29,7 @@ _APART = 0.02
 _LOST = 0.5
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Floquet:
     """Stability of an orbit.

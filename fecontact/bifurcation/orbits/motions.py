@@ -10,6 +10,7 @@ import numpy as np
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.core.checks import as_floats, as_texts
 from fecontact.core.errors import InputError, require_positive, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.simulate import simulate
@@ -29,6 +30,7 @@ _WITH_TIME = ("modal_coordinates", "modal_velocities", "memory", "held_normal_fo
 _COUNTED = ("work", "node_friction_work", "node_creep_work")
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class PeriodicMotion(Summarised):
     """A periodic motion over at least one period: a start for branches of orbits.

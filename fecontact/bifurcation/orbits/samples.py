@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fecontact.analysis.histories import point_name
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
@@ -141,7 +142,10 @@ def observe(
         points.append(replace(one, values={
             **one.values, "observed_minimum": low, "observed_maximum": high,
             "observed_amplitude": (high - low) / 2.0, **section}))
-    return replace(branch, points=tuple(points))
+    where = point_name(point, field.system().basis)
+    unit = "rad" if component.startswith("phi") else "m"
+    return replace(branch, points=tuple(points), attributes={
+        **branch.attributes, "observed_label": f"displacement {component} of {where} [{unit}]"})
 
 
 def _range(

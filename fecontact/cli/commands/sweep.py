@@ -82,12 +82,12 @@ def sweep(
         except KeyboardInterrupt:
             note(f"Finished cases are kept in {folder}; go on with --resume.")
             raise
-    from fecontact.study.study import without_defaults
+    from fecontact.study.study import with_given_keys
     from fecontact.sweeps.report import report_sweep
 
     with waiting("Writing"):
         page = report_sweep(table, folder / "index.html", title=described.name,
-                            study=without_defaults(described.to_toml()),
+                            study=with_given_keys(described.to_toml()),
                             command=partial(command, table))
     return _report(table, described.sweep, folder, page, partial(command, table))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, choices, nearest, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.integrate.events import AnyEvent, Events
@@ -19,6 +20,7 @@ from fecontact.integrate.trajectory import Status, output_part
 from fecontact.system.fields.vector_field import VectorField
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class FieldRun(Summarised):
     """Motion of a vector field at N output times.

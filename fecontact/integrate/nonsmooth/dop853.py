@@ -78,7 +78,8 @@ def error(h, Y, limits, room):
         return math.inf
     if fifth == 0.0:
         return 0.0
-    return h * fifth * fifth / math.sqrt(fifth * fifth + 0.01 * third * third)
+    # A ratio, for squares of tiny errors vanish.
+    return h * fifth / math.hypot(1.0, 0.1 * third / fifth)
 
 
 @routine

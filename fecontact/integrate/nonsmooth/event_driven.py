@@ -50,6 +50,7 @@ from fecontact.integrate.nonsmooth.problem import (
 from fecontact.integrate.nonsmooth.rigid_stops import (
     NO_ACCELERATION,
     NO_IMPULSES,
+    RATE_ROUNDING,
     change_contacts_at,
     settle,
 )
@@ -96,6 +97,13 @@ def _height(p, limits, progress):
 
 
 @helper
+def _slow(part, largest):
+    """Penetration rate of stops at rest: a part of the largest one, or rounding [m/s]."""
+    fast = largest[RATE_SIZE]
+    return max(part * fast, RATE_ROUNDING * max(largest[SLIP_SIZE], fast))
+
+
+@helper
 def _start(t, p, limits, progress, w, room):
     """Decide at the start of a run which clusters stick and which stops are closed."""
     largest = progress.largest
@@ -111,7 +119,7 @@ def _start(t, p, limits, progress, w, room):
             largest[RATE_SIZE] = max(largest[RATE_SIZE], abs(w.nodes[j, RATE]))
             largest[DEPTH_SIZE] = max(largest[DEPTH_SIZE], abs(depth))
         flight = change_contacts_at(p.change)(
-            t, p, progress, room, w, _SLOW * largest[RATE_SIZE], _height(p, limits, progress),
+            t, p, progress, room, w, _slow(_SLOW, largest), _height(p, limits, progress),
             1e-9 * limits.longest, room.rate)
         progress.counts[EVENTS] += 1 if room.touched.any() else 0
         return _outcome(flight)
@@ -273,7 +281,7 @@ def _change_stops(t, again, p, limits, progress, w, room):
     Returns the longest flight of a rebound [s], or why there is none.
     """
     clusters, closed, largest = len(p.rows), progress.closed, progress.largest
-    slow = 0.01 * limits.rtol * largest[RATE_SIZE]
+    slow = _slow(0.01 * limits.rtol, largest)
     _mark_clusters(again, p, progress, w, room)
     for j in range(len(p.cluster)):
         event = room.past[clusters + j]

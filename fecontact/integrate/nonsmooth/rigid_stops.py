@@ -83,7 +83,7 @@ NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 # Slip velocities below this part of the largest are none, energies gained rounding.
 _NEAR, _GAIN = 1e-9, 1e-10
 # Rounding of penetration rates relative to the largest slip velocity or rate.
-_RATE_ROUNDING = 1e-14
+RATE_ROUNDING = 1e-14
 # Corrections of the places of stops that close or open.
 _MOST_CORRECTIONS = 5
 
@@ -362,7 +362,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
         before[c] = STICK if room.fresh[c] else status[c]
     settle(t, p, before, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)
-    noise = _RATE_ROUNDING / _NEAR * near
+    noise = RATE_ROUNDING / _NEAR * near
     for j in range(n):
         if closed[j]:
             room.flights[j, YOUNG] = 0.0
@@ -401,7 +401,7 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
     for j in range(n):
         rate = w.nodes[j, RATE] if room.touched[j] else 0.0
         approached = approached or rate > 0.0
-        room.touched[j] = rate > _RATE_ROUNDING * near
+        room.touched[j] = rate > RATE_ROUNDING * near
         struck = struck or room.touched[j]
         progress.counts[IMPACTS] += 1 if room.touched[j] else 0
     if approached and not _strike(t, touching, p, progress, w):

@@ -157,7 +157,8 @@ def _end_of_slip(
         return None
     t = begin + first * h
     y = dense(t)
-    stick_again(t, y, arrays, counts, np.where(places <= first + _ONE_PLACE, 1.0, 0.0))
+    # The state without the works that follow it.
+    stick_again(t, y[:size], arrays, counts, np.where(places <= first + _ONE_PLACE, 1.0, 0.0))
     return t, y
 
 

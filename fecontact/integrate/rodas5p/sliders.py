@@ -4,10 +4,13 @@ The deflections of the elements follow the slip velocity all the time; see
 :mod:`fecontact.system.elastic_sliders`. Slip of an element ends where its excess over the limit is
 largest. A step with such a place inside is shortened to end there. The next step finds that the
 excess falls from its start: the deflection is returned to the limit, and the step is taken anew.
+Where the normal force of a contact that closes jumps, the limit jumps too. A step ends just past
+such a touch, and the next one begins with the deflections since then, ``z = v (t - t_touch)``.
 Forces are continuous at both ends of slip, and the derivatives of a deflection that is returned to
 the limit become those of the limit.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -15,7 +18,9 @@ import numpy as np
 from fecontact.core.compiled import compile_law, function_at, routine
 from fecontact.core.records import Vector
 from fecontact.integrate.rodas5p import dynamics, state, tableau
+from fecontact.integrate.rodas5p.step_length import LAST_STEP
 from fecontact.integrate.rodas5p.variational import Vary
+from fecontact.laws.signatures import normal_at
 from fecontact.system.elastic_sliders import (
     SHORT,
     deflection_of,
@@ -47,6 +52,12 @@ _NEAR, _NEAR_VARIED = 1e-3, 1e-6
 _PRECISION, _TRIALS = 1e-7, 50
 # A contact has just closed if it did within this part of a step.
 _TOUCH = 1e-3
+# Part of the force at the next look that a normal force has right after a touch at which it jumps.
+_JUMP = 1e-4
+# Steps do not end at a touch that is nearer to their start than this part of the time.
+_BRIEFEST = 1e-12
+# Steps that end at a touch go past it by at most this many times what counts as the end.
+_PAST = 4.0
 
 
 @routine
@@ -76,6 +87,80 @@ def _excess(part, j, i, step, problem, progress, room, y, force, rates):
     pressing, _ = _pressing(j, y, moved, s, force, rates)
     count = problem.control.slider_counts[j]
     return deflection_of(memory_of(j, y, s), i, s) - limit_of(j, i, count, pressing, s)
+
+
+@routine
+def _touch(low, high, j, step, problem, progress, room, y, force, rates):
+    """Part of the step at which the open contact of node j closes, and the force just after."""
+    pressing = 0.0
+    while high - low > _PRECISION:
+        part = 0.5 * (low + high)
+        moved = _look(part, step, problem, progress, room, y)
+        found, _ = _pressing(j, y, moved, problem.system, force, rates)
+        if found > 0.0:
+            high, pressing = part, found
+        else:
+            low = part
+    return high, pressing
+
+
+@routine
+def _since_touch(j, contact, earlier, s):
+    """Time since the contact of node j closed [s]; -1 if it is longer than ``earlier``."""
+    u, v, p = contact.penetration, contact.rate, s.normal_parameters[j]
+    if normal_at(s.normal[j])(u - v * earlier, v, p)[0] != 0.0:
+        return -1.0
+    low, high = 0.0, earlier
+    for _ in range(_TRIALS):
+        middle = 0.5 * (low + high)
+        if normal_at(s.normal[j])(u - v * middle, v, p)[0] != 0.0:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@routine
+def _begin_contact(j, since, t, problem, progress, vary, force, rates):
+    """Set the deflections of node j a time after its touch; True if any changes.
+
+    They are ``z = v since``, within their limits.
+    """
+    s, y, changed = problem.system, progress.state, False
+    count = problem.control.slider_counts[j]
+    pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    z, slip = memory_of(j, y, s), math.hypot(contact.slip, contact.slip_across)
+    for i in range(count):
+        limit = limit_of(j, i, count, pressing, s)
+        most, time = limit * (1.0 - SHORT), since
+        if slip * since > most:
+            time = most / slip
+        first = 2 * i if in_space(s) else i
+        along, across = contact.slip * time, contact.slip_across * time
+        if z[first] == along and (not in_space(s) or z[first + 1] == across):
+            continue
+        if len(vary.variation.columns):
+            _columns(j, i, count, limit, max(deflection_of(z, i, s), 1e-300), t, y,
+                     progress.gradients, problem, progress, vary, force, rates, True)
+        z[first], changed = along, True
+        if in_space(s):
+            z[first + 1] = across
+    return changed
+
+
+@routine
+def _after_touch(earlier, t, problem, progress, vary, force, rates):
+    """Set the deflections of contacts that closed at most ``earlier`` ago; True if any changes."""
+    s, control, changed = problem.system, problem.control, False
+    moved = ground_motion(t, s)
+    for j in range(len(control.slider_counts)):
+        if control.slider_counts[j] == 0:
+            continue
+        pressing, contact = _pressing(j, progress.state, moved, s, force, rates)
+        since = _since_touch(j, contact, earlier, s) if pressing > 0.0 else -1.0
+        if since >= 0.0:
+            changed |= _begin_contact(j, since, t, problem, progress, vary, force, rates)
+    return changed
 
 
 @routine
@@ -209,8 +294,13 @@ def _switch(step, problem, progress, room, vary):
     closed, starts = np.zeros((3, n)), np.full((n, states), -1.0)
     begins = varies or control.slider_counts.sum() <= _FEW
     near = _NEAR_VARIED if varies else _NEAR
-    first = 2.0
+    first, t = 2.0, step.t
+    after_t = np.nextafter(t, np.inf)
+    again = _after_touch(_PAST * near * progress.numbers[LAST_STEP], after_t, problem, progress,
+                         vary, force, rates)
     for look in range(_LOOKS + 2):
+        if again:
+            break
         # The last two are close together, so that what begins to fall at the end is seen.
         part = 1.0 if look == _LOOKS + 1 else (
             1.0 - near if look == _LOOKS else look / _LOOKS)
@@ -226,6 +316,17 @@ def _switch(step, problem, progress, room, vary):
             z = memory_of(j, y, s)
             for i in range(count):
                 now[j, i] = deflection_of(z, i, s) - limit_of(j, i, count, pressing, s)
+            if look > 0 and pressing > 0.0 and closed[(look + 2) % 3, j] == 0.0:
+                begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
+                place, just_after = _touch(begun, part, j, step, problem, progress, room, y, force,
+                                           rates)
+                if just_after > _JUMP * pressing:
+                    if place > near and place * step.h > _BRIEFEST * abs(t):
+                        first = min(first, place)
+                    else:
+                        again |= _begin_contact(j, 0.0, after_t, problem, progress, vary, force,
+                                                rates)
+                _look(part, step, problem, progress, room, y)
         if look == 0:
             starts[:, :] = now
             continue
@@ -255,12 +356,10 @@ def _switch(step, problem, progress, room, vary):
         if first <= part:
             break
     # Steps end a little past a switch, so that it lies well within what counts as the end.
-    if first >= 1.0 - 3.0 * near:
+    if not again and first >= 1.0 - 3.0 * near:
         return 1.0
-    if first > near:
+    if not again and first > near:
         return min(first + near * first, 1.0)
-    t, again = step.t, False
-    after_t = np.nextafter(t, np.inf)
     for j in range(n):
         for i in range(control.slider_counts[j]):
             if places[j, i] <= near:

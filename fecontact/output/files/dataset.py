@@ -144,9 +144,8 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
         found[name] = Variable(("time", "node", *(["tangent"] * (values.ndim - 2))), values, unit)
     if basis.thickness is not None:
         found["pressure"] = Variable(("time", "node"), trajectory.pressure, "Pa")
-    energies = trajectory.energies
-    for name in energies.__dataclass_fields__:
-        found[f"energy_{name}"] = Variable(("time",), getattr(energies, name), "J")
+    for name, values in trajectory.energies.terms.items():
+        found[f"energy_{name}"] = Variable(("time",), values, "J")
     found["modal_coordinates"] = Variable(("time", "mode"), q, "kg^0.5 m")
     found["modal_velocities"] = Variable(("time", "mode"), rate, "kg^0.5 m/s")
     return found

@@ -20,7 +20,7 @@ from fecontact.output.plots.diagram_insets import (
     place_labels,
 )
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.parameter_labels import branch_label, name_axis
 from fecontact.output.plots.style import DASHES, distinct_colours, legend_label
 
 if TYPE_CHECKING:
@@ -144,9 +144,9 @@ def plot_branches(
                 if point.kind is not None:
                     known.setdefault(point.kind, []).append((places[index], heights[index]))
         axis.ticklabel_format(axis="y", scilimits=(-3, 5))
-        parameter, limits = branches[0].parameter_name, axis.dataLim
-        name_axis(axis, "x", x_label or _label(x, parameter), np.array(limits.intervalx))
-        name_axis(axis, "y", y_label or _label(y, parameter), np.array(limits.intervaly))
+        limits = axis.dataLim
+        name_axis(axis, "x", x_label or _label(x, branches[0]), np.array(limits.intervalx))
+        name_axis(axis, "y", y_label or _label(y, branches[0]), np.array(limits.intervaly))
         axis.margins(x=0.02, y=0.06)
         axis.autoscale_view()
         special = _mark(axis, known)
@@ -255,11 +255,7 @@ def _legend(
         axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 
-def _label(quantity: Quantity, parameter: str) -> str:
-    if quantity == "parameter":
-        return parameter_label(parameter)
-    if quantity == "period":
-        return "period [s]"
-    if isinstance(quantity, int | np.integer):
-        return f"state {quantity}"
-    return quantity if isinstance(quantity, str) else ""
+def _label(quantity: Quantity, branch: "Branch") -> str:
+    if callable(quantity):
+        return ""
+    return branch_label(branch, quantity if isinstance(quantity, str) else int(quantity))

@@ -17,11 +17,12 @@ from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.analysis import LOWEST_DECADES, end_of_content, spectrum_line
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.parameter_labels import name_axis
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import distinct_colours, legend_label
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -211,7 +212,7 @@ def plot_poincare_scan(
         axis.pcolormesh(edges, rows, np.where(share > 0.0, share, np.nan).T, cmap="Blues",
                         norm=LogNorm(0.2 * float(met.min()),
                                      float(np.quantile(met, _DARKEST))), rasterized=True)
-        name_axis(axis, "x", x_label or parameter_label(found.parameter), found.values)
+        name_axis(axis, "x", x_label or _parameter(found), found.values)
         name_axis(axis, "y", y_label or _named(found, point, component, of), heights)
         axis.grid(False)
     return figure
@@ -226,6 +227,11 @@ def _edges(values: np.ndarray) -> np.ndarray:
     between = 0.5 * (values[first - 1] + values[first])
     return np.concatenate([values[:1] - 0.5 * (values[1] - values[0]), between,
                            values[-1:] + 0.5 * (values[-1] - values[-2])])
+
+
+def _parameter(found: "PoincareScan") -> str:
+    system = found.system if isinstance(found.system, ContactSystem) else None
+    return parameter_label(found.parameter, system=system)
 
 
 def _named(

@@ -1,25 +1,20 @@
-"""Labels of parameters with units, from the annotations of their classes, and of their axes."""
+"""Labels of axes: of parameters and stored values of branches, with ticks in suitable units."""
 
-import re
-from collections.abc import Iterator
-from dataclasses import is_dataclass
-from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib.ticker import Formatter
 
 from fecontact.core.types import Array
-from fecontact.core.units import Unit, has_prefixes, suitable_unit
-from fecontact.laws.base import NormalLaw
-from fecontact.laws.registry import is_kind, law_names
-from fecontact.system.contact_system import ContactSystem
+from fecontact.core.units import has_prefixes, suitable_unit
+from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from fecontact.bifurcation.continuation.branch import Branch
 
-_FORCE = re.compile(r"load\.forces\.(\d+)\.signal\.(\w+)")
+_UNITS = {"period": "s", "time": "s", "frequency_hz": "Hz"}
 
 
 class _InUnit(Formatter):
@@ -50,72 +45,26 @@ def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array)
         (axes.xaxis if which == "x" else axes.yaxis).set_major_formatter(_InUnit(factor))
 
 
-def parameter_label(
-    name: str, owner: type = ContactSystem, system: ContactSystem | None = None
-) -> str:
-    """Axis label of a parameter, with its unit if it has one.
+def branch_label(branch: "Branch", name: str | int = "parameter") -> str:
+    """Axis label of the parameter, of a stored value or of a state of a branch, with its unit.
 
-    ``ground.speed`` becomes ``ground speed [m/s]``. Names that are not parameters of the dataclass
-    ``owner``, or whose unit depends on the law, get no unit. With the system,
-    ``load.forces.0.signal.amplitude`` becomes ``force at B x [N]``.
+    Branches store labels of their parameters, ``labels``, and of what was observed of them,
+    ``observed_label``. Without them parameters have those of
+    :func:`~fecontact.system.parameter_labels.parameter_label`.
     """
-    if found := _FORCE.fullmatch(name):
-        return _force_label(int(found[1]), found[2], system)
-    inner = re.sub(r"^links\.[^.]+\.", "links.", re.sub(r"^interfaces\.[^.]+\.", "", name))
-    units = _units(owner).get(inner, frozenset())
-    words = re.sub(r"\b(\w+) \1\b", r"\1", re.sub(r"[._]", " ", name.removeprefix("interfaces.")))
-    return f"{words} [{next(iter(units))}]" if len(units) == 1 else words
-
-
-def _force_label(number: int, key: str, system: ContactSystem | None) -> str:
-    """Label of a number of the signal of a force, by the place and direction of the force."""
-    what, unit = f"force {number}", ""
-    if system is not None and number < len(system.load.forces):
-        force = system.load.forces[number]
-        moment = force.component.startswith("phi")
-        what = f"{'moment' if moment else 'force'} at {force.point} {force.component}"
-        unit = "N m" if moment else "N"
-    if key != "amplitude":
-        units = _units(ContactSystem).get(f"load.forces.signal.{key}", frozenset())
-        what = f"{key.replace('_', ' ')} of the {what}"
-        unit = next(iter(units)) if len(units) == 1 else ""
-    return f"{what} [{unit}]" if unit else what
-
-
-@cache
-def _units(owner: type) -> dict[str, frozenset[str]]:
-    """Units of each dotted name; several or none if laws differ."""
-    found: dict[str, set[str]] = {"gap": {"m"}}
-    laws: Any = law_names()[NormalLaw]
-    for law in laws.values():
-        if law.bilateral:
-            found |= {f"links.{name}": {unit} for name, unit in _units_of(law).items()}
-    for entry, hint in get_type_hints(owner).items():
-        section = entry.removesuffix("_settings")
-        for place, cls in _classes(hint, section):
-            for name, unit in _units_of(cls).items():
-                found.setdefault(f"{place}.{name}", set()).add(unit)
-    return {place: frozenset(units) - {""} if "" not in units else frozenset()
-            for place, units in found.items()}
-
-
-def _units_of(cls: type) -> dict[str, str]:
-    """Units from the annotations of a class's fields; empty strings for fields without one."""
-    return {name: next((item.symbol for item in getattr(hint, "__metadata__", ())
-                        if isinstance(item, Unit)), "")
-            for name, hint in get_type_hints(cls, include_extras=True).items()
-            if get_origin(hint) is not ClassVar}
-
-
-def _classes(hint: Any, place: str) -> Iterator[tuple[str, type]]:
-    """Dotted names and classes of all parts of a type: nested dataclasses and laws."""
-    if is_kind(hint):
-        for law in law_names()[hint].values():
-            yield place, law
-    elif is_dataclass(hint) and isinstance(hint, type):
-        yield place, hint
-        for name, inner in get_type_hints(hint).items():
-            yield from _classes(inner, f"{place}.{name}")
-    else:
-        for part in get_args(hint):
-            yield from _classes(part, place)
+    known = branch.attributes
+    if isinstance(name, int):
+        states = known.get("state_names", ())
+        return str(states[name]) if -len(states) <= name < len(states) else f"state {name}"
+    names = branch.parameter_names
+    if name == "parameter" or name in names:
+        place = 0 if name == "parameter" else names.index(name)
+        labels = known.get("labels", ())
+        return str(labels[place]) if place < len(labels) else parameter_label(names[place])
+    if name.startswith("observed_"):
+        what = str(known.get("observed_label", "observed displacement"))
+        return {"observed_maximum": f"largest {what}", "observed_minimum": f"smallest {what}",
+                "observed_amplitude": f"amplitude of {what}",
+                "observed_section": f"once per period: {what}"}.get(name, what)
+    words = name.removesuffix("_hz").replace("_", " ")
+    return f"{words} [{_UNITS[name]}]" if name in _UNITS else words

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.parameter_labels import branch_label, name_axis
 from fecontact.output.plots.style import DASHES, distinct_colours
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def plot_eigenvalues(
                            textcoords="offset points", fontsize=9.0)
         upper.set_ylabel("frequency [Hz]")
         lower.set_ylabel("growth rate [1/s]")
-        name_axis(lower, "x", x_label or parameter_label(branch.parameter_name), values)
+        name_axis(lower, "x", x_label or branch_label(branch), values)
         if values.min() < values.max():
             lower.set_xlim(values.min(), values.max())
         figure.align_ylabels([upper, lower])
@@ -129,8 +129,8 @@ def plot_stability_map(
             centre = inside[np.argmin(((inside - inside.mean(axis=0)) ** 2).sum(axis=1))]
             axis.text(found.first[centre[1]], found.second[centre[0]], "stable", ha="center",
                       va="center")
-        name_axis(axis, "x", x_label or parameter_label(found.names[0]), found.first)
-        name_axis(axis, "y", y_label or parameter_label(found.names[1]), found.second)
+        name_axis(axis, "x", x_label or found.labels[0], found.first)
+        name_axis(axis, "y", y_label or found.labels[1], found.second)
         axis.grid(False)
     return figure
 

@@ -131,8 +131,11 @@ class Overlay(Strips):
     def chart_height(self) -> int:
         """Height of the force chart in pixels, from the room that a flat body leaves; or zero.
 
-        The scene keeps little more than it needs, and at least a third.
+        The scene keeps little more than it needs, and at least a third. Without contact nodes there
+        is no chart.
         """
+        if not self.motion.trajectory.system.basis.contact_nodes:
+            return 0
         room = self.height - self.header_height - self.footer_height
         left = min(room - _SPARE * needed_height(self.motion) * self.width, _MOST_CHART * room)
         return 2 * int(0.5 * left) if left >= _LEAST_CHART * self.size else 0

@@ -12,7 +12,6 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import suitable_unit
-from fecontact.output.plots.parameter_labels import parameter_label
 from fecontact.output.report.diagram_page import (
     SAMPLES,
     Diagram,
@@ -84,7 +83,7 @@ def report_branches(
     largest = max(float(np.abs(one).max()) for one in heights)
     factor, symbol = suitable_unit(largest, "m") if y.startswith("observed") else (1.0, "")
     diagram = Diagram(
-        parameter_label(next(iter(named.values())).parameter_name, system=field.system()),
+        field.parameter_label(next(iter(named.values())).parameter_name),
         y.replace("_", " ").replace("observed", f"displacement {component} of {point},")
         + f" [{symbol}]" * bool(symbol),
         [branch.parameter for branch in named.values()], [one / factor for one in heights])

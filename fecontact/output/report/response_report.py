@@ -60,8 +60,8 @@ def report_response(
     path = require_page(path)
     names = [response.parameter_name, *([response.level_name] if response.level_name else [])]
     field = contact_field(system, dict.fromkeys(names))
-    named = dict(zip(_names(response, system), response.branches, strict=True))
-    factor, x_label = frequency_axis(response.parameter_name, system)
+    named = dict(zip(_names(response), response.branches, strict=True))
+    factor, x_label = frequency_axis(response)
     x = [branch.parameter / factor for branch in response.branches]
     amplitudes = [response.amplitude(level) for level in range(len(named))]
     unit = "rad" if observe[1].startswith("phi") else "m"
@@ -86,10 +86,10 @@ def report_response(
                           study)
 
 
-def _names(response: FrequencyResponse, system: ContactSystem) -> list[str]:
+def _names(response: FrequencyResponse) -> list[str]:
     """Names of the levels, each once."""
     if response.level_name is None:
         return ["response"]
-    words, texts = level_texts(response.level_name, response.levels, system)
+    words, texts = level_texts(response)
     return [f"{words} {text}" + f" ({number})" * (text in texts[:number])
             for number, text in enumerate(texts)]

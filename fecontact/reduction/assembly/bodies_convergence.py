@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.reduction.assembly.interface_compliance import (
@@ -19,6 +20,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 _SHOWN, _RIGID = 6, 3  # frequencies, and the most rigid modes of a body
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class BodiesConvergence:
     """Effect of mesh refinement and of further modes on several bodies; ``str(...)`` is a table.

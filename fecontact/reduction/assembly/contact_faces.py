@@ -83,7 +83,11 @@ def contact_directions(basis: ModalBasis) -> tuple[Array, Array]:
 
 
 def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
-    """One face for each interface; for a single body one of all its contact nodes, along x."""
+    """One face for each interface.
+
+    For a single body one of all its contact nodes, along x; without contact nodes one without name
+    and nodes.
+    """
     found: dict[str, ContactFace] = {}
     for one in _passes(basis):
         first = found.get(one.name, one)
@@ -98,7 +102,7 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
 def _passes(basis: ModalBasis) -> tuple[ContactFace, ...]:
     """As :func:`contact_faces`, but one for each pass of interfaces of two, with whole lengths."""
     x, length = basis.contact_x, np.array(basis.tributary)
-    if not several_bodies(basis):
+    if not several_bodies(basis) or not len(x):
         return (ContactFace("", (), slice(0, len(x)), x, "x", length),)
     ground, (tangents, normals) = basis.ground_nodes, contact_directions(basis)
     places = basis.positions[2 : 2 + len(x)]

@@ -18,6 +18,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.fem.elastic_body import ElasticBody
@@ -31,6 +32,7 @@ _ENOUGH = 0.9
 _ROUND_OFF = 1e-10  # of the largest compliance, below which there is none
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class InterfaceCompliance(Summarised):
     r"""Static compliance of an interface, and how much of it a modal basis resolves.

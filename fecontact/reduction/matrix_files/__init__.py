@@ -12,11 +12,13 @@ from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
+from fecontact.core.read_only import read_only_arrays
 from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
 
 _BANNER = b"%%MatrixMarket"
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class AssembledMatrix:
     """A matrix from a file.

@@ -14,6 +14,7 @@ import numpy as np
 
 from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.from_modes import basis_from_modes
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _AXES = ("x", "y", "z")
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class UffModes:
     """Modes of a universal file, in SI units if the file gives its units.

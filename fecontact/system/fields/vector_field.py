@@ -61,6 +61,10 @@ class VectorField(ABC):
         """The same field without what earlier calls have shown of it."""
         return self
 
+    def parameter_label(self, name: str) -> str:
+        """Label of a parameter for axes, with its meaning and unit where they are known."""
+        return name
+
     def forcing_period(self, values: Array) -> float | None:
         """Period of f in t [s]; None where f does not depend on t."""
         return None

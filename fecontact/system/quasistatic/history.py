@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
 from fecontact.system.contact_system import ContactSystem
@@ -24,6 +25,7 @@ from fecontact.system.quasistatic.pose import (
 from fecontact.system.quasistatic.rest_state import STATES, RestState, total_friction
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class Loop(Summarised):
     """Force and displacement of one action between two vertices of a path.
@@ -63,6 +65,7 @@ class Loop(Summarised):
         return float(np.trapezoid(self.force, self.displacement))
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class LoadHistory(Summarised):
     r"""Equilibria along a path of quasi-static loading.

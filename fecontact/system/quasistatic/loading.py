@@ -96,10 +96,12 @@ def load_history(
     require_kind("load_history", (LoadHistory, RestState), start=start)
     state = start.state() if isinstance(start, LoadHistory) else start
     state.check(system)
-    pose = _pose(state.modal_coordinates, state.sliders, state.slider_place, state.slider_force)
+    # Tuples for kernels hold no read-only arrays.
+    sliders = Sliders(*map(np.array, state.sliders))
+    pose = _pose(state.modal_coordinates, sliders, state.slider_place, state.slider_force)
     balance = _balance(system, arrays, given[0])
-    return _loaded(system, arrays, path, np.vstack([state.given, given]), pose, state.sliders,
-                   balance, rtol, 1)
+    return _loaded(system, arrays, path, np.vstack([state.given, given]), pose, sliders, balance,
+                   rtol, 1)
 
 
 def _loaded(

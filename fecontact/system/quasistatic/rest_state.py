@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, count, quantity
 from fecontact.system.contact_system import ContactSystem
@@ -24,6 +25,7 @@ _KINDS = ("plane bodies", "solids")
 _AT_LIMIT = 1e-9
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class RestState(Summarised):
     """Equilibrium of a body at rest, which depends on how it was loaded.

@@ -14,7 +14,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.output.plots.bifurcation_diagram import SPECIAL, runs_of, stable_pieces
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.parameter_labels import branch_label, name_axis
 from fecontact.output.plots.style import DASHES, distinct_colours
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def plot_resonance_curve(
                   np.concatenate([curve.amplitude for curve in given]))
         name_axis(lower, "y", "frequency [Hz]",
                   np.concatenate([curve.frequency for curve in given]))
-        name_axis(lower, "x", parameter_label(next(iter(over))),
+        name_axis(lower, "x", branch_label(given[0].branch),
                   np.concatenate([curve.parameter for curve in given]))
         _legend(upper, list(names), colours, drawn)
     return figure

@@ -11,7 +11,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import has_prefixes, suitable_unit
 from fecontact.output.plots.bifurcation_diagram import SPECIAL, runs_of, stable_pieces
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis, parameter_label
+from fecontact.output.plots.parameter_labels import branch_label, name_axis
 from fecontact.output.plots.style import (
     BEYOND,
     BEYOND_COLOUR,
@@ -19,16 +19,15 @@ from fecontact.output.plots.style import (
     distinct_colours,
     shaded_beyond,
 )
+from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from fecontact.system.contact_system import ContactSystem
-
 
 def plot_response(
     response: FrequencyResponse, *, logarithmic: bool = False, y_label: str | None = None,
-    system: "ContactSystem | None" = None, usable_hz: float = np.inf,
+    usable_hz: float = np.inf,
     path: str | Path | None = None,
 ) -> "Figure":
     """Plot a frequency response: amplitude and phase, a colour for each level.
@@ -46,8 +45,6 @@ def plot_response(
     y_label : str, optional
         Label of the amplitude with its unit, such as ``amplitude [m]``; ticks are in a unit that
         suits the values.
-    system : ContactSystem, optional
-        What vibrates; its loads name the parameters.
     usable_hz : float
         Frequency up to which the basis is usable [Hz]; over frequency, what lies beyond is shaded.
     path : str or Path, optional
@@ -59,7 +56,7 @@ def plot_response(
         For another suffix, or a file that cannot be written.
     """
     require_kind("plot_response", FrequencyResponse, response=response)
-    factor, label = frequency_axis(response.parameter_name, system)
+    factor, label = frequency_axis(response)
     with new_figure(9.0, 6.4, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         marked: dict[str, None] = {}
@@ -89,24 +86,23 @@ def plot_response(
         name_axis(lower, "x", label, np.array(lower.dataLim.intervalx))
         upper.margins(x=0.02)
         beyond = label.endswith("[Hz]") and shaded_beyond((upper, lower), usable_hz)
-        _legend(upper, response, colours, list(marked), dashed, beyond, system)
+        _legend(upper, response, colours, list(marked), dashed, beyond)
     return figure
 
 
-def frequency_axis(name: str, system: "ContactSystem | None" = None) -> tuple[float, str]:
-    """Factor and label of a parameter's axis; angular frequencies are shown in Hz."""
-    label = parameter_label(name, system=system)
-    if name.rpartition(".")[2] == "angular_frequency":
+def frequency_axis(response: FrequencyResponse) -> tuple[float, str]:
+    """Factor and label of the parameter's axis; angular frequencies are shown in Hz."""
+    label = branch_label(response.branches[0])
+    if response.parameter_name.rpartition(".")[2] == "angular_frequency":
         words = label.removesuffix(" [rad/s]").replace("angular ", "")
         return 2.0 * np.pi, f"{words} [Hz]"
     return 1.0, label
 
 
-def level_texts(
-    name: str, levels: Array, system: "ContactSystem | None" = None
-) -> tuple[str, list[str]]:
+def level_texts(response: FrequencyResponse) -> tuple[str, list[str]]:
     """Name of the parameter of the levels, and their values in a unit that suits them."""
-    label = parameter_label(name, system=system)
+    levels, known = response.levels, response.branches[0].attributes
+    label = str(known.get("level_label") or parameter_label(response.level_name or ""))
     words, _, unit = label.rpartition(" [")
     unit = unit.removesuffix("]") if words else ""
     factor, symbol = 1.0, unit
@@ -135,14 +131,14 @@ def _degrees(limits: tuple[float, float]) -> Array:
 
 def _legend(
     axis: Any, response: FrequencyResponse, colours: list[str], kinds: list[str], dashed: bool,
-    beyond: bool, system: "ContactSystem | None",
+    beyond: bool,
 ) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     handles: list[Any] = []
     if response.level_name:
-        name, texts = level_texts(response.level_name, response.levels, system)
+        name, texts = level_texts(response)
         handles.append(Line2D([], [], linestyle="none", label=name))
         handles += [Line2D([], [], color=colour, linewidth=1.8, label=text)
                     for text, colour in zip(texts, colours, strict=True)]

@@ -1,0 +1,79 @@
+"""Read-only arrays of results: NumPy raises ValueError where they are written to."""
+
+from collections.abc import Callable
+from functools import cached_property, wraps
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+
+_Owner = TypeVar("_Owner", bound=type)
+
+
+def read_only(value: Any) -> Any:
+    """Return a read-only view of an array; in tuples, lists and mappings, of each array.
+
+    The array itself stays writeable, so that one given by a user is not frozen.
+    """
+    if isinstance(value, np.ndarray):
+        if not value.flags.writeable:
+            return value
+        view = value.view()
+        view.flags.writeable = False
+        return view
+    if type(value) in (dict, MappingProxyType):
+        frozen = {name: read_only(item) for name, item in value.items()}
+        changed = any(frozen[name] is not item for name, item in value.items())
+        return type(value)(frozen) if changed else value
+    if isinstance(value, tuple | list):
+        items = [read_only(item) for item in value]
+        if all(new is old for new, old in zip(items, value, strict=True)):
+            return value
+        return value._make(items) if hasattr(value, "_make") else type(value)(items)
+    return value
+
+
+def read_only_arrays(owner: _Owner) -> _Owner:
+    """Decorate a class so that the arrays of its objects are read-only.
+
+    This covers fields, public properties and cached properties, also after copying and unpickling.
+    Methods return new arrays, which stay writeable. Place the decorator above ``@dataclass``.
+    """
+    for name, member in list(vars(owner).items()):
+        if name.startswith("_"):
+            continue
+        if isinstance(member, cached_property):
+            member.func = _returning_read_only(member.func)
+        elif isinstance(member, property) and member.fget is not None:
+            setattr(owner, name, property(_returning_read_only(member.fget), member.fset,
+                                          member.fdel, member.__doc__))
+    if "__init__" in vars(owner):
+        made, restored = vars(owner)["__init__"], getattr(owner, "__setstate__", _set_state)
+        for name, function in (("__init__", made), ("__setstate__", restored)):
+            setattr(owner, name, _freezing(function))
+    return owner
+
+
+def _returning_read_only(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    @wraps(function)
+    def returned(self: Any) -> Any:
+        return read_only(function(self))
+
+    return returned
+
+
+def _freezing(function: Callable[..., None]) -> Callable[..., None]:
+    """Let a function that fills an object end with read-only arrays in it."""
+
+    @wraps(function)
+    def filled(self: Any, *args: Any, **kwargs: Any) -> None:
+        function(self, *args, **kwargs)
+        known = vars(self)
+        for name, value in known.items():
+            known[name] = read_only(value)
+
+    return filled
+
+
+def _set_state(self: Any, state: dict[str, Any]) -> None:
+    vars(self).update(state)
