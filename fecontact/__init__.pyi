@@ -25,10 +25,10 @@ from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
 from .fem.points import Patch
 from .integrate.contact_quantities import ContactState
-from .integrate.ensemble import ensemble
+from .integrate.ensembles import ensemble
 from .integrate.events import Event, event
 from .integrate.initial_state import RigidStart
-from .integrate.sensitivity import sensitivity
+from .integrate.sensitivities import sensitivity
 from .integrate.simulate import simulate
 from .integrate.trajectory import Status, Trajectory
 from .laws.excitation import BoundaryLoad, Drive, Load, PointLoad

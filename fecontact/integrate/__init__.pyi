@@ -1,8 +1,8 @@
-from .ensemble import Ensemble, strobe
+from .ensembles import Ensemble, strobe
 from .events import ContactEvents, Crossing, Events
 from .field_runs.field_run import FieldRun
 from .initial_state import PointStart, initial_state
-from .sensitivity import Sensitivity
+from .sensitivities import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
 from .solvers import CVODE, Rodas5P, Scipy, SetValued, Solver, Task
 from .trajectory import Energies, Solution

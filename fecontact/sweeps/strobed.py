@@ -7,7 +7,7 @@ import numpy as np
 from fecontact.analysis.periodicity import count_periods
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
-from fecontact.integrate.ensemble import ensemble
+from fecontact.integrate.ensembles import ensemble
 from fecontact.integrate.initial_state import initial_state
 from fecontact.integrate.trajectory import Status
 from fecontact.study.study import Study

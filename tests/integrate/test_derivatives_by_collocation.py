@@ -15,7 +15,7 @@ from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, sensitivity
 from fecontact.integrate import Rodas5P
 from fecontact.integrate.rodas5p import driver, step_loop
 from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.integrate.sensitivity import _moved
+from fecontact.integrate.sensitivities import _moved
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,

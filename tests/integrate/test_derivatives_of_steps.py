@@ -10,7 +10,7 @@ from systems import mass_in_plane
 from fecontact import Drive, Ground, Load
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.integrate.sensitivity import _moved
+from fecontact.integrate.sensitivities import _moved
 from fecontact.laws import (
     ExponentialFriction,
     HarmonicSpeed,

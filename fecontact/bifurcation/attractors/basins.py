@@ -22,7 +22,7 @@ from fecontact.core.progress import progress_bar, shown
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike, Integers
-from fecontact.integrate.ensemble import ensemble, strobe
+from fecontact.integrate.ensembles import ensemble, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
 from fecontact.integrate.solvers import RODAS5P, Solver
 from fecontact.reduction.modal_basis import Component

@@ -19,7 +19,7 @@ from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
-from fecontact.integrate.ensemble import ensemble, is_many, strobe
+from fecontact.integrate.ensembles import ensemble, is_many, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
 from fecontact.integrate.field_runs.start import start_state
 from fecontact.integrate.solvers import RODAS5P, Solver

@@ -19,8 +19,8 @@ from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
 from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
-from fecontact.integrate.ensemble import ensemble
-from fecontact.integrate.sensitivity import Sensitivity, differentiated
+from fecontact.integrate.ensembles import ensemble
+from fecontact.integrate.sensitivities import Sensitivity, differentiated
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem

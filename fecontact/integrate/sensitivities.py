@@ -14,7 +14,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.collocation.room import chosen_collocation
-from fecontact.integrate.ensemble import Ensemble, ensemble
+from fecontact.integrate.ensembles import Ensemble, ensemble
 from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p import step_loop
