@@ -66,7 +66,7 @@ def test_a_chain_hands_on_its_states():
 
 def test_a_run_that_cannot_go_on_leaves_the_others():
     system = impact_oscillator(modes=2)
-    wild = np.array([0.0, 0.0, 1e200, 0.0])
+    wild = np.array([0.0, 0.0, 1e50, 0.0])
     found = ensemble(system, [0.0, 0.1, 0.2], initial=np.vstack([wild, np.zeros(4)]))
     assert found.status[0] is not Status.FINISHED
     assert np.isnan(found.states[0, -1]).all()
@@ -78,7 +78,7 @@ def test_runs_in_the_tables_of_another_are_those_of_fresh_ones():
     system, state = beam()
     assert system.basis.contact_nodes > FEW
     tilted, fast, wild = state.copy(), state.copy(), state.copy()
-    tilted[2], fast[9], wild[5:] = 3e-6, 1e200, 1e308
+    tilted[2], fast[9], wild[5:] = 3e-6, 1e50, 9e59
     starts = np.vstack([state, fast, tilted, wild, state])
     times = np.linspace(0.0, 2e-3, 5)
     found = ensemble(system, times, initial=starts, workers=1)
@@ -103,7 +103,7 @@ def test_runs_with_powers_derivatives_or_events_are_not_begun_again(options):
     ({"times": [0.0, 0.0]}, "ascending"),
     ({"times": np.zeros((3, 2))}, "ascending"),
     ({"initial": np.zeros((2, 3))}, "must have 4 values"),
-    ({"initial": np.full((2, 4), np.nan)}, "not finite"),
+    ({"initial": np.full((2, 4), np.nan)}, "must be finite"),
     ({"rtol": 0.0}, "rtol = 0.0"),
     ({"chain": 0}, "chain = 0"),
     ({"workers": 1.5}, "workers = 1.5"),
