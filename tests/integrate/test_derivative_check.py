@@ -7,7 +7,7 @@ import pytest
 from systems import friction_oscillator, mass_in_y
 
 from fecontact import Load, ModelWarning, sensitivity
-from fecontact.integrate import sensitivity as module
+from fecontact.integrate import sensitivities as module
 from fecontact.laws import Frictionless, LinearContact
 
 DEPTH = 1e-3
