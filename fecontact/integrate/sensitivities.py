@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
@@ -14,6 +14,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.collocation.room import chosen_collocation
+from fecontact.integrate.derivative_check import doubts
 from fecontact.integrate.ensembles import Ensemble, ensemble
 from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages
 from fecontact.integrate.initial_state import Initial, initial_state
@@ -66,7 +67,7 @@ class Sensitivity:
         The transitions by differences to one side, above and below the state, where runs are
         differenced. Where a jump of their ends lies near, they are far apart.
     note : str
-        Which derivatives by differences are none, as those to both sides are apart; else empty.
+        Which derivatives disagree with differences of runs, or to both sides; else empty.
     """
 
     times: Array
@@ -125,6 +126,10 @@ def sensitivity(
     derivatives is solved along the motion. Where a node touches down with a force that jumps, as
     that of :class:`fecontact.laws.LinearContact` with damping, derivatives contain the saltation.
 
+    One direction of the derivatives is compared with differences of runs. If they are more than two
+    percent apart, as where a node just touches the ground, a ModelWarning and
+    :attr:`Sensitivity.note` name the spans between output times.
+
     With SetValued, forces and velocities jump. Its runs locate the jumps, so that the end of a run
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives
     are central differences of this function, which contain the saltation at the jumps, of relative
@@ -171,6 +176,10 @@ def sensitivity(
     state = initial_state(system, initial, t_start)
     found = differentiated(system, times, state, parameter, solver, float(rtol), derivative_rtol,
                            max_step)
+    if isinstance(solver, Rodas5P):
+        at = None if parameter is None else _function_of(system, parameter)
+        found = replace(found, note=doubts(system, times, found.states, found.transitions,
+                                           found.forced, at, solver, float(rtol), max_step))
     if found.note:
         warnings.warn(found.note, ModelWarning, stacklevel=2)
     return found

@@ -79,6 +79,10 @@ MEMORY_FORM = "f(v, F, z, p, force, rates)"
 
 def _compiled(signature: Any, form: str, function: Any, arguments: int) -> CompiledLaw:
     """Make a law of a function after checking its number of arguments."""
+    if inspect.isfunction(function) and "print" in function.__code__.co_names:
+        raise InputError(f"The law {function.__name__} calls print, which waits for Python inside "
+                         f"a compiled run and may never return; remove it, and print what "
+                         f"fecontact.laws.check_law or the law's methods return.")
     if not inspect.isfunction(function):
         raise InputError(f"A law must be a Python function {form}, not "
                          f"{type(function).__name__}.")
