@@ -97,9 +97,9 @@ def read_inp(path: Path) -> RawMesh:
 
 
 def _require_end(text: str) -> None:
-    """Refuse a file that ends within a line, within a part, or before the data of a keyword."""
+    """Refuse a file that ends within data, within a part, or before the data of a keyword."""
     lines = [line.strip() for line in text.splitlines()]
-    if not text.endswith("\n") and lines[-1] and not lines[-1].startswith("**"):
+    if not text.endswith("\n") and lines[-1] and not lines[-1].startswith("*"):
         raise MeshError(f"The last line, {shown(lines[-1])}, has no line break, so the file may be "
                         f"cut off; end it with a line break if it is complete.")
     lines = [line for line in lines if line and not line.startswith("**")]
