@@ -60,10 +60,10 @@ class Size:
 
     def _combined(self, other: "Size | int", sign: str, of: Callable[[int, int], int]) -> "Size":
         def value(sizes: Mapping[Size, int]) -> int:
-            found = [_length(item, sizes) for item in (self, other)]
-            if None in found:
+            first, second = _length(self, sizes), _length(other, sizes)
+            if first is None or second is None:
                 raise KeyError
-            return of(*found)
+            return of(first, second)
 
         return Size(f"({self.name} {sign} {getattr(other, 'name', other)})", value)
 

@@ -15,6 +15,7 @@ between them but for the square of the window, and its amplitude but for the fou
 Phase: the given force does no work in phase with the displacements, Re(P^H X_1) = 0.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -79,6 +80,10 @@ class PeakProblem(Problem):
     window: float = 0.0
 
     keeps_matrix: ClassVar[bool] = True
+
+    def labels(self, names: Sequence[str]) -> tuple[str, ...]:
+        """See :meth:`Problem.labels`."""
+        return self.orbit.labels(names)
 
     def linearise(self, u: Array) -> "PeakLinearised":
         """Residual and derivative at u, on demand."""

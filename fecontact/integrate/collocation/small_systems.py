@@ -56,6 +56,6 @@ def _of_room(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
 def compile_usual() -> None:
     """Compile the loops of all sizes, and derivatives of steps of the usual ones."""
     for size in small_systems.SIZES:
-        _advance(*size)
+        _advance(*size).ready()
     for size in small_systems.USUAL:
         _propagate(*size)

@@ -16,7 +16,7 @@ USUAL = ((1, 1), (2, 1), (3, 1), (2, 2))
 def compile_usual() -> None:
     """Compile the step loops of the usual sizes, or find them stored."""
     for size in USUAL:
-        advance_for(*size)
+        advance_for(*size).ready()
 
 
 @cache

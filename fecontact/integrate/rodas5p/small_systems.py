@@ -92,7 +92,7 @@ def compile_step_loops(last_first: bool = False) -> None:
     process. Two processes in opposite order share the work.
     """
     for size in reversed(SIZES) if last_first else SIZES:
-        _advance(*size)
+        _advance(*size).ready()
 
 
 def compile_usual() -> None:

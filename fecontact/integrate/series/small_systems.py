@@ -35,3 +35,9 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all systems of a size, for each type of tuples."""
     return small_systems.fixed_values(modes, nodes) | shapes(
         small_systems.sizes_of(modes, nodes), Series)
+
+
+def compile_usual() -> None:
+    """Compile the loops of all sizes."""
+    for size in SIZES:
+        _advance(*size).ready()

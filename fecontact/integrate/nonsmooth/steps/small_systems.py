@@ -46,3 +46,9 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
                    kinds.Workspace, Room)
     found[kinds.NonsmoothProblem]["cluster"] = np.arange(nodes)
     return found | {SystemArrays: small_systems.fixed_values(modes, nodes)[SystemArrays]}
+
+
+def compile_usual() -> None:
+    """Compile the runs of all sizes."""
+    for size in SIZES:
+        _run(*size).ready()
