@@ -12,12 +12,12 @@ coefficients follow from the terms up to third order (Kuznetsov, Govaerts, Doede
 J. Numer. Anal. 43, 2005), as those that make the collocation equations solvable. The second and
 third derivatives of f are differences of its Jacobian along directions.
 
-Jumps of the second derivative of f along the orbit, as of exp(-b |v|) at zero slip, belong to its
-third derivative but are not in these differences. The coefficient lacks their share, which its
-error does not cover: with such friction 0.39 instead of 0.46 at a doubling of stick-slip.
+Jumps of the second derivative of f along the orbit, as of friction with exp(-b |v|) at zero slip,
+add a delta each to the third derivative, see :mod:`fecontact.bifurcation.orbits.kinks`.
 """
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +34,7 @@ from fecontact.bifurcation.orbits.curves.singularity import (
     of_torus,
 )
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
+from fecontact.bifurcation.orbits.kinks import JacobianKinks
 
 Array = NDArray[Any]
 
@@ -95,14 +96,14 @@ def _judged(
     values: list[float] = []
     pairs: list[tuple[float, float]] = []
     for step in _STEPS:
-        value, size = formula(expansion.bends(step))
+        (value, size), uncertain = expansion.coefficient(formula, step)
         values.append(value)
         if len(values) > 1:
             pairs.append((abs(value - values[-2]), value))
             if pairs[-1][0] <= _AGREEMENT * abs(value):
-                return verdict(value, max(pairs[-1][0], _CANCELLED * size))
+                return verdict(value, max(pairs[-1][0], _CANCELLED * size) + uncertain)
     _, value = min(pairs)
-    return verdict(value, max(abs(one - value) for one in values))
+    return verdict(value, max(abs(one - value) for one in values) + uncertain)
 
 
 class Share(NamedTuple):
@@ -166,27 +167,58 @@ class Expansion:
         unit = self._size(V) ** 2
         return Share(found.real / unit, size / unit)
 
+    def coefficient(
+        self, formula: Callable[[Sequence[Bend]], Share], step: float
+    ) -> tuple[Share, float]:
+        """A coefficient with the share of jumps of second derivatives, and the error of that share.
+
+        ``step`` is the step of the differences in ranges of the states.
+        """
+        bends = self.bends(step)
+        # Coefficients of folds contain second derivatives only.
+        if formula == self.fold or not self._kinks.passages:
+            return formula(bends), 0.0
+        found, doubtful = [], []
+        span = self._span()
+        for bend, term in zip(bends, self._at.terms, strict=True):
+            change, error = self._kinks.second(term.states, self._step(term.states, step), span)
+            found.append(bend._replace(second=bend.second + change))
+            doubtful.append(bend._replace(second=bend.second + change + error))
+        whole = formula(found)
+        return whole, abs(formula(doubtful).value - whole.value)
+
+    @cached_property
+    def _kinks(self) -> JacobianKinks:
+        return JacobianKinks(self._linearised)
+
     def bends(self, step: float) -> list[Bend]:
         """Differences of fourth order along v, over a step in ranges of the states."""
         return [self._bend(term.states, step) for term in self._at.terms]
 
     def _bend(self, direction: Array, step: float) -> Bend:
         """Differences along a direction (N m, d)."""
-        problem = self._problem
-        nodes = problem.nodes(self._u)
-        scales = problem.scales[: nodes.shape[1]]
-        size = np.ptp(nodes, axis=0) / scales
-        span = np.maximum(size, 0.1 * size.max()) * scales
-        largest = float(np.max(np.abs(direction) / span))
-        if largest == 0.0:
+        h = self._step(direction, step)
+        if h == 0.0:
             return Bend(*(np.zeros_like(self._J) for _ in range(3)))
-        h = step / largest
         _, J, P = self._linearised.derivatives_beside(
             [part * h * direction for part in (1.0, -1.0, 2.0, -2.0)], states_alone=True)
         odd, far_odd = J[0] - J[1], J[2] - J[3]
         even, far_even = J[0] + J[1], J[2] + J[3]
         return Bend(np.asarray((8.0 * odd - far_odd) / (12.0 * h)),
                     np.asarray((16.0 * even - far_even - 30.0 * self._J) / (12.0 * h * h)), P[0])
+
+    def _span(self) -> Array:
+        """Ranges (d,) of the states over the orbit, at least a tenth of the largest scaled one."""
+        nodes = self._problem.nodes(self._u)
+        scales = self._problem.scales[: nodes.shape[1]]
+        size = np.ptp(nodes, axis=0) / scales
+        span: Array = np.maximum(size, 0.1 * size.max()) * scales
+        return span
+
+    def _step(self, direction: Array, step: float) -> float:
+        """Factor of a direction (N m, d) for a step in ranges; 0 if the direction is zero."""
+        largest = float(np.max(np.abs(direction) / self._span()))
+        return step / largest if largest > 0.0 else 0.0
 
     def _share(self, left: Array, V: Array, g: Array) -> tuple[complex, float]:
         """The c for which w' - A w = T g - c v is solvable, and the sum of the sizes in it."""
