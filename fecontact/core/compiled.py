@@ -23,15 +23,14 @@ from numba import types
 from numba.core import sigutils
 from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
-from numba.core.datamodel.models import PrimitiveModel
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
-from numba.core.typing import Signature
-from numba.extending import intrinsic, lower_builtin, register_model
 
+from fecontact.core.addresses import contract_signature
 from fecontact.core.errors import InputError
 from fecontact.core.kernel_parts import BorrowingCompiler, kernel_compiler, part
-from fecontact.core.records import signature_of
+from fecontact.core.records import is_record, signature_of
 
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
 
@@ -201,9 +200,10 @@ class _Kernel(CPUDispatcher):
 
     def ready(self) -> Any:
         """Itself, compiled."""
-        if not self.overloads:
-            self.compile(self.signature)
-            self.disable_compile()
+        with global_compiler_lock:
+            if not self.overloads:
+                self.compile(self.signature)
+                self.disable_compile()
         return self
 
     @property
@@ -213,9 +213,41 @@ class _Kernel(CPUDispatcher):
         return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
 
     def _compile_for_args(self, *arguments: Any, **by_name: Any) -> Any:
-        if self.overloads:
-            return super()._compile_for_args(*arguments, **by_name)
+        # Called before it is compiled only, and called again with what is returned.
         return self.ready()
+
+
+class _RecordKernel(_Kernel):
+    """A kernel that takes records, in which arrays of results may be read-only.
+
+    It must not write to them, as to read-only arrays that any kernel is given.
+    """
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the function returns."""
+        try:
+            return super().__call__(*arguments)
+        except TypeError:
+            given = tuple(map(_writeable, arguments))
+            if all(new is old for new, old in zip(given, arguments, strict=True)):
+                raise
+            return super().__call__(*given)
+
+
+def _writeable(value: Any) -> Any:
+    """The value, with views that numba takes in place of read-only arrays."""
+    if isinstance(value, np.ndarray) and not value.flags.writeable:
+        view = value.view()
+        try:
+            view.flags.writeable = True
+        except ValueError:
+            return value.copy()
+        return view
+    if isinstance(value, tuple):
+        items = tuple(map(_writeable, value))
+        if any(new is not old for new, old in zip(items, value, strict=True)):
+            return value._make(items) if hasattr(value, "_make") else items
+    return value
 
 
 # All kernels of the modules that have been imported.
@@ -244,7 +276,8 @@ def kernel(
         "nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": _FASTMATH,
         "no_cpython_wrapper": by_address, **options,
     }
-    made = _Kernel(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
+    kind = _RecordKernel if any(map(is_record, function.__annotations__.values())) else _Kernel
+    made = kind(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
     made.given, made.by_address, made.options = signature, by_address, options
     made.enable_caching()
     _stamp(made, made, variant=constants)
@@ -326,13 +359,7 @@ class CompiledLaw:
 
 def compile_law(contract: Any, form: str, function: Callable[..., Any]) -> CompiledLaw:
     """A law of the types of ``contract``, a ``Callable[...]``; ``form`` is that for people."""
-    return CompiledLaw(function, form, _signature(contract))
-
-
-def _signature(contract: Any) -> Any:
-    if isinstance(contract, Signature):
-        return contract
-    return signature_of(getattr(contract, "py_func", contract))
+    return CompiledLaw(function, form, contract_signature(contract))
 
 
 def _arguments(function: Callable[..., Any]) -> str:
@@ -354,56 +381,3 @@ def _raising(function: Callable[..., Any], seen: set[Any] | None = None) -> str 
         if called is not None and called not in seen and _raising(called, seen) is not None:
             return f" in {name}"
     return None
-
-
-class _FunctionAt(types.Callable):
-    """Numba's type of an address of a function in C that takes and returns numba's values."""
-
-    def __init__(self, signature: Any, only_reads: bool) -> None:
-        self.prototype, self.only_reads = types.FunctionType(signature), only_reads
-        super().__init__(name=f"FunctionAt({signature}, {only_reads})")
-
-    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        """Its signature, for as many arguments."""
-        wanted = self.prototype.signature
-        return wanted.replace(recvr=self) if len(args) == len(wanted.args) else None
-
-    def get_call_signatures(self) -> Any:
-        """Its signature."""
-        return [self.prototype.signature], False
-
-    def get_impl_key(self, sig: Any) -> Any:
-        """All such functions are called in the same way."""
-        return type(self)
-
-
-@register_model(_FunctionAt)
-class _FunctionAtModel(PrimitiveModel):
-    def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, dmm.lookup(types.int64).get_value_type())
-
-
-@lower_builtin(_FunctionAt, _FunctionAt, types.VarArg(types.Any))
-def _call_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    kind = signature.args[0]
-    pointer = builder.inttoptr(args[0], context.get_value_type(kind.prototype.ftype))
-    attributes = ("nounwind", "readonly") if kind.only_reads else ("nounwind",)
-    return builder.call(pointer, args[1:], attrs=attributes)
-
-
-def function_at(contract: Any, *, only_reads: bool = False) -> Any:
-    """A function for kernels that turns an address into a callable.
-
-    ``contract`` is its type, ``Callable[[...], ...]``, or a kernel of that. Functions that
-    store nothing, ``only_reads``, leave what kernels have read as it was.
-    """
-    kind = _FunctionAt(_signature(contract), only_reads)
-
-    @intrinsic
-    def at(typingctx: Any, address: Any) -> Any:
-        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return args[0]
-
-        return kind(types.int64), codegen
-
-    return at

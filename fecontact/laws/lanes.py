@@ -11,7 +11,8 @@ from typing import Any
 
 from numba import types
 
-from fecontact.core.compiled import CompiledLaw, compile_law, function_at, helper
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import CompiledLaw, compile_law, helper
 from fecontact.core.lanes.functions import (
     arctangent,
     exponential,

@@ -48,11 +48,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from fecontact.core.compiled import (
-    CompiledLaw,
-    compile_law,
-    function_at,
-)
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import InputError
 from fecontact.core.records import Matrix, Vector
 

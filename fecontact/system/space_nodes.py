@@ -9,7 +9,8 @@ for systems in space only. With slopes y_i of the ground along the tangents i = 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from fecontact.core.compiled import compile_law, function_at, helper
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, helper
 from fecontact.core.records import Matrix, Vector
 from fecontact.laws.signatures import ground_at, normal_at, planar_at, surface_at
 from fecontact.system.nodes import (

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 from numba import types
 
-from fecontact.core.compiled import compile_law, function_at, helper, kernel, routine
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, helper, kernel, routine
 from fecontact.core.constants import constants
 from fecontact.core.records import (
     IntegerVector,
@@ -195,6 +197,38 @@ def test_a_kernel_is_compiled_at_its_first_call_and_for_its_types_alone():
     assert len(twice.overloads) == 1
     with pytest.raises(TypeError, match="No matching definition"):
         twice(Inner(np.ones(1), 1.5))
+
+
+@kernel
+def total_of(p: Outer, y: Vector) -> float:
+    return p.x.sum() + p.inner.rows.sum() + y.sum()
+
+
+def test_read_only_arrays_are_read_in_records_too():
+    p, y = given(), np.ones(3)
+    expected = total_of(p, y)
+    for array in (p.x, p.inner.rows, y):
+        array.flags.writeable = False
+    assert total_of(p, y) == expected
+    assert not p.x.flags.writeable
+    fixed = p._replace(x=np.frombuffer(p.x.tobytes()))
+    assert total_of(fixed, y) == expected
+    assert len(total_of.overloads) == 1
+
+
+@kernel
+def many_sines(x: Vector) -> float:
+    total = 0.0
+    for value in x:
+        total += np.sin(value)
+    return total
+
+
+def test_threads_may_call_a_kernel_for_the_first_time_together():
+    x = np.linspace(0.0, 1.0, 100)
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(lambda _: many_sines(x), range(8)))
+    assert found == pytest.approx([np.sin(x).sum()] * 8)
 
 
 @pytest.mark.long

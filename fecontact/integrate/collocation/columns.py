@@ -18,7 +18,8 @@ which it has through the accelerations at its begin too, is their error.
 
 import numpy as np
 
-from fecontact.core.compiled import function_at, helper, kernel, routine
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.dense_lu import backward, factorise, forward
 from fecontact.integrate.collocation.courses import look
 from fecontact.integrate.collocation.room import Collocation

@@ -14,7 +14,8 @@ node].
 
 from collections.abc import Callable
 
-from fecontact.core.compiled import compile_law, function_at, helper
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, helper
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerVector, Vector
 from fecontact.integrate.nonsmooth.problem import (

@@ -10,7 +10,8 @@ whose changes of sign are found however close.
 
 from collections.abc import Callable
 
-from fecontact.core.compiled import compile_law, function_at, helper, routine
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
 from fecontact.integrate.courses import MOST
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate

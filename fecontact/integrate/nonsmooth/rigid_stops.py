@@ -27,7 +27,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fecontact.core.compiled import compile_law, function_at, routine
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, routine
 from fecontact.core.records import Vector
 from fecontact.integrate.nonsmooth.contact_conditions import (
     Conditions,

@@ -24,7 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import function_at, helper
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
 from fecontact.integrate.nonsmooth.problem import CREEP, NonsmoothProblem

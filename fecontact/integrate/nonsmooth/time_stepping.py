@@ -13,7 +13,8 @@ import math
 
 import numpy as np
 
-from fecontact.core.compiled import function_at, helper, kernel
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper, kernel
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
 from fecontact.integrate.nonsmooth.event_search import ROUGHLY, UNFELT, first_pressed, pressed

@@ -13,12 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import (
-    compile_law,
-    function_at,
-    helper,
-    routine,
-)
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.integrate import bernstein

@@ -15,7 +15,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fecontact.core.compiled import compile_law, function_at, routine
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, routine
 from fecontact.core.records import Vector
 from fecontact.integrate.rodas5p import dynamics, state, tableau
 from fecontact.integrate.rodas5p.step_length import LAST_STEP

@@ -11,7 +11,8 @@ estimate of the error sees it.
 
 from collections.abc import Callable
 
-from fecontact.core.compiled import compile_law, function_at, helper
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law, helper
 from fecontact.integrate.courses import (
     COEFFICIENTS,
     DOUBT,

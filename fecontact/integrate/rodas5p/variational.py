@@ -18,12 +18,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import (
-    function_at,
-    helper,
-    kernel,
-    routine,
-)
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Block, Size, allocate
 from fecontact.core.types import Array
 from fecontact.integrate import collocated_columns as collocation

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from numba import types
 from numba.extending import intrinsic
 
-from fecontact.core.compiled import function_at, helper
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper
 from fecontact.integrate.rodas5p import state
 
 # Node forces and the rates at a stage; rates and gradients at the end of a step; rates in time; the

@@ -6,11 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import (
-    function_at,
-    helper,
-    kernel,
-)
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import (
     Block,
     ComplexMatrix,

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import compile_law, function_at
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import compile_law
 from fecontact.core.records import ComplexMatrix, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.system.fields.function_kernels import (
