@@ -5,8 +5,7 @@ import os
 import sys
 from typing import Any
 
-from fecontact.core.checks import require_docstrings
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, require_docstrings
 
 _ASCII = str.maketrans({
     "\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MINUS SIGN}": "-",

@@ -2,7 +2,6 @@
 
 import os
 import stat
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
@@ -16,13 +15,6 @@ from fecontact.core.types import Array, Coordinates, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
 _LARGEST = 1e12  # factor of displacements, which are drawn in single precision
-
-
-def require_docstrings() -> None:
-    """Raise :class:`InputError` if Python runs without docstrings, which describe all keys."""
-    if sys.flags.optimize > 1:
-        raise InputError("Python was started with -OO, or with PYTHONOPTIMIZE=2, which removes the "
-                         "docstrings that fecontact reads; start it with -O at most.")
 
 
 def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> None:

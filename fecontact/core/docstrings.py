@@ -7,7 +7,7 @@ from typing import Any, ClassVar, get_origin
 from docstring_parser import Docstring, DocstringStyle, compose, parse
 from docstring_parser.common import DocstringParam
 
-from fecontact.core.checks import require_docstrings
+from fecontact.core.errors import require_docstrings
 
 require_docstrings()
 

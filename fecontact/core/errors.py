@@ -104,3 +104,10 @@ def shown(value: object) -> str:
     except ValueError:
         return "a number of thousands of digits"
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def require_docstrings() -> None:
+    """Raise :class:`InputError` if Python runs without docstrings, which describe all keys."""
+    if sys.flags.optimize > 1:
+        raise InputError("Python was started with -OO, or with PYTHONOPTIMIZE=2, which removes the "
+                         "docstrings that fecontact reads; start it with -O at most.")
