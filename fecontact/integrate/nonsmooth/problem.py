@@ -41,8 +41,8 @@ SIZES = 3
 SLIP_SIZE, RATE_SIZE, DEPTH_SIZE = range(SIZES)
 
 
-# Groups of nodes that slip as one, and what is told of a node; a state with the work after it.
-CLUSTERS, TOLD = Size("clusters"), Size("told of a node")
+# Groups of nodes that slip as one, and entries of a node; a state with the work after it.
+CLUSTERS, NODE_ENTRIES = Size("clusters"), Size("entries of a node")
 WITH_WORK = 2 * MODES + NODES + POWER_COUNT
 
 
@@ -131,7 +131,7 @@ class Step(NamedTuple):
 class Workspace(NamedTuple):
     """Results per node and per cluster of the last evaluation, and room for small systems."""
 
-    nodes: Annotated[Array, NODES, TOLD]
+    nodes: Annotated[Array, NODES, NODE_ENTRIES]
     friction: Annotated[Array, NODES]
     total: Annotated[Array, CLUSTERS]
     limit: Annotated[Array, CLUSTERS]
@@ -162,7 +162,7 @@ def sizes_of(problem: NonsmoothProblem) -> dict[Size, int]:
     """Sizes of the records of a run."""
     k, m = problem.rows.shape
     return {MODES: m, NODES: len(problem.cluster), CLUSTERS: k, AXES: 1 + tangents(problem),
-            TOLD: node_columns(problem)}
+            NODE_ENTRIES: node_columns(problem)}
 
 
 def progress_for(

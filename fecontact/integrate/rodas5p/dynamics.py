@@ -23,7 +23,7 @@ GIVEN = 10
 
 # Length of what friction says of a node; it is longer in space, see
 # :func:`fecontact.system.nodes.force_room`.
-TOLD_OF_FRICTION = Size("told of friction")
+FRICTION_ENTRIES = Size("entries of friction")
 
 
 class Gradients(NamedTuple):
@@ -36,7 +36,7 @@ class Gradients(NamedTuple):
     """
 
     partial: Annotated[Array, NODES, AXES + 1, 2 * AXES]
-    force: Annotated[Array, NODES, TOLD_OF_FRICTION]
+    force: Annotated[Array, NODES, FRICTION_ENTRIES]
     rates: Annotated[Array, NODES, MEMORY, AXES + 1 + MEMORY]
 
 

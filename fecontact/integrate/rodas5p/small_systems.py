@@ -105,7 +105,7 @@ def compile_usual() -> None:
 def sizes_of(modes: int, nodes: int) -> dict[Size, int]:
     """Sizes of the records of small systems: plane ones without internal variables."""
     return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: 0,
-            dynamics.TOLD_OF_FRICTION: 3}
+            dynamics.FRICTION_ENTRIES: 3}
 
 
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:

@@ -228,7 +228,7 @@ def gradients_for(
     """
     length = 2 * (4 + states) + told if dimension == 3 else 3 + states
     return allocate(motion.Gradients, {NODES: nodes, MEMORY: states, AXES: dimension,
-                                       motion.TOLD_OF_FRICTION: length})
+                                       motion.FRICTION_ENTRIES: length})
 
 
 def room_for(

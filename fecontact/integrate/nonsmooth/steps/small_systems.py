@@ -41,7 +41,7 @@ def _run(modes: int, nodes: int) -> Any:
 def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     """What is the same in all small systems of a size, for each type of tuples."""
     sizes = small_systems.sizes_of(modes, nodes) | {
-        kinds.CLUSTERS: nodes, kinds.TOLD: kinds.NODE_COLUMNS}
+        kinds.CLUSTERS: nodes, kinds.NODE_ENTRIES: kinds.NODE_COLUMNS}
     found = shapes(sizes, kinds.NonsmoothProblem, kinds.Limits, kinds.Progress, kinds.Output,
                    kinds.Workspace, Room)
     found[kinds.NonsmoothProblem]["cluster"] = np.arange(nodes)
