@@ -178,7 +178,7 @@ def _zeros(record: Any, name: str, kind: Any, sizes: Mapping[Size, int]) -> Any:
 
 
 def shapes(sizes: Mapping[Size, int], *records: Any) -> dict[Any, dict[str, Any]]:
-    """Shapes of arrays as far as they follow from sizes, by record and field; None for other lengths.
+    """Shapes of arrays by record and field; None for lengths that do not follow from ``sizes``.
 
     Records within the given ones are among them.
     """
