@@ -587,7 +587,8 @@ def test_a_motion_that_grows_beyond_all_numbers(method, tolerance):
     ({"t_start": 1.0}, r"t_end = 1\.0 must be a finite time after t_start = 1\.0"),
     ({"t_start": float("-inf")}, "t_end"), ({"t_start": "now"}, "t_start = 'now'"),
     ({"initial": "resting"}, "did you mean 'rest'"), ({"initial": np.zeros(3)}, "4 values"),
-    ({"initial": [0.0, 0.0, 0.0, float("nan")]}, "must be finite"), ({"initial": {}}, "initial = {}"),
+    ({"initial": [0.0, 0.0, 0.0, float("nan")]}, "must be finite"),
+    ({"initial": {}}, "initial = {}"),
     ({"initial": None}, "initial = None must be 'rest'"),
     ({"initial": np.full(4, 1j)}, r"initial = .* an array of real numbers"),
 ])
