@@ -139,10 +139,10 @@ def is_numeric(values: Any) -> bool:
     return True
 
 
-def require_state(state: Array) -> None:
-    """Raise :class:`InputError` unless all values of an initial state are from -1e60 to 1e60."""
+def require_state(state: Array, largest: float = LARGEST) -> None:
+    """Raise :class:`InputError` for an initial state with values beyond +-1e60, or ``largest``."""
     for wrong, remedy in ((~np.isfinite(state), "be finite"),
-                          (np.abs(state) > LARGEST, f"be from {-LARGEST:g} to {LARGEST:g}")):
+                          (np.abs(state) > largest, f"be from {-largest:g} to {largest:g}")):
         if wrong.any():
             index = int(np.argmax(wrong))
             raise InputError(f"The initial state holds {state[index]:g} (value {index} of "

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import basis, impact_oscillator
+from systems import basis, impact_oscillator, mass_in_y
 
 from fecontact import (
     AnalysisError,
@@ -16,7 +16,7 @@ from fecontact import (
 )
 from fecontact.bifurcation import Axis, basins, lyapunov_exponents, poincare_scan
 from fecontact.integrate import Crossing, strobe
-from fecontact.laws import ConstantFriction, PrescribedForce, ProductFriction
+from fecontact.laws import ConstantFriction, PowerContact, PrescribedForce, ProductFriction
 
 
 def test_exponents_of_a_linear_oscillator():
@@ -153,7 +153,8 @@ def test_bad_input():
     with pytest.raises(InputError, match="count = 5"):
         lyapunov_exponents(system, 1.0, count=5)
     with pytest.raises(AnalysisError, match="before its end"):
-        lyapunov_exponents(system, 1.0, initial=np.array([0.0, 0.0, 1e200, 0.0]))
+        lyapunov_exponents(mass_in_y(normal=PowerContact(1e6, exponent=6.0)), 1.0,
+                           initial=[0.0, -9e59])
     with pytest.raises(InputError, match="keep = 2"):
         basins(system, (Axis("B", "y"), [0.0]), (Axis("B", "y", "velocity"), [0.0]),
                transient_periods=1, keep=2)

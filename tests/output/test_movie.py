@@ -226,7 +226,9 @@ def test_contact_nodes_show_their_states_and_forces():
     q = np.zeros((3, 5))
     q[:, 1] = [5e-6, -4e-6, -4e-6]  # open, then pressed down
     trajectory = still(q, speed=0.02)
-    trajectory.modal_velocities[1, 0] = 0.02  # moves with the ground
+    speeds = trajectory.modal_velocities.copy()
+    speeds[1, 0] = 0.02  # moves with the ground
+    trajectory = replace(trajectory, modal_velocities=speeds)
     assert np.array_equal(trajectory.contact_state, [[0] * 5, [1] * 5, [2] * 5])
     motion = motion_of(trajectory)
     with Scene(motion, 640, 300) as scene:

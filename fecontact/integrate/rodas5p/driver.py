@@ -121,7 +121,7 @@ def start(
     workers : int
         Threads that share the contact nodes; results do not depend on it.
     """
-    require_state(state)
+    require_state(state, np.inf)
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
     times = np.array(times, dtype=float)
@@ -177,7 +177,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
     assert not len(run.variation.variation.columns)
     assert not run.watch.note
     assert not control.work
-    require_state(state)
+    require_state(state, np.inf)
     output = run.output
     return Run(
         run.problem, _progress(system, control, run.times, state), run.room,
