@@ -30,8 +30,9 @@ def doubts(
 ) -> str:
     """Sentence on the spans between output times whose derivatives disagree with differences.
 
-    Empty if all agree, within two percent of the largest derivative. ``at`` is the system as a
-    function of the parameter of ``forced``, and the value.
+    Empty if all agree, within two percent of the largest derivative; spans beside which no run
+    reaches its end are not judged. ``at`` is the system as a function of the parameter of
+    ``forced``, and the value.
     """
     scales, spans = _scales(system, states), np.stack([times[:-1], times[1:]], axis=1)
     finer, size = max(_FINER * rtol, _FINEST), len(scales)
@@ -65,6 +66,9 @@ def doubts(
         left = left[~agrees]
         if not len(left):
             return ""
+    left = left[np.isfinite(apart[left])]
+    if not len(left):
+        return ""
     where = ", ".join(f"{times[k]:.6g} to {times[k + 1]:.6g} s ({100.0 * apart[k]:.2g} %)"
                       for k in left)
     return (f"Derivatives differ from differences of runs from t = {where}: a node touches down, "

@@ -507,8 +507,8 @@ def test_bad_tolerances(given):
 def apart(one, other):
     """Largest distance of two autonomous orbits, in any phase, in the ranges of the states."""
     mine, theirs = (point.orbit(samples=8001) for point in (one, other))
-    theirs.states[-1] = theirs.states[0]
-    through = CubicSpline(theirs.times / theirs.times[-1], theirs.states, bc_type="periodic")
+    closed = np.vstack([theirs.states[:-1], theirs.states[:1]])
+    through = CubicSpline(theirs.times / theirs.times[-1], closed, bc_type="periodic")
     phases, ranges = mine.times[:-1] / mine.times[-1], np.ptp(theirs.states, axis=0)
     sides = [np.fft.rfft(states[:-1] - states[:-1].mean(axis=0), axis=0) / ranges
              for states in (mine.states, theirs.states)]
