@@ -125,10 +125,7 @@ def sensitivity(
     differences; with more than four modes or two nodes, and no memory, the linear equation of the
     derivatives is solved along the motion. Where a node touches down with a force that jumps, as
     that of :class:`fecontact.laws.LinearContact` with damping, derivatives contain the saltation.
-
-    One direction of the derivatives is compared with differences of runs. If they are more than two
-    percent apart, as where a node just touches the ground, a ModelWarning and
-    :attr:`Sensitivity.note` name the spans between output times.
+    A ModelWarning and ``note`` name spans where they are 2 % apart from differences of runs.
 
     With SetValued, forces and velocities jump. Its runs locate the jumps, so that the end of a run
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives

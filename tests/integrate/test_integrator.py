@@ -207,5 +207,5 @@ def test_motion_that_grows_beyond_all_numbers_ends_the_run():
 
 def test_states_that_are_no_numbers_are_refused():
     system = body()
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(InputError, match="must be finite"):
         control.start(system, np.full(system.size, np.nan), np.array([0.0, 0.1]), rtol=1e-6)

@@ -82,7 +82,7 @@ def test_study_files_take_motions_of_points():
     # None has no place in a file.
     given = SimulationSettings(initial=PointStart({"B": (None, 1e-3)}))
     assert to_table(given, defaults=False) == {
-        "initial": {"displacements": {"B": {"y": 1e-3}}, "velocities": {}}}
+        "initial": {"displacements": {"B": {"y": 1e-3}}}}
     with pytest.raises(InputError, match=r"table such as \{x = 1e-3\}"):
         SimulationSettings(initial=PointStart({"B": (None, None, 1e-3)}))
 

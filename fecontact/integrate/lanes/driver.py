@@ -157,7 +157,7 @@ class SideBySide:
     def _start(self, run: int) -> None:
         """Let a run begin from its initial state."""
         state = self._state_of(run)
-        require_state(state)
+        require_state(state, np.inf)
         self.runs.starts[run, arrays.NUMBERS : arrays.NUMBERS + len(state)] = state
 
     @property
