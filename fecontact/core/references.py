@@ -118,7 +118,7 @@ def _array(context: Any, builder: Any, field: Any, name: str, value: Any, index:
 
 
 def _asked(builder: Any, name: str, value: Any, *place: int) -> Any:
-    """A number or an address of a tuple, by a function that :func:`fecontact.core.constants.constants` may replace."""
+    """A number or an address of a tuple, by a function that ``constants`` may replace."""
     # What is read does not change: loops need not read it again after each number they store.
     kind = builder.gep(value, [_I32(0), *map(_I32, place)]).type.pointee
     function = builder.module.globals.get(name)
