@@ -186,7 +186,7 @@ class _Kernel(CPUDispatcher):
         return self.given or signature_of(self.py_func, by_reference=self.by_address)
 
     def for_values(self, constants: str) -> Any:
-        """This kernel for records whose values are those of :func:`fecontact.core.constants.constants`."""
+        """The kernel for records with values of :func:`fecontact.core.constants.constants`."""
         return kernel(self.py_func, constants=constants, signature=self.given,
                       by_address=self.by_address, **self.options)
 
@@ -224,7 +224,7 @@ class _RecordKernel(_Kernel):
     """
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the function, with views of read-only arrays where it needs them."""
+        """Call the function, with views in place of read-only arrays if it refuses these."""
         try:
             return super().__call__(*arguments)
         except TypeError:
