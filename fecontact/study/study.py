@@ -199,7 +199,10 @@ class Study(Summarised, StudyModels):
         last = text.rstrip().rpartition("\n")[2]
         if not last.startswith(_KEYS_GIVEN):
             return study
-        return replace(study, _keys=json.loads(last.removeprefix(_KEYS_GIVEN)))
+        try:
+            return replace(study, _keys=json.loads(last.removeprefix(_KEYS_GIVEN)))
+        except (ValueError, RecursionError):  # a comment that somebody edited
+            return study
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":

@@ -274,7 +274,8 @@ def plot_sobol(
                 axes.errorbar(value, places + shift,
                               xerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
                               fmt="none", ecolor="#303030", elinewidth=0.9, capsize=2)
-            axes.set_yticks(places, [parameter_label(key, Study) for key in parameters])
+            axes.set_yticks(places, [found[name].labels.get(key) or parameter_label(key, Study)
+                                     for key in parameters])
             axes.grid(False, axis="y")
             axes.set_title(name.replace("_", " "), loc="left")
         grid[-1].set_xlabel("part of the variance")

@@ -1,7 +1,7 @@
 """Statistics of samples: moments, quantiles and Sobol indices, with confidence intervals."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,11 +37,14 @@ class SobolIndices:
         Fraction due to the parameter alone or in interaction with others.
     samples : int
         Number of base samples used.
+    labels : mapping of parameter to str
+        Labels of the parameters for axes; those of :meth:`SweepTable.label`.
     """
 
     first: Mapping[str, Estimate]
     total: Mapping[str, Estimate]
     samples: int
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 def statistics(
@@ -122,7 +125,7 @@ def sobol_indices(
     first, total, samples = indices_of(table.column(name), len(names), confidence=confidence,
                                        seed=seed)
     return SobolIndices(dict(zip(names, first, strict=True)), dict(zip(names, total, strict=True)),
-                        samples)
+                        samples, {parameter: table.label(parameter) for parameter in names})
 
 
 def indices_of(

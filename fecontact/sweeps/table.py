@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecontact.core.checks import as_path, require_regular_file
-from fecontact.core.errors import InputError, MissingLibraryError, choices, nearest
+from fecontact.core.errors import (
+    FecontactError,
+    InputError,
+    MissingLibraryError,
+    choices,
+    nearest,
+)
 from fecontact.core.files.csv_text import csv_text, read_cell
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
@@ -254,6 +260,8 @@ def _text(value: Any) -> str:
 def read_table(path: str | Path) -> SweepTable:
     """Read a table written by :meth:`SweepTable.write`.
 
+    Labels of its parameters come from ``sweep.toml`` in the same folder, if a sweep left it there.
+
     Raises
     ------
     InputError
@@ -276,13 +284,25 @@ def read_table(path: str | Path) -> SweepTable:
             [None if status == "missing" else reason
              for status, reason in zip(columns["status"], columns["reason"], strict=True)],
             folder=path.parent, strobed=_read_strobed(_strobed_file(path), len(rows)),
-            warnings=columns["warning"])
+            warnings=columns["warning"],
+            labels=_stored_labels(path.with_name("sweep.toml"), parameters))
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; run the sweep first.") from None
     except InputError:
         raise
     except (OSError, ValueError, KeyError, IndexError, csv.Error, RecursionError):
         raise InputError(f"{path} is not the table of a sweep.") from None
+
+
+def _stored_labels(path: Path, parameters: Sequence[str]) -> dict[str, str]:
+    """Labels of parameters by the study that a sweep keeps; none without that file."""
+    if not path.is_file():
+        return {}
+    try:
+        study = Study.read(path)
+    except FecontactError:  # a label is no reason to refuse the numbers of a table
+        return {}
+    return {name: parameter_label(name, Study, study) for name in parameters}
 
 
 def _read_strobed(path: Path, count: int) -> Array | None:

@@ -122,6 +122,8 @@ def test_resolved_study_reads_back_the_same(text):
     resolved = study.to_toml()
     assert Study.from_toml(resolved) == study
     assert Study.from_toml(resolved).to_toml() == resolved
+    edited = resolved.rpartition("\n# Keys given: ")[0] + "\n# Keys given: {none"
+    assert Study.from_toml(edited) == Study.from_toml(resolved)
 
 
 @pytest.mark.parametrize("shape", TEMPLATES)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweep_study import Serial, write_study
+from sweep_study import STUDY, Serial, write_study
 
 from fecontact import InputError, sweep
 from fecontact.cli.commands import sweep as command
@@ -17,7 +17,7 @@ from fecontact.cli.run_files import read_study
 from fecontact.core.progress import clock
 from fecontact.io import read_table
 from fecontact.plot import plot_sobol, plot_sweep
-from fecontact.sweeps import Estimate, SobolIndices, SweepTable, executors, plots
+from fecontact.sweeps import Estimate, SobolIndices, SweepTable, executors, plots, sobol_indices
 from fecontact.sweeps.sweep import note
 
 SWEEP = """
@@ -283,6 +283,26 @@ def test_plots_of_sweeps_as_files(tmp_path):
     found = SobolIndices({"a": one, "b": one}, {"a": one, "b": one}, 64)
     plot_sobol({"f": found, "g": found}, path=tmp_path / "s.png")
     assert (tmp_path / "s.png").stat().st_size > 5000
+
+
+def test_tables_read_from_files_know_the_places_of_forces(tmp_path):
+    """In the folder of its sweep; a table that was moved has the names alone."""
+    forces = 'forces = [{ point = "B", component = "y", signal = { law = "constant", value = 1 } }]'
+    study = write_study(tmp_path, text=STUDY.replace("normal = 14.0", f"normal = 14.0, {forces}"))
+    force = "load.forces.0.signal.value"
+    sweep(study, {name: {"distribution": "uniform", "low": low, "high": low + 2.0}
+                  for name, low in ((force, -2.0), ("load.normal", 10.0))},
+          method="sensitivity", samples=8, summaries=["mean_normal_force"], executor=Serial(),
+          folder=tmp_path / "found")
+    table = read_table(tmp_path / "found/index.csv")
+    assert plot_sweep(table, "mean_normal_force").axes[0].get_xlabel() == "force at B y [N]"
+    axes = plot_sobol({"force": sobol_indices(table, "mean_normal_force")}).axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["force at B y [N]",
+                                                                      "load normal [N]"]
+    (tmp_path / "found/sweep.toml").write_text("[geometry")
+    moved = read_table(tmp_path / "found/index.csv")
+    assert moved.label(force) == "value of force 0"
+    assert moved.label("load.normal") == "load normal [N]"
 
 
 def test_names_of_files_are_safe():
