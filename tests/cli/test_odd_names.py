@@ -6,6 +6,7 @@ import numpy as np
 
 from fecontact.cli.console import echo, note, show
 from fecontact.cli.tables import table
+from fecontact.cli.templates import template
 from fecontact.core.errors import ModelWarning
 from fecontact.output.files.fields_of_frames import FieldKind
 from fecontact.output.plots.figure import new_figure
@@ -87,3 +88,14 @@ def test_numbers_beyond_single_precision_are_its_largest():
         stored = kind.flat(np.array([[1e300, -1e39, 1.0, np.nan]]))
     largest = np.finfo(np.float32).max
     assert np.array_equal(stored, [largest, -largest, 1.0, np.nan], equal_nan=True)
+
+
+def test_meshes_of_bodies_of_any_name_are_written_beside_each_other(cli, tmp_path):
+    """A slash is no folder, and names that files cannot tell apart get numbers."""
+    text = template("pad").replace("bodies.pad", 'bodies."a/b"').replace("bodies.block",
+                                                                         'bodies."a:b"')
+    (tmp_path / "s.toml").write_text(
+        text.replace("pad.contact", "a/b.contact").replace("block.top", "a:b.top"))
+    code, _, err = cli("mesh", tmp_path / "s.toml", "-o", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"s-a_b.msh", "s-a_b-2.msh"}

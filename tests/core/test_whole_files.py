@@ -17,7 +17,13 @@ from synthetic import basis, run
 from fecontact import Beam, InputError, generate, read_case, render, write_case, write_mesh
 from fecontact.cli import execute
 from fecontact.core.files import atomic_write
-from fecontact.core.files.atomic_write import clear_leftovers, name_part, replaced, replaced_folder
+from fecontact.core.files.atomic_write import (
+    clear_leftovers,
+    name_part,
+    name_parts,
+    replaced,
+    replaced_folder,
+)
 from fecontact.io import export_csv, export_pvd
 from fecontact.output.files.hdf5 import new_file
 from fecontact.plot import rendering_problem
@@ -365,3 +371,8 @@ def test_the_mesh_of_a_study_is_not_written_over(tmp_path, capsys):
 def test_names_of_bodies_in_names_of_files(name, part):
     """No folder is left or looked for, and no name is too long for a file."""
     assert name_part(name) == part
+
+
+def test_parts_of_names_of_files_differ():
+    assert name_parts(["a/b", "a:b", "A_b", "c", "\u6f22" * 40, "n" * 50, "n" * 60]) == [
+        "a_b", "a_b-2", "A_b-3", "c", "\u6f22" * 13, "n" * 40, "n" * 40 + "-2"]

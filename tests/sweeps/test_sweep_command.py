@@ -305,9 +305,11 @@ def test_tables_read_from_files_know_the_places_of_forces(tmp_path):
     assert moved.label("load.normal") == "load normal [N]"
 
 
-def test_names_of_files_are_safe():
-    assert command._file_name("own.py:f") == "own-py-f"
-    assert command._file_name("amplitude_x@B") == "amplitude_x-B"
+def test_names_of_files_are_safe_and_different():
+    names = ["own.py:f", "amplitude_x@B", "amplitude_x@a/b", "amplitude_x@a:B", "n" * 400]
+    assert command._file_names(names) == dict(zip(names, [
+        "own-py-f", "amplitude_x-B", "amplitude_x-a-b", "amplitude_x-a-B-2", "n" * 120],
+        strict=True))
 
 
 def test_a_script_without_main_guard_is_told(tmp_path):

@@ -44,19 +44,20 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     """Generate or read the mesh of a study, or those of its bodies; print size and groups."""
     from fecontact.cli.run_files import read_study
     from fecontact.cli.tables import mesh_table, table
-    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import name_parts, output_folder
     from fecontact.fem.mesh_files import write_mesh
 
     described = read_study(study, set_)
     with output_folder(output or described.results) as folder:
         several = described.meshes() if described.bodies else {}
-        for name, made in (several or {"": described.mesh()}).items():
+        meshes = several or {"": described.mesh()}
+        for (name, made), part in zip(meshes.items(), name_parts(meshes), strict=True):
             geometry = described.bodies[name].geometry if name else described.geometry
             if name:
                 echo(f"\n{name}:")
             body = described.bodies[name].body if name else described.body
             show(mesh_table(made, body.degree))
-            target = folder / f"{described.name}{'-' * bool(name)}{name}.msh"
+            target = folder / f"{described.name}{'-' * bool(name)}{part}.msh"
             source = getattr(geometry, "file", None)
             if source is not None and target.exists() and (
                     target.samefile(described.folder / source)):
@@ -108,7 +109,7 @@ def modes(
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import interfaces_of, read_study
     from fecontact.cli.tables import complex_table, compliance_table
-    from fecontact.core.files.atomic_write import name_part, output_folder
+    from fecontact.core.files.atomic_write import name_parts, output_folder
     from fecontact.core.units import quantity
     from fecontact.reduction.report import BasisReport
 
@@ -120,12 +121,12 @@ def modes(
             basis = described.reduced.basis
             bases = described.modal_bases() if described.bodies else {"": basis}
             interfaces = interfaces_of(described)
-        for name, one in bases.items():
+        for (name, one), part in zip(bases.items(), name_parts(bases), strict=True):
             if name:
                 echo(f"\n{name}:")
             touched = tuple(face.name for face in interfaces if name in face.bodies)
             echo(str(BasisReport(one, touched if name else None)))
-            picture = folder / f"{described.name}{'-' * bool(name)}{name_part(name)}-modes.png"
+            picture = folder / f"{described.name}{'-' * bool(name)}{part}-modes.png"
             plot_modes(one, path=picture)
             echo_written(picture)
         if interfaces:

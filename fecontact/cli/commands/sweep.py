@@ -1,7 +1,7 @@
 """The command ``sweep``: many cases of a study."""
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from fecontact.sweeps.table import SweepTable
 
 _SHOWN = 10  # reasons, and cases of each
+_LONGEST_NAME = 120  # bytes of the name of a summary in that of its picture
 
 
 def sweep(
@@ -214,14 +215,15 @@ def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[
     if len(set(table.keys)) < 2:
         return []
     names = [name for name, values in table.values.items() if (values == values).any()]
+    parts = _file_names([*table.values, *table.parameters])
     files = []
     for name in names:
-        files.append(folder / f"{_file_name(name)}.png")
+        files.append(folder / f"{parts[name]}.png")
         plot_sweep(table, name, path=files[-1])
     if table.strobed is not None:
         for parameter, values in table.parameters.items():
             if len(set(values)) > 1:
-                files.append(folder / f"strobed-{_file_name(parameter)}.png")
+                files.append(folder / f"strobed-{parts[parameter]}.png")
                 plot_strobed(table, parameter, path=files[-1])
     if settings.method == "sensitivity" and names:
         found = {}
@@ -234,6 +236,10 @@ def _draw(table: "SweepTable", settings: "SweepSettings", folder: Path) -> list[
     return files
 
 
-def _file_name(name: str) -> str:
-    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)
+def _file_names(names: Sequence[str]) -> dict[str, str]:
+    """Names of pictures without ending: letters, digits, ``-`` and ``_``, different ones each."""
+    from fecontact.core.files.atomic_write import name_parts
 
+    plain = ["".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)
+             for name in names]
+    return dict(zip(names, name_parts(plain, _LONGEST_NAME), strict=True))

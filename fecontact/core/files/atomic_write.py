@@ -12,7 +12,7 @@ import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -24,7 +24,7 @@ _MARK = b"a file is being written by fecontact\n"
 _NAME = re.compile(r"\..+\.[0-9]+\.part")
 _MOST = 1000  # writers of one name at a time
 _LONGEST = 200  # bytes of the name used for the folder
-_LONGEST_PART = 40  # characters of a name of a body in that of a file
+_LONGEST_PART = 40  # bytes of a name of a body in that of a file
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -281,10 +281,29 @@ def output_folder(folder: Path) -> Iterator[Path]:
         _remove_empty(made)
 
 
-def name_part(name: str) -> str:
+def name_part(name: str, longest: int = _LONGEST_PART) -> str:
     """Part of the name of a file from any name: what file systems do not allow becomes ``_``."""
     allowed = "".join(letter if letter.isprintable() else "_" for letter in name)
-    return re.sub(r'[/\\:*?"<>|]', "_", allowed)[:_LONGEST_PART]
+    part = re.sub(r'[/\\:*?"<>|]', "_", allowed)
+    return part.encode()[:longest].decode(errors="ignore")
+
+
+def name_parts(names: Iterable[str], longest: int = _LONGEST_PART) -> list[str]:
+    """Parts of names of files by :func:`name_part`, a different one for each name.
+
+    Parts that are equal, or differ in case alone, get numbers.
+    """
+    parts: list[str] = []
+    taken: set[str] = set()
+    for name in names:
+        first = part = name_part(name, longest)
+        number = 1
+        while part.casefold() in taken:
+            number += 1
+            part = f"{first}-{number}"
+        taken.add(part.casefold())
+        parts.append(part)
+    return parts
 
 
 def write_text(path: Path, text: str) -> None:
