@@ -1,8 +1,10 @@
 """Console output of commands, and the signals that end them."""
 
+import ctypes
 import os
 import re
 import signal
+import socket
 import sys
 import threading
 import time
@@ -17,6 +19,9 @@ from fecontact.core import progress
 
 INTERRUPTED = 130  # exit code after Ctrl-C
 _ENDING = ("SIGTERM", "SIGHUP")
+_ends = {getattr(signal, name) for name in ("SIGINT", *_ENDING) if hasattr(signal, name)}
+_PATIENCE = 5.0  # seconds for Python to answer a signal
+_PendingCall = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 _ended_by: list[int] = []  # first signal received
 
 
@@ -94,6 +99,8 @@ def ending_signals() -> Iterator[None]:
 
     Batch systems and closing terminals may send them repeatedly. Only the first counts, so that
     writing the results is not interrupted. Signals already ignored, as under nohup, stay ignored.
+    Where compiled code does not return, a second signal ends the process, see
+    :func:`_second_signal_ends`.
     """
     def end(number: int, frame: FrameType | None) -> None:
         if _ended_by:
@@ -118,11 +125,58 @@ def ending_signals() -> Iterator[None]:
     try:
         for number in taken:
             signal.signal(number, end)
-        yield
+        with _second_signal_ends():
+            yield
     finally:
         for number in taken:
             signal.signal(number, signal.SIG_DFL)
         _ended_by.clear()
+
+
+@contextmanager
+def _second_signal_ends() -> Iterator[None]:
+    """Let a second signal end the process where Python has not answered the first one.
+
+    Python answers signals between calls of compiled functions only, so that a law that never
+    returns would make the process deaf. A thread reads each signal from the socket of
+    :func:`signal.set_wakeup_fd`.
+    """
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    before = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+    threading.Thread(target=_watch, args=(reader,), daemon=True).start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        writer.close()
+
+
+def _watch(signals: socket.socket) -> None:
+    """Read numbers of signals until the other end is closed; see :func:`_second_signal_ends`."""
+    answered = threading.Event()
+
+    def answer(_: object) -> int:
+        answered.set()
+        return 0
+
+    call = _PendingCall(answer)  # by the main thread, as soon as it can
+    with signals:
+        while received := signals.recv(1):
+            if received[0] not in _ends:
+                continue
+            answered.clear()
+            ctypes.pythonapi.Py_AddPendingCall(call, None)
+            if answered.wait(_PATIENCE):
+                continue
+            note(f"Compiled code has not returned for {_PATIENCE:g} s, perhaps a law of your own "
+                 f"that never does; another signal ends the process without writing more.")
+            again = signals.recv(1)
+            if again and not answered.is_set():
+                os.write(2, b"error: interrupted.\n")
+                os._exit(128 + again[0])
+            # A call that is pending must not be freed.
+            answered.wait()
 
 
 def _leave_terminal(descriptors: list[int]) -> None:

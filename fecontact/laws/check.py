@@ -1,5 +1,6 @@
 """Checks of a law: derivatives, signs and energy over its relevant range."""
 
+import threading
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import product
@@ -18,6 +19,8 @@ _NORMAL_PLACES = np.array([(u, v) for u in (-1e-3, 0.0, 1e-9, 1e-6, 1e-4)
                            for v in (-1.0, -1e-3, 0.0, 1e-6, 1e-3, 1.0)]).T
 _FRICTION_PLACES = np.array([(v, F) for v in (-1.0, -1e-3, 0.0, 1e-6, 1e-3, 1.0)
                              for F in (0.0, 1e-3, 1.0, 100.0)]).T
+
+_PATIENCE = 10.0  # seconds for a law to return, which takes a microsecond
 
 # Distances to the other side, in penetration scales.
 _DISTANCES = np.concatenate([[0.0], np.geomspace(1e-6, 1e4, 21)])
@@ -58,12 +61,9 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
     row = law.table(np.full(nodes, 1.0 / nodes))[0]
     if isinstance(law, NormalLaw):
         names, (first, second) = "u, v", _NORMAL_PLACES
-        out = normal_values(law.kernel.address, row, first, second)
     else:
         names, (first, second) = "v, F", _FRICTION_PLACES
-        address, z = law.kernel.address, np.zeros((len(first), law.memory))
-        out = (memory_values(address, row, first, second, z).reshape(len(first), -1)
-               if law.memory else friction_values(address, row, first, second))
+    out = _evaluated(law, row, names, first, second)
     wrong = np.flatnonzero(~np.isfinite(out).all(axis=1))
     if len(wrong):
         place = f"{first[wrong[0]]:g}, {second[wrong[0]]:g}"
@@ -72,6 +72,39 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
                          f"({place}); a law must return finite numbers everywhere.")
     if isinstance(law, NormalLaw):
         _require_untouched(law, law.table(np.full(nodes, 1.0 / nodes)))
+
+
+def _evaluated(
+    law: NormalLaw | FrictionLaw, row: Array, names: str, first: Array, second: Array
+) -> Array:
+    """Values (k, m) of a law at pairs of arguments (k,), without memory or at z = 0.
+
+    They are evaluated in another thread; InputError if the law does not return there.
+    """
+    address = law.kernel.address
+
+    def values(places: slice) -> Array:
+        x, y = first[places], second[places]
+        if isinstance(law, NormalLaw):
+            return normal_values(address, row, x, y)
+        if not law.memory:
+            return friction_values(address, row, x, y)
+        size = (1 + law.memory) * (3 + law.memory)
+        return memory_values(address, row, x, y, np.zeros((len(x), law.memory))).reshape(-1, size)
+
+    def evaluate() -> None:
+        found.extend(values(slice(place, place + 1)) for place in range(len(first)))
+
+    found = [values(slice(0))]  # compiles, which may take longer
+    thread = threading.Thread(target=evaluate, daemon=True)
+    thread.start()
+    thread.join(_PATIENCE)
+    if thread.is_alive():
+        place = len(found) - 1
+        raise InputError(f"{type(law).__name__} has not returned after {_PATIENCE:g} s at "
+                         f"({names}) = ({first[place]:g}, {second[place]:g}); end its loops for "
+                         f"all arguments.")
+    return np.concatenate(found)
 
 
 def _require_untouched(law: NormalLaw, table: Array) -> None:

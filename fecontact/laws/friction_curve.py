@@ -43,7 +43,7 @@ _STEEP, _CREEP = 1e36, 1e-18
 _SEARCHED = np.geomspace(1e-6, 1e12, 4001)
 
 
-@kernel
+@kernel(nogil=True)
 def _sample(address: int, v: Vector, F: float, p: Vector, out: Matrix) -> None:
     """Fill out (len(v), 2) with R/F and d(R/F)/dv."""
     for i in range(len(v)):

@@ -8,19 +8,19 @@ from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at, memory_at, normal_at
 
 
-@kernel
+@kernel(nogil=True)
 def _normal(address: int, u: Vector, v: Vector, p: Vector, out: Matrix) -> None:
     for k in range(len(u)):
         out[k, 0], out[k, 1], out[k, 2] = normal_at(address)(u[k], v[k], p)
 
 
-@kernel
+@kernel(nogil=True)
 def _friction(address: int, v: Vector, F: Vector, p: Vector, out: Matrix) -> None:
     for k in range(len(v)):
         out[k, 0], out[k, 1], out[k, 2] = friction_at(address)(v[k], F[k], p)
 
 
-@kernel
+@kernel(nogil=True)
 def _memory(address: int, v: Vector, F: Vector, z: Matrix, p: Vector, out: Block) -> None:
     for k in range(len(v)):
         memory_at(address)(v[k], F[k], z[k], p, out[k, 0], out[k, 1:])

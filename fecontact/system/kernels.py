@@ -240,7 +240,7 @@ def rates_under(load, moved, y, s, force, rates, out):
             out[2 * m + j * states + k] = rates[k, 0]
 
 
-@kernel
+@kernel(nogil=True)
 def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     """Fill out (2 m + n s,) with y'."""
     states = s.memory.max()
@@ -250,7 +250,7 @@ def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     rates_under(load, moved, y, s, np.empty(length), np.empty((states, width)), out)
 
 
-@kernel
+@kernel(nogil=True)
 def contact_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) -> None:
     """Fill out (N, n, 6), in space (N, n, 8), with `contact_state` at N times."""
     for k in range(len(times)):

@@ -46,6 +46,33 @@ sys.exit(execute(["run", sys.argv[1]]))
 """
 
 
+ENDLESS = """
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from fecontact.laws import FrictionLaw, friction_law
+
+
+@friction_law
+def _endless(v, F, p):
+    x = 1.0
+    while 4.0 < F < 90.0 and x > 0.0:
+        x = 1.0 + 0.5 * x
+    smooth = math.tanh(1e4 * v)
+    return 0.1 * smooth * F * x, 1e3 * (1.0 - smooth**2) * F, 0.1 * smooth
+
+
+@dataclass(frozen=True)
+class Endless(FrictionLaw):
+    kernel: ClassVar = _endless
+
+    @property
+    def velocity_scale(self):
+        return 1e-4
+"""
+
+
 def files(folder):
     return sorted(path.name for path in folder.iterdir())
 
@@ -81,6 +108,37 @@ def test_a_run_that_is_ended_before_its_first_step_leaves_nothing(tmp_path):
                           capture_output=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (143, "error: interrupted.\n")
     assert files(tmp_path) == ["s.toml"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_signal_ends_a_run_whose_law_never_returns(tmp_path, number):
+    """A load of 90 N from 10 ms on, on four nodes: above 4 N at one the law loops for ever."""
+    (tmp_path / "own.py").write_text(ENDLESS)
+    head, _, tail = STUDY.partition("friction = ")
+    tail = tail.partition("\n")[2]
+    load = 'normal = 10.0, forces = [{ point = "B", component = "y", signal = SIGNAL }]'.replace(
+        "SIGNAL", '{ law = "step", time = 0.01, value = -80.0 }')
+    (tmp_path / "s.toml").write_text(
+        f'{head}friction = {{ law = "own.py:Endless" }}\n{tail}'.replace("normal = 10.0", load)
+        .replace("1e5", "1.0").replace("100001", "11"))
+    code = RUN.replace("    if run.outputs:\n    ", "").replace(
+        "model_limits.PERIODS", "console._PATIENCE = 0.5\nmodel_limits.PERIODS").replace(
+        "import execute", "import console, execute")
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path / "s.toml")], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+    assert process.stderr.readline() == "running\n"
+    time.sleep(1.0)
+    process.send_signal(number)
+    line = process.stderr.readline()
+    while line == "running\n":
+        line = process.stderr.readline()
+    assert line.startswith("Compiled code has not returned for 0.5 s"), line
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, err, out) == (128 + number, "error: interrupted.\n", "")
+    assert "s.vtkhdf" not in files(tmp_path / "results")
 
 
 def test_a_closed_terminal_writes_the_run(tmp_path):

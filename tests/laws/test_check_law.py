@@ -38,6 +38,7 @@ from fecontact.laws import (
     memory_friction_law,
     normal_law,
 )
+from fecontact.laws import check as checks
 from fecontact.laws.sampling import cycle_work
 
 NEEDED = {
@@ -274,3 +275,29 @@ class Mine(FrictionLaw):
     assert "not checked" in capsys.readouterr().out
     assert execute(["laws", f"{tmp_path}/own.py:Yours"]) == 1
     assert "has no law of that name" in capsys.readouterr().err
+
+
+@friction_law
+def _slow(v, F, p):
+    x = 1.0
+    if v == 1e-3 and F == 1.0:
+        for _ in range(200_000_000):
+            x = 1.0 + math.sin(x)
+    return 1e-300 * x + math.tanh(1e4 * v) * F, 1e4 * F, 1.0
+
+
+@dataclass(frozen=True)
+class Slow(FrictionLaw):
+    kernel: ClassVar = _slow
+
+    @property
+    def velocity_scale(self):
+        return 1e-4
+
+
+def test_a_law_that_does_not_return_is_refused(monkeypatch):
+    """A loop of some seconds stands for one without end, which no test could leave."""
+    monkeypatch.setattr(checks, "_PATIENCE", 0.2)
+    with pytest.raises(fc.InputError, match=r"Slow has not returned after 0\.2 s at \(v, F\) = "
+                                            r"\(0\.001, 1\); end its loops"):
+        check_law(Slow())
