@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -105,9 +106,9 @@ def _digester(folder: Path) -> Callable[[Mapping[str, Any]], str]:
 def _with_content(text: str, folder: Path) -> str:
     name, colon, rest = text.partition(".py:")
     file = folder / (f"{name}.py" if colon else text)
+    if not os.path.isfile(file):  # also false, not an error, for a text that is too long
+        return text
     try:
-        if not file.is_file():
-            return text
         return f"{hashlib.sha256(file.read_bytes()).hexdigest()}{colon}{rest}"
     except OSError as error:
         raise InputError(f"{shown(text)} cannot be read "

@@ -3,6 +3,7 @@
 import warnings
 
 import numpy as np
+import pytest
 
 from fecontact.cli.console import echo, note, show
 from fecontact.cli.tables import table
@@ -65,6 +66,18 @@ def test_dollars_in_labels_are_no_mathematics(tmp_path):
         axes.legend()
     assert (tmp_path / "odd.png").is_file()
     assert all(text.get_parse_math() for text in axes.get_yticklabels())
+
+
+@pytest.mark.parametrize("name", [CLEARS, "\tx", "n" * 400, "n " * 200, "\ud800"])
+def test_names_of_any_letters_and_length_leave_space_for_axes(name, tmp_path):
+    """No warning of a missing letter or of axes without size, which are errors in tests."""
+    with new_figure(6.0, 4.0, tmp_path / "odd.png") as figure:
+        axes = figure.subplots()
+        axes.plot([1.0, 2.0], label=name)
+        axes.set(title=name, ylabel=f"displacement of {name} [mm]")
+        axes.legend(loc="lower left")
+    assert axes.get_title().startswith(ascii(name)[1:-1][:4])
+    assert min(axes.get_window_extent().size) > 100.0
 
 
 def test_dollars_in_titles_of_pictures_are_no_mathematics():

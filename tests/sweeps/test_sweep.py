@@ -405,3 +405,12 @@ def test_runs_have_one_thread_each(study, monkeypatch):
     monkeypatch.setattr(driver, "workers_for", lambda nodes, workers: seen.append(workers) or 1)
     sweep(study, {"ground.speed": [1e-3, 2e-3]}, Serial())
     assert seen == [1, 1]
+
+
+def test_long_names_of_a_study_are_no_files(study, tmp_path):
+    """No file has a name of more than 255 letters; systems report an error, not its absence."""
+    name = "n" * 400
+    table = sweep(study.with_(**{"basis.points": {name: "left"}}), {"ground.speed": [1e-3]},
+                  executor=Serial(), folder=tmp_path / "long", summaries=[f"amplitude_x@{name}"])
+    assert table.reasons == [""]
+    assert table.values[f"amplitude_x@{name}"][0] > 0.0

@@ -1,5 +1,6 @@
 """Figures in the package's style, for notebooks and files."""
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -21,6 +22,10 @@ from fecontact.core.files.atomic_write import replaced
 from fecontact.output.plots.style import STYLE
 
 _SUFFIXES = (".png", ".pdf", ".svg")
+# The font of pictures has no control characters, and half a pair of surrogates is an error.
+_CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+# Of names; labels of the package are shorter.
+_LONG_WORD, _LONG_LINE = re.compile(r"(\S{40})\S+"), re.compile(r"(.{90}).+")
 _PIXELS_PER_INCH = 96  # of a notebook's page
 _style: ContextVar[Any] = ContextVar("style", default=MappingProxyType({}))
 
@@ -95,8 +100,10 @@ class StyledFigure(Figure):
         """See :meth:`matplotlib.figure.Figure.draw`."""
         # Names may contain dollars; ticks of logarithmic axes alone are mathematical text.
         for text in self.findobj(Text):
-            if isinstance(text, Text) and r"\mathdefault" not in text.get_text():
-                text.set_parse_math("$" not in text.get_text())
+            if isinstance(text, Text) and r"\mathdefault" not in (written := text.get_text()):
+                text.set_parse_math("$" not in written)
+                if (shown := _legible(written)) != written:
+                    text.set_text(shown)
         with rc_context(self._settings):
             super().draw(renderer)
 
@@ -111,6 +118,13 @@ class StyledFigure(Figure):
         self.savefig(drawn, format="png")
         width, height = (round(_PIXELS_PER_INCH * inches) for inches in self.get_size_inches())
         return drawn.getvalue(), {"width": width, "height": height}
+
+
+def _legible(text: str) -> str:
+    """The text, control characters escaped, and cut where a name leaves no space for axes."""
+    text = _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
+    return _LONG_LINE.sub("\\1\N{HORIZONTAL ELLIPSIS}",
+                          _LONG_WORD.sub("\\1\N{HORIZONTAL ELLIPSIS}", text))
 
 
 @contextmanager
