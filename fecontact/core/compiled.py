@@ -17,6 +17,7 @@ from numbers import Number
 from pathlib import Path
 from types import CodeType
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numba import types
@@ -330,7 +331,9 @@ class CompiledLaw:
             If the function takes or returns something else than its form says, uses what cannot
             be compiled, or raises exceptions.
         """
-        return int(self._compiled.address)
+        address = int(self._compiled.address)
+        _LAWS[address] = self
+        return address
 
     @cached_property
     def _compiled(self) -> Any:
@@ -355,6 +358,15 @@ class CompiledLaw:
                              f"the form {self.form}: "
                              f"{lines[1] if len(lines) > 1 else lines[0]}") from None
         return law
+
+
+# Compiled laws by their addresses.
+_LAWS: WeakValueDictionary[int, CompiledLaw] = WeakValueDictionary()
+
+
+def law_at(address: int) -> CompiledLaw:
+    """The law whose function has an address."""
+    return _LAWS[address]
 
 
 def compile_law(contract: Any, form: str, function: Callable[..., Any]) -> CompiledLaw:

@@ -1,7 +1,8 @@
-"""Arctangent and sine of one number, for laws that integrators call millions of times.
+"""Arctangent and sine of one number or eight, for laws that integrators call millions of times.
 
 They become part of the law, while those of the C library are called, which costs as much again as
-the law itself. Arguments are brought to a short interval, on which a polynomial serves; its
+the law itself. Functions of eight numbers are in :mod:`fecontact.core.lanes.functions`; branches
+are faster for one. Arguments are brought to a short interval, on which a polynomial serves; its
 coefficients and intervals are those of the freely distributable library of Sun Microsystems
 (fdlibm). Results are right to two units in the last place of the largest value that they can have.
 """
@@ -10,6 +11,8 @@ import math
 
 from fecontact.core.compiled import helper
 from fecontact.core.kernel_parts import part
+from fecontact.core.lanes import functions
+from fecontact.core.lanes.functions import by_kind
 
 # A quarter turn in three parts, the first two of 33 bits, so that multiples of them are exact.
 _QUARTER = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21
@@ -17,8 +20,7 @@ _LARGEST_ANGLE = 1e6
 
 
 @helper
-def arctangent(x):
-    """Arctangent [rad]."""
+def _arctangent(x):
     size = abs(x)
     if size >= 2.4375:
         base, r = 1.57079632679489655800, -1.0 / size
@@ -41,6 +43,10 @@ def arctangent(x):
     return math.copysign(base + (r - r * (odd + even)), x)
 
 
+# Arctangent of x [rad].
+arctangent = by_kind(_arctangent, functions.arctangent)
+
+
 def _reduced(x):
     """The nearest number of quarter turns, and what is left of the angle."""
     quarters = math.floor(x * (2.0 / math.pi) + 0.5)
@@ -53,8 +59,7 @@ _reduced = part(_reduced, error_model="numpy", fastmath=False, forceinline=True)
 
 
 @helper
-def sine_and_cosine(x):
-    """Both, of an angle [rad]."""
+def _sine_and_cosine(x):
     if not abs(x) < _LARGEST_ANGLE:
         return math.sin(x), math.cos(x)
     quarters, r = _reduced(x)
@@ -69,3 +74,7 @@ def sine_and_cosine(x):
     turn = int(quarters) & 3
     first, second = (cosine, sine) if turn & 1 else (sine, cosine)
     return -first if turn & 2 else first, -second if (turn + 1) & 2 else second
+
+
+# Sine and cosine of an angle x [rad].
+sine_and_cosine = by_kind(_sine_and_cosine, functions.sine_and_cosine)

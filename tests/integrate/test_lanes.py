@@ -1,5 +1,8 @@
 """Eight runs side by side: the numbers of single runs, whatever else is run, and closed forms."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from systems import basis, friction_oscillator
@@ -30,6 +33,7 @@ from fecontact.laws import (
     HarmonicSpeed,
     HyperbolicFriction,
     LinearContact,
+    NormalLaw,
     ParabolicSurface,
     PowerContact,
     PrescribedForce,
@@ -38,11 +42,32 @@ from fecontact.laws import (
     RoughSurface,
     Sine,
     TwoSidedStop,
+    normal_law,
 )
 
 UP, ALONG = np.array([[0.0], [1.0]]), np.array([[1.0], [0.0]])
 HERTZ = 0.5 / np.pi
 LANES_ONLY = Rodas5P(series="never")
+
+
+@normal_law
+def halved(u, v, p):
+    if u <= 0.0:
+        return 0.0, 0.0, 0.0
+    return 0.5 * p[0] * u, 0.5 * p[0], 0.0
+
+
+@dataclass(frozen=True)
+class Halved(NormalLaw):
+    """Law of a user: half a stiffness."""
+
+    kernel: ClassVar = halved
+
+    stiffness: float = 1.0
+
+    @property
+    def penetration_scale(self):
+        return 2.0 / self.stiffness
 
 
 def slider(**parts):
@@ -76,6 +101,9 @@ CASES = {
     "parabolic": friction_oscillator(2, normal=ParabolicSurface(1e7, 1e-5, 40.0)),
     "linear": friction_oscillator(2, normal=LinearContact(1e7, 40.0)),
     "two stops": friction_oscillator(2, normal=TwoSidedStop(1e7, 1e-5, 1.0, 0.2)),
+    # Laws with branches, which are called for one lane after the other.
+    "Gaussian": friction_oscillator(2, normal=GaussianSurface(1e7, 1e-5, 40.0)),
+    "own law": friction_oscillator(2, normal=Halved(2e7)),
     "load in time": friction_oscillator(2, load=Load(14.0, (
         PointLoad("C", "y", signal=Harmonic(-3.0, 40.0)),))),
 }
@@ -299,7 +327,6 @@ def test_initial_states_that_are_not_finite():
     block(4, 1), block(1, 2), block(3, 2), block(2, 3),
     friction_oscillator(2, load=Load(14.0, (
         PointLoad("C", "y", signal=Pulse("half-sine", -3.0, 0.01, 0.05)),))),
-    friction_oscillator(2, normal=GaussianSurface(1e7, 1e-5, 40.0)),
 ])
 def test_other_systems_are_run_one_by_one(other):
     """Their results are those of single runs bit for bit."""

@@ -1,18 +1,37 @@
-"""Elementary functions of eight numbers at once, to a few units in the last place.
+"""Functions that take one number or eight, so that a kernel is written once for both.
 
-Those of the C library take one number at a time, and a vector library that numba would use is
-not part of its wheels. Arguments are brought to a short interval, on which a polynomial or a ratio
-of two serves; those of arctan and tanh are from S. L. Moshier's Cephes library.
+``math.exp``, ``log``, ``sqrt``, ``atan``, ``tanh``, ``abs``, ``min``, ``max`` and powers take eight
+numbers too, and a float beside eight numbers counts as eight equal ones. :func:`select` replaces a
+branch that chooses a value, since SIMD lanes share their branches; :func:`somewhere` and
+:func:`everywhere` guard work that no lane needs.
+
+Functions of the C library take one number at a time, and a vector library that numba would use is
+not part of its wheels. The elementary functions of eight numbers here reduce the argument to a
+short interval, on which a polynomial or a ratio of two is accurate to a few units in the last
+place; the coefficients of arctan and tanh are from S. L. Moshier's Cephes library.
 """
 
 import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.datamodel.models import PrimitiveModel
+from numba.core.typeconv.rules import default_type_manager
+from numba.extending import intrinsic, lower_cast, overload, register_model
 
 from fecontact.core.compiled import helper
 from fecontact.core.lanes.vectors import (
+    WIDTH,
     chosen,
     exponent,
     fused,
+    lanes,
     magnitude,
+    mask,
     root,
     scaled,
     signed,
@@ -146,3 +165,228 @@ def reciprocal_fifth_root(x):
 def reciprocal_root(x):
     """1 / sqrt(x)."""
     return 1.0 / root(x)
+
+
+# A float where eight numbers are wanted, in a result or at the end of a branch.
+default_type_manager.set_promote(types.float64, lanes)
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+_JIT = {"error_model": "numpy", "forceinline": True}
+
+
+def _repeated(builder: Any, number: Any) -> Any:
+    empty, index = ir.Constant(_VECTOR, ir.Undefined), ir.IntType(32)
+    first = builder.insert_element(empty, number, ir.Constant(index, 0))
+    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(index, WIDTH), None))
+
+
+@lower_cast(types.float64, lanes)
+def _float_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+    return _repeated(builder, value)
+
+
+@intrinsic
+def _select(typingctx: Any, where: Any, then: Any, otherwise: Any) -> Any:
+    kind = lanes if lanes in (then, otherwise) or where == mask else types.float64
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        values = [_repeated(builder, value) if kind == lanes != given else value
+                  for given, value in zip(signature.args[1:], args[1:], strict=True)]
+        return builder.select(args[0], *values)
+
+    numbers = [number if number == lanes else types.float64 for number in (then, otherwise)]
+    return kind(where, *numbers), codegen
+
+
+@helper
+def select(where, then, otherwise):
+    """``then`` where a condition holds, else ``otherwise``; both are computed."""
+    return _select(where, then, otherwise)
+
+
+def _folded(instruction: str) -> Any:
+    """Intrinsic that makes one truth value of those of all lanes."""
+
+    @intrinsic
+    def fold(typingctx: Any, where: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            if where != mask:
+                return args[0]
+            truths = builder.bitcast(args[0], ir.IntType(WIDTH))
+            none = instruction == "or"
+            return builder.icmp_unsigned("!=" if none else "==", truths,
+                                         ir.Constant(truths.type, 0 if none else -1))
+
+        return types.boolean(where), codegen
+
+    return fold
+
+
+_any, _all = _folded("or"), _folded("and")
+
+
+@helper
+def somewhere(where):
+    """True if a condition holds, of eight numbers if it holds for at least one of them."""
+    return _any(where)
+
+
+@helper
+def everywhere(where):
+    """True if a condition holds, of eight numbers if it holds for each of them."""
+    return _all(where)
+
+
+def by_kind(one: Callable[..., Any], eight: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of x for kernels that calls ``one`` of a float and ``eight`` of eight numbers."""
+
+    def function(x):
+        return one(x) if isinstance(x, float) else eight(x)
+
+    def typed(x):
+        return (lambda x: eight(x)) if x == lanes else (lambda x: one(x))
+
+    overload(function, jit_options=_JIT)(typed)
+    return function
+
+
+@helper
+def _smaller(a, b):
+    return chosen(b < a, b, a)
+
+
+@helper
+def _larger(a, b):
+    return chosen(b > a, b, a)
+
+
+@helper
+def _logarithm(x):
+    """The natural logarithm; of zero -inf, below NaN."""
+    small = x < 1e-290
+    found = logarithm(chosen(small, x * 2.0**100, x)) - chosen(small, 100.0 * math.log(2.0), 0.0)
+    found = chosen(x > 0.0, found, chosen(x == 0.0, -np.inf, np.nan))
+    return chosen(x < np.inf, found, x)
+
+
+@helper
+def _power(x, exponent):
+    """x^exponent; of x below zero for whole exponents, else NaN."""
+    size = magnitude(x)
+    usual = (size > 1e-290) & (size < np.inf)
+    log = exponent * logarithm(chosen(usual, size, 1.0))
+    power = chosen(log > 709.78, np.inf, chosen(log < -708.0, 0.0, exponential(log)))
+    grows = ((exponent > 0.0) & (size > 1.0)) | ((exponent < 0.0) & (size < 1.0))
+    extreme = chosen(exponent == 0.0, 1.0, chosen(grows, np.inf, spread(0.0)))
+    power = chosen(size == size, chosen(usual, power, extreme), x)
+    half = exponent * 0.5
+    signed_power = chosen(whole(half) == half, power, -power)
+    of_negative = chosen(whole(exponent) == exponent, signed_power, np.nan)
+    return chosen(x < 0.0, of_negative, power)
+
+
+@helper
+def _whole_power(x, exponent):
+    factor, rest, power = x, abs(exponent), spread(1.0)
+    while rest > 0:
+        if rest & 1:
+            power = power * factor
+        factor = factor * factor
+        rest >>= 1
+    return power if exponent >= 0 else 1.0 / power
+
+
+@overload(operator.pow, jit_options={"error_model": "numpy", "forceinline": True})
+def _typed_power(a, b):
+    if a != lanes:
+        return None
+    if isinstance(b, types.Integer):
+        return lambda a, b: _whole_power(a, b)
+    if b == types.float64:
+        return lambda a, b: _power(a, spread(b))
+    return (lambda a, b: _power(a, b)) if b == lanes else None
+
+
+def _for_eight(function: Any, eight: Any) -> None:
+    """Let a function of one number, as Python has it, take eight."""
+    overload(function, jit_options=_JIT)(
+        lambda x: (lambda x: eight(x)) if x == lanes else None)
+
+
+def _for_eight_pairs(function: Any, eight: Any) -> None:
+    """Let a function of two numbers take eight for one or both."""
+
+    def typed(a, b):
+        kinds = (a, b)
+        if lanes in kinds and all(kind in (lanes, types.float64) for kind in kinds):
+            return lambda a, b: eight(a, b)
+        return None
+
+    overload(function, jit_options=_JIT)(typed)
+
+
+for _of_one, _of_eight in (
+        (math.exp, exponential), (math.log, _logarithm), (math.atan, arctangent),
+        (math.tanh, hyperbolic_tangent), (math.sqrt, root), (abs, magnitude)):
+    _for_eight(_of_one, _of_eight)
+for _of_two, _of_eight in ((min, _smaller), (max, _larger)):
+    _for_eight_pairs(_of_two, _of_eight)
+
+
+class _Rows(types.Type):
+    def __init__(self) -> None:
+        super().__init__(name="Rows")
+
+
+_rows = _Rows()
+
+
+@register_model(_Rows)
+class _RowsModel(PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, ir.DoubleType().as_pointer())
+
+
+@intrinsic
+def rows(typingctx: Any, table: Any) -> Any:
+    """A table (k, 8) of which ``rows(table)[i]`` are eight numbers."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.make_array(signature.args[0])(context, builder, args[0]).data
+
+    return _rows(table), codegen
+
+
+@intrinsic
+def _row(typingctx: Any, table: Any, i: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = builder.gep(args[0], [builder.mul(args[1], ir.Constant(args[1].type, WIDTH))])
+        return builder.load(builder.bitcast(place, _VECTOR.as_pointer()), align=8)
+
+    return lanes(table, types.int64), codegen
+
+
+@overload(operator.getitem)
+def _typed_row(table, i):
+    if isinstance(table, _Rows) and isinstance(i, types.Integer):
+        return lambda table, i: _row(table, i)
+    return None
+
+
+@intrinsic
+def lane_of(typingctx: Any, numbers: Any, lane: Any) -> Any:
+    """One of eight numbers."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.extract_element(*args)
+
+    return types.float64(lanes, types.int64), codegen
+
+
+@intrinsic
+def with_lane(typingctx: Any, numbers: Any, lane: Any, number: Any) -> Any:
+    """Eight numbers, one of which is replaced."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.insert_element(args[0], args[2], args[1])
+
+    return lanes(lanes, types.int64, types.float64), codegen

@@ -29,7 +29,7 @@ from fecontact.integrate.rodas5p.step_loop import FINISHED, RUNNING
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.ground.motion import constant_speed
-from fecontact.laws.lanes import lane_address
+from fecontact.laws.simd import simd_address
 from fecontact.system.contact_system import ContactSystem
 
 # Steps of a call, in all lanes; runs that a worker takes at once, at most.
@@ -76,7 +76,7 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     laws = []
     for given in (s.normal, s.friction, drive, s.load, [s.ground_motion]):
         # Along axes without spring or dashpot nothing is driven.
-        found = [0 if given is drive and not law else lane_address(int(law)) for law in given]
+        found = [0 if given is drive and not law else simd_address(int(law)) for law in given]
         if None in found:
             return None
         laws.append(tuple(law for law in found if law is not None))

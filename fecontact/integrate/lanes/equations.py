@@ -15,7 +15,7 @@ from fecontact.core.lanes.vectors import (
     write,
 )
 from fecontact.integrate.lanes.arrays import BY_FORCE, BY_PLACE, BY_RATE, BY_SLIP, FORCE
-from fecontact.laws.lanes import node_lanes_at, signal_lanes_at
+from fecontact.laws.simd import node_lanes_at, signal_lanes_at
 
 
 @helper

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.lanes.functions import select, somewhere
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NotNegative, PerNode, Positive
@@ -24,22 +25,27 @@ from fecontact.laws.signatures import friction_law
 def _smoothed_sign(v, slope, smoothing):
     """s(v) and s'(v); ``smoothing`` is the index of the choice."""
     rise = 2.0 / math.pi * slope
-    if smoothing == 0.0:
+    by_tanh, by_root = smoothing == 1.0, smoothing == 2.0
+    sign, rate = 0.0, 0.0
+    if somewhere(smoothing == 0.0):
         x = slope * v
-        return 2.0 / math.pi * arctangent(x), rise / (1.0 + x * x)
-    x = rise * v
-    if smoothing == 1.0:
-        s = math.tanh(x)
-        return s, rise * (1.0 - s) * (1.0 + s)
-    root = 1.0 / math.sqrt(1.0 + x * x)
-    return x * root, rise * root * root * root
+        sign, rate = 2.0 / math.pi * arctangent(x), rise / (1.0 + x * x)
+    if somewhere(by_tanh):
+        s = math.tanh(rise * v)
+        sign, rate = select(by_tanh, s, sign), select(by_tanh, rise * (1.0 - s) * (1.0 + s), rate)
+    if somewhere(by_root):
+        x = rise * v
+        root = 1.0 / math.sqrt(1.0 + x * x)
+        sign = select(by_root, x * root, sign)
+        rate = select(by_root, rise * root * root * root, rate)
+    return sign, rate
 
 
 @helper
 def _force(v, F, coefficient, change, viscous, slope, smoothing):
     """R, dR/dv, dR/dF from mu and ``change``, its derivative with respect to speed."""
     s, rate = _smoothed_sign(v, slope, smoothing)
-    sign = 1.0 if v >= 0.0 else -1.0
+    sign = select(v >= 0.0, 1.0, -1.0)
     ratio = coefficient * s + viscous * v
     return ratio * F, (coefficient * rate + sign * change * s + viscous) * F, ratio
 
@@ -102,7 +108,7 @@ def product(v, F, p):
     """R/F a_1 (1 + a_2 exp(-b_1 |v|)) arctan(b_2 v)."""
     factor, excess, decay, slope = p[0], p[1], p[2], p[3]
     fall = excess * math.exp(-decay * abs(v))
-    sign = 1.0 if v >= 0.0 else -1.0
+    sign = select(v >= 0.0, 1.0, -1.0)
     x = slope * v
     bend = arctangent(x)
     ratio = factor * (1.0 + fall) * bend

@@ -10,6 +10,7 @@ from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import require_finite, require_positive
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
+from fecontact.laws.elementary import sine_and_cosine
 from fecontact.laws.signals.base import between
 from fecontact.laws.signatures import signal
 
@@ -66,9 +67,11 @@ def constant_speed(t, p):
 @signal
 def _harmonic_speed(t, p):
     speed, amplitude, w, phase = p[0], p[1], p[2], p[3]
+    angle = 0.5 * w * t
     # cos(phase) - cos(w t + phase), without cancellation.
-    travel = 2.0 * math.sin(0.5 * w * t + phase) * math.sin(0.5 * w * t)
-    return speed * t + amplitude / w * travel, speed + amplitude * math.sin(w * t + phase)
+    travel = 2.0 * sine_and_cosine(angle + phase)[0] * sine_and_cosine(angle)[0]
+    return (speed * t + amplitude / w * travel,
+            speed + amplitude * sine_and_cosine(w * t + phase)[0])
 
 
 @dataclass(frozen=True)

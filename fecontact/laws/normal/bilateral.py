@@ -12,6 +12,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.errors import InputError
+from fecontact.core.lanes.functions import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive
@@ -23,9 +24,8 @@ _NO_FORCE, _NOWHERE = 1e-300, 1e100
 @helper
 def _felt(tension, slope, damping):
     """F, dF/du, dF/dv of a spring with stiffness."""
-    if tension == 0.0 and (slope != 0.0 or damping != 0.0):
-        return _NO_FORCE, slope, damping
-    return -tension, slope, damping
+    hidden = (tension == 0.0) & (abs(slope) + damping > 0.0)
+    return select(hidden, _NO_FORCE, -tension), slope, damping
 
 
 @dataclass(frozen=True)
@@ -110,14 +110,12 @@ class BilateralCubic(BilateralLaw):
 @normal_law
 def _play(u, v, p):
     e = p[4] - u
-    side = 1.0 if e > 0.0 else -1.0
+    side = select(e > 0.0, 1.0, -1.0)
     depth = side * e - p[1]
-    if depth <= 0.0:
-        return -p[3], 0.0, 0.0
     held = p[0] * depth - p[2] * side * v
-    if held <= 0.0:
-        return -p[3], 0.0, 0.0
-    return _felt(side * held + p[3], p[0], p[2])
+    slack = (depth <= 0.0) | (held <= 0.0)
+    force, slope, damping = _felt(side * held + p[3], p[0], p[2])
+    return select(slack, -p[3], force), select(slack, 0.0, slope), select(slack, 0.0, damping)
 
 
 @dataclass(frozen=True)

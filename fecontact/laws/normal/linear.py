@@ -5,9 +5,11 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from fecontact.core.lanes.functions import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, Positive
+from fecontact.laws.normal.powers import lower_power
 from fecontact.laws.pieces import pieces_of
 from fecontact.laws.signatures import normal_law
 
@@ -16,9 +18,8 @@ from fecontact.laws.signatures import normal_law
 def _linear(u, v, p):
     stiffness, damping = p[0], p[1]
     force = stiffness * u + damping * v
-    if u <= 0.0 or force <= 0.0:
-        return 0.0, 0.0, 0.0
-    return force, stiffness, damping
+    away = (u <= 0.0) | (force <= 0.0)
+    return select(away, 0.0, force), select(away, 0.0, stiffness), select(away, 0.0, damping)
 
 
 @dataclass(frozen=True)
@@ -72,18 +73,16 @@ class LinearContact(NormalLaw):
 @normal_law
 def _two_sided(u, v, p):
     stiffness, clearance, exponent, factor = p[0], p[1], p[2], p[3]
-    if u > 0.0:
-        side, depth = 1.0, u
-    elif u < -clearance:
-        side, depth = -1.0, -u - clearance
-    else:
-        return 0.0, 0.0, 0.0
+    side, depth = select(u > 0.0, 1.0, -1.0), select(u > 0.0, u, -u - clearance)
     damped = 1.0 + factor * side * v
-    if damped <= 0.0:
+    away = (depth <= 0.0) | (damped <= 0.0)
+    if everywhere(away):
         return 0.0, 0.0, 0.0
-    lower = 1.0 if exponent == 1.0 else depth ** (exponent - 1.0)
+    lower = lower_power(select(away, 0.0, depth), exponent)
     elastic = stiffness * lower * depth
-    return side * elastic * damped, exponent * stiffness * lower * damped, elastic * factor
+    return (select(away, 0.0, side * elastic * damped),
+            select(away, 0.0, exponent * stiffness * lower * damped),
+            select(away, 0.0, elastic * factor))
 
 
 @dataclass(frozen=True)

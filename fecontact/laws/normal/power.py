@@ -9,9 +9,11 @@ from typing import Annotated, ClassVar, Literal, get_args
 import numpy as np
 
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.lanes.functions import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive, UpToOne
+from fecontact.laws.normal.powers import lower_power
 from fecontact.laws.pieces import pieces_of
 from fecontact.laws.signatures import normal_law
 
@@ -26,20 +28,15 @@ Exponent = Annotated[PerNode | Literal["point", "line"],
 def _power(u, v, p):
     scale, length, exponent, factor = p[0], p[1], p[2], p[3]
     damped = 1.0 + factor * v
-    if u <= 0.0 or damped <= 0.0:
+    away = (u <= 0.0) | (damped <= 0.0)
+    if everywhere(away):
         return 0.0, 0.0, 0.0
-    ratio = u / length
-    # Powers of the usual exponents are much faster this way.
-    if exponent == 1.5:
-        lower = ratio**0.5
-    elif exponent == 1.0:
-        lower = 1.0
-    elif exponent == 2.0:
-        lower = ratio
-    else:
-        lower = ratio ** (exponent - 1.0)
+    ratio = select(away, 0.0, u / length)
+    lower = lower_power(ratio, exponent)
     elastic = scale * lower * ratio
-    return elastic * damped, exponent * scale * lower / length * damped, elastic * factor
+    return (select(away, 0.0, elastic * damped),
+            select(away, 0.0, exponent * scale * lower / length * damped),
+            select(away, 0.0, elastic * factor))
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.lanes.functions import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive
@@ -23,34 +24,29 @@ def bed_of_asperities(v, p, compression, bearing, density):
     """F, dF/du, dF/dv from f(s), h = f' and h'; p begins with c, R_Z and beta c."""
     stiffness, height, damping = p[0], p[1], p[2]
     force = stiffness * height * compression + damping * bearing * v
-    if force <= 0.0:
-        return 0.0, 0.0, 0.0
-    return force, stiffness * bearing + damping * density / height * v, damping * bearing
+    away = force <= 0.0
+    return (select(away, 0.0, force),
+            select(away, 0.0, stiffness * bearing + damping * density / height * v),
+            select(away, 0.0, damping * bearing))
 
 
 @normal_law
 def uniform(u, v, p):
     """Density 1."""
-    s = u / p[1]
-    if s <= 0.0:
-        return 0.0, 0.0, 0.0
-    if s < 1.0:
-        return bed_of_asperities(v, p, 0.5 * s * s, s, 1.0)
-    return bed_of_asperities(v, p, s - 0.5, 1.0, 0.0)
+    s = select(u <= 0.0, 0.0, u / p[1])
+    partly = s < 1.0
+    return bed_of_asperities(v, p, select(partly, 0.5 * s * s, s - 0.5),
+                             select(partly, s, 1.0), select(partly, 1.0, 0.0))
 
 
 @normal_law
 def parabolic(u, v, p):
     """Density 6 s (1 - s)."""
-    s = u / p[1]
-    if s <= 0.0:
-        return 0.0, 0.0, 0.0
-    compression, bearing, density = s - 0.5, 1.0, 0.0
-    if s < 1.0:
-        compression = s * s * s * (1.0 - 0.5 * s)
-        bearing = s * s * (3.0 - 2.0 * s)
-        density = 6.0 * s * (1.0 - s)
-    return bed_of_asperities(v, p, compression, bearing, density)
+    s = select(u <= 0.0, 0.0, u / p[1])
+    partly = s < 1.0
+    return bed_of_asperities(v, p, select(partly, s * s * s * (1.0 - 0.5 * s), s - 0.5),
+                             select(partly, s * s * (3.0 - 2.0 * s), 1.0),
+                             select(partly, 6.0 * s * (1.0 - s), 0.0))
 
 
 @normal_law

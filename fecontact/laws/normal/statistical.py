@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from fecontact.core.lanes.functions import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive
@@ -19,11 +20,13 @@ def _exponential(u, v, p):
     scale, length, factor = p[0], p[1], p[2]
     s = u / length
     damped = 1.0 + factor * v
-    if s < _FARTHEST or damped <= 0.0:
+    away = (s < _FARTHEST) | (damped <= 0.0)
+    if everywhere(away):
         return 0.0, 0.0, 0.0
     slope = scale * math.exp(min(s, _DEEPEST))
     elastic = slope * (1.0 + max(s - _DEEPEST, 0.0))
-    return elastic * damped, slope / length * damped, elastic * factor
+    return (select(away, 0.0, elastic * damped), select(away, 0.0, slope / length * damped),
+            select(away, 0.0, elastic * factor))
 
 
 @dataclass(frozen=True)

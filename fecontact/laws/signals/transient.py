@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.lanes.functions import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
@@ -27,7 +28,7 @@ _RISE = 0.01
 
 @signal
 def _step(t, p):
-    return (p[1] if t >= p[0] else 0.0), 0.0
+    return select(t >= p[0], p[1], 0.0), 0.0
 
 
 @dataclass(frozen=True)

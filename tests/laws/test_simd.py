@@ -1,15 +1,23 @@
 """Laws for eight nodes at once: the same numbers as the laws themselves."""
 
+import math
+
 import numpy as np
 import pytest
 
 from fecontact.core.compiled import kernel
+from fecontact.core.lanes.functions import select
 from fecontact.core.lanes.vectors import read, write
 from fecontact.core.records import Matrix, Vector
 from fecontact.laws import (
+    BilateralCubic,
+    BilateralPiecewise,
+    BilateralPlay,
     Constant,
     ConstantFriction,
+    CosineSurface,
     CubicFriction,
+    ExponentialContact,
     ExponentialFriction,
     GalvanettoFriction,
     GaussianFriction,
@@ -25,14 +33,15 @@ from fecontact.laws import (
     RestitutionContact,
     RoughSurface,
     TwoSidedStop,
+    normal_law,
+    simd,
 )
-from fecontact.laws import lanes as lane_laws
 from fecontact.laws.ground.motion import constant_speed
 
 
 @kernel
 def at_nodes(law: int, a: Vector, b: Vector, p: Matrix, out: Matrix) -> None:
-    one, two, three = lane_laws.node_lanes_at(law)(read(a), read(b), p)
+    one, two, three = simd.node_lanes_at(law)(read(a), read(b), p)
     write(out[0], one)
     write(out[1], two)
     write(out[2], three)
@@ -40,7 +49,7 @@ def at_nodes(law: int, a: Vector, b: Vector, p: Matrix, out: Matrix) -> None:
 
 @kernel
 def at_times(law: int, t: Vector, p: Matrix, out: Matrix) -> None:
-    value, rate = lane_laws.signal_lanes_at(law)(read(t), p)
+    value, rate = simd.signal_lanes_at(law)(read(t), p)
     write(out[0], value)
     write(out[1], rate)
 
@@ -64,7 +73,15 @@ NORMAL = [
     PrescribedForce(varied(14.0)),
     TwoSidedStop(varied(1e6), varied(1e-5)),
     TwoSidedStop(varied(1e8), varied(1e-5), (1.0, 1.5, 1.3, 2.0) * 2, varied(0.4)),
+    ExponentialContact(varied(10.0), varied(1e-5), 0.4),
+    BilateralCubic(varied(1e6), 1e16, varied(30.0), 2.0),
+    BilateralPlay(varied(1e6), 1e-6, varied(30.0), 2.0),
+    # Those with branches.
+    CosineSurface(varied(1e6), varied(1e-5), varied(30.0)),
+    GaussianSurface(varied(1e6), varied(1e-5), varied(30.0)),
+    BilateralPiecewise((-1e-5, 0.0, 1e-5), (-2.0, 0.0, 1.0), varied(30.0)),
 ]
+BRANCHED = 3
 FRICTION = [
     law for smoothing in ("arctan", "tanh", "square-root") for law in (
         ExponentialFriction(0.8, varied(0.5), 1000.0, varied(1e4), 0.1, smoothing=smoothing),
@@ -78,7 +95,7 @@ FRICTION = [
 
 def assert_same(law, a, b):
     """Values and derivatives in random states, eight at once and one by one."""
-    lane = lane_laws.lane_law(law.kernel)
+    lane = simd.simd_law(law.kernel)
     assert lane is not None
     table = law.table(np.full(8, 0.125))
     p, seen = np.ascontiguousarray(table.T), []
@@ -116,15 +133,51 @@ def test_signals(kernel_of, table):
     p = np.array(table) * np.linspace(0.5, 1.5, 8)
     for t in RNG.uniform(0.0, 100.0, (100, 8)):
         out = np.zeros((2, 8))
-        at_times(lane_laws.lane_law(kernel_of).address, t, p, out)
+        at_times(simd.simd_law(kernel_of).address, t, p, out)
         wanted = np.array([kernel_of.python(t[i], np.ascontiguousarray(p[:, i]))
                            for i in range(8)]).T
         # Angles of up to 5000 are rounded to 5e-13 in either way.
         assert out == pytest.approx(wanted, rel=1e-12, abs=1e-12 * np.abs(wanted).max())
 
 
-def test_laws_without_a_function_for_lanes():
-    assert lane_laws.lane_law(GaussianSurface.kernel) is None
-    assert lane_laws.lane_address(GaussianSurface.kernel.address) is None
-    law = RoughSurface.kernel
-    assert lane_laws.lane_address(law.address) == lane_laws.lane_law(law).address
+@normal_law
+def capped(u, v, p):
+    while u > p[0]:
+        u *= 0.5
+    return u, 1.0, 0.0
+
+
+@normal_law
+def branchless(u, v, p):
+    return p[0] * math.exp(u) + abs(v), p[0] * math.exp(u), select(v > 0.0, 1.0, -1.0)
+
+
+@pytest.mark.parametrize(("law", "at_once"), [(capped, False), (branchless, True)])
+def test_laws_of_users(law, at_once):
+    """A law whose branches depend on numbers is called for one lane after the other."""
+    assert simd.simd_law(law).python.__qualname__.endswith("at_once") == at_once
+    a, b = RNG.normal(size=(2, 8))
+    p, out = RNG.uniform(0.1, 1.0, (1, 8)), np.zeros((3, 8))
+    at_nodes(simd.simd_address(law.address), a, b, p, out)
+    wanted = np.array([law.python(a[i], b[i], p[:, i]) for i in range(8)]).T
+    assert out == pytest.approx(wanted, rel=1e-14)
+
+
+def test_laws_that_are_common_are_compiled_for_eight_numbers():
+    for law in (*NORMAL[:-BRANCHED], *FRICTION):
+        assert simd.simd_law(law.kernel).python.__qualname__.endswith("at_once"), law
+
+
+@pytest.mark.parametrize("law", NORMAL, ids=lambda law: type(law).__name__)
+def test_what_is_no_number_is_not_hidden(law):
+    """One lane without a number does not change the others, and is seen in its own force."""
+    p = np.ascontiguousarray(law.table(np.full(8, 0.125)).T)
+    u, v, out = 1e-6 * RNG.normal(size=8), np.zeros(8), np.zeros((3, 8))
+    address = simd.simd_address(law.kernel.address)
+    at_nodes(address, u, v, p, out)
+    before = out.copy()
+    u[3] = np.nan
+    at_nodes(address, u, v, p, out)
+    assert (np.delete(out, 3, axis=1) == np.delete(before, 3, axis=1)).all()
+    if type(law) is not PrescribedForce:
+        assert np.isnan(out[:, 3]).any()
