@@ -11,6 +11,7 @@ import sys
 import webbrowser
 from pathlib import Path
 
+from fecontact.core.checks import require_file
 from fecontact.core.errors import InputError, MissingLibraryError, choices
 from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import reading
@@ -36,6 +37,7 @@ def paraview() -> Path | None:
 
 def require_kind_of_result(file: Path) -> None:
     """InputError unless a file is one that can be shown and cannot run code."""
+    require_file(file, "a file of results")
     if not file.is_file():
         raise InputError(f"{file} does not exist; give a file that fecontact wrote, or a study "
                          f"that was run.")

@@ -73,25 +73,34 @@ def as_path(path: Any, what: str) -> Path:
     return found
 
 
-def require_regular_file(path: Path, what: str, where: str = "") -> None:
-    """Raise :class:`InputError` if a path exists but is no regular file that fits into memory.
+def require_file(path: Path, what: str, where: str = "") -> None:
+    """Raise :class:`InputError` if a path is a folder, or a pipe or device, which may never end.
 
-    Pipes and devices may never end. Call it before the file is opened; ``what`` is its role in the
-    message, 'a study', and ``where`` its beginning.
+    Call it before the file is opened; ``what`` is its role in the message, 'a study', and ``where``
+    its beginning.
     """
     try:
-        found = path.stat()
+        mode = path.stat().st_mode
     except (OSError, ValueError):
         return  # said when it is opened
-    begin, free = f"{where}{path} cannot be read as {what}", available_memory()
-    if stat.S_ISDIR(found.st_mode):
+    begin = f"{where}{path} cannot be read as {what}"
+    if stat.S_ISDIR(mode):
         raise InputError(f"{begin}: it is a folder; give a file.")
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(mode):
         raise InputError(f"{begin}: it is a pipe or device, not a file; store its content in a "
                          f"file first.")
-    if found.st_size > free:
-        raise InputError(f"{begin}: it has {shown_memory(found.st_size)}, where "
-                         f"{shown_memory(free)} of memory are free; take a smaller one.")
+
+
+def require_regular_file(path: Path, what: str, where: str = "") -> None:
+    """Apply :func:`require_file`, also to the size: the file must fit into memory."""
+    require_file(path, what, where)
+    try:
+        size = path.stat().st_size
+    except (OSError, ValueError):
+        return
+    if size > (free := available_memory()):
+        raise InputError(f"{where}{path} cannot be read as {what}: it has {shown_memory(size)}, "
+                         f"where {shown_memory(free)} of memory are free; take a smaller one.")
 
 
 def as_count(value: Any, what: str, least: int = 1) -> int:

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.core.errors import ModelWarning, choices
+from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array
 from fecontact.fem.chords import chords
 from fecontact.fem.elastic_body import ElasticBody
@@ -130,10 +131,13 @@ def _too_far(system: ContactSystem, times: Array, states: Array) -> str | None:
             moved = states[first : first + _BLOCK, : basis.modes] @ rows
             moved = moved.reshape(len(moved), -1, d)
             moved[..., : d - 1] -= moved[..., : d - 1].mean(axis=1, keepdims=True)
-            farthest = max(farthest, float(np.sqrt((moved**2).sum(axis=-1)).max()))
+            scale = magnitude(moved)
+            moved /= scale
+            farthest = max(farthest, scale * float(np.sqrt((moved**2).sum(axis=-1)).max()))
     if farthest <= size:
         return None
-    return (f"points of the body move by {farthest:.2g} m, more than its own size of {size:.2g} m; "
+    far = f"{farthest:.2g} m" if np.isfinite(farthest) else "more than 1e308 m"
+    return (f"points of the body move by {far}, more than its own size of {size:.2g} m; "
             f"displacements must be small, so check the supports of the body and the units of "
             f"loads and stiffnesses.")
 

@@ -1,5 +1,7 @@
 """What is refused, and what succeeds, where input is unusual."""
 
+import os
+
 import numpy as np
 import pytest
 from systems import friction_oscillator, impact_oscillator
@@ -15,6 +17,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.cli.plot_kinds import PlotRequest, point_of
 from fecontact.integrate import ContactEvents
+from fecontact.output.render.movie import target
 from fecontact.plot import plot_branches
 
 
@@ -71,3 +74,24 @@ def test_branches_do_not_switch_a_drive_on():
     field = contact_field(system, ["drive.amplitude_x"])
     with pytest.raises(AnalysisError, match=r"drive.amplitude_x = 0"):
         equilibrium_branch(field, parameter="drive.amplitude_x", bounds=(0.0, 1.0))
+
+
+@pytest.mark.parametrize("command", [
+    ("plot", "pipe.vtkhdf", "history"), ("plot", "pipe.h5", "branches"),
+    ("report", "pipe.checkpoint"), ("export", "pipe.vtkhdf"), ("render", "pipe.h5"),
+    ("open", "pipe.vtkhdf"), ("compare", "pipe.vtkhdf", "pipe.vtkhdf")])
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names")
+def test_results_that_are_pipes(cli, tmp_path, monkeypatch, command):
+    """Nobody writes into them, so that a reader would wait for ever."""
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo(command[1])
+    code, _, err = cli(*command)
+    assert code == 1
+    assert err == (f"error: {command[1]} cannot be read as a file of results: it is a pipe or "
+                   f"device, not a file; store its content in a file first.\n")
+
+
+@pytest.mark.parametrize("name", [".mp4", ".PNG"])
+def test_movies_without_a_name(tmp_path, name):
+    with pytest.raises(InputError, match=f"no name before its ending; give one, such as run{name}"):
+        target(tmp_path / name, 25.0, (320, 180))

@@ -13,6 +13,7 @@ from fecontact import (
     PointLoad,
     RigidStart,
     Status,
+    Trajectory,
     basis_from_matrices,
     simulate,
     static_equilibrium,
@@ -29,6 +30,7 @@ from fecontact.laws import (
 )
 from fecontact.reduction import PointPairing, point_masses
 from fecontact.system.model_limits import limits_exceeded
+from fecontact.system.powers import POWERS
 
 
 def test_cvode_agrees():
@@ -171,6 +173,10 @@ def test_runs_warn_where_they_leave_the_limits_of_the_model():
         run = simulate(system, 0.21, initial=np.array([0.0, 0.1]))
     assert len(run.limits_exceeded) == 1
     assert simulate(system, 0.19, initial=np.array([0.0, 0.1])).limits_exceeded == ()
+    # Squares of these displacements are beyond all numbers.
+    far = Trajectory(system, np.zeros(2), np.array([[0.0], [1e200]]), np.zeros((2, 1)),
+                     np.zeros((2, len(POWERS))))
+    assert "points of the body move by 1e+200 m, more than its own size" in far.limits_exceeded[0]
     # v (m / c)^(1/2) deep: 1.1 mm are 110 roughness heights, 0.9 mm are 90.
     with pytest.warns(ModelWarning, match=r"contact node 0 is 0\.0011 m deep .* 1\.1e\+02 times"):
         simulate(system, 5e-3, initial=np.array([0.0, -1.1]))

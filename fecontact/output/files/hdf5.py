@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import as_path, require_kind
+from fecontact.core.checks import as_path, require_file, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.files.hdf5_check import append_checksum, open_hdf5
@@ -104,6 +104,7 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
         converted too, see :func:`fecontact.core.files.stored.reading`.
     """
     path = as_path(path, "a file of results")
+    require_file(path, "a file of results")
     if not path.is_file():
         raise InputError(f"{path} does not exist; give a file that fecontact wrote.")
     with reading(path, "not an HDF5 file, or is damaged"):

@@ -143,6 +143,8 @@ def target(path: str | Path, fps: float, size: tuple[int, int]) -> tuple[Path, b
     if path.suffix.lower() not in (".mp4", ".png", "") and not path.is_dir():
         raise InputError(f"{path} must end in .mp4 for a movie or .png for pictures, or be a "
                          f"folder.")
+    if path.name.lower() in (".mp4", ".png"):
+        raise InputError(f"{path} has no name before its ending; give one, such as run{path.name}.")
     require_frame_rate("A movie", fps)
     _require_size(size)
     return path, path.suffix.lower() == ".mp4"
