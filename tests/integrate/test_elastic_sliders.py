@@ -7,11 +7,13 @@ from scipy.optimize import brentq
 
 import fecontact as fc
 from fecontact.laws import (
+    BilateralCubic,
     FourParameterIwanFriction,
     Harmonic,
     IwanFriction,
     JenkinsFriction,
     LinearContact,
+    PowerContact,
     PrescribedForce,
 )
 
@@ -163,6 +165,31 @@ def test_elements_turn_on_the_edge_of_their_disc():
         own = run.states[:, 4 + 2 * i : 6 + 2 * i]
         assert np.abs(own - z).max() < 2e-3 * limit
         assert np.linalg.norm(own, axis=1).max() <= limit * (1.0 + 1e-9)
+    assert abs(run.energies.imbalance) < 1e-5
+
+
+@pytest.mark.parametrize("normal", [LinearContact(20.0, 0.0), PowerContact(20.0, 2.0),
+                                    BilateralCubic(5.0, 1.0, 0.0)])
+def test_elements_turn_where_the_normal_force_vanishes(normal):
+    """Deflections in space are those of the disc that follows the motion, where F passes zero."""
+    rows = np.eye(3)
+    basis = fc.basis_from_matrices(np.eye(3), np.diag([1.0, 1.3, 4.0]), {
+        "contact": rows[None], "C": rows}, damping=0.1 * np.eye(3), dimension=3)
+    law = IwanFriction(20.0, 0.5, elements=2)
+    system = fc.ContactSystem(basis, normal=normal, friction=law, load=fc.Load(forces=(
+        fc.PointLoad("C", "x", signal=Harmonic(2.0, 0.9)),
+        fc.PointLoad("C", "y", signal=Harmonic(1.5, 1.3)),
+        fc.PointLoad("C", "z", signal=Harmonic(3.0, 1.7)))))
+    rough, run = (fc.simulate(system, 20.0, outputs=80001, rtol=rtol) for rtol in (1e-6, 1e-9))
+    F = np.abs(run.normal_force[:, 0])
+    vanishes = (F == 0.0) | (np.diff(np.sign(run.normal_force[:, 0]), append=0.0) != 0.0)
+    assert (F > 0.0).mean() > 0.02
+    assert np.count_nonzero(np.diff(vanishes)) > 8
+    for i in range(2):
+        z = swept(run.displacement("C")[:, :2], (0.125, 0.375)[i] * F / 10.0, np.zeros(2))
+        own = run.states[:, 6 + 2 * i : 8 + 2 * i]
+        assert np.abs(own - z).max() < 2e-3 * np.abs(z).max()
+    assert np.abs(rough.states[:, :3] - run.states[:, :3]).max() < 1e-5 * np.abs(run.states).max()
     assert abs(run.energies.imbalance) < 1e-5
 
 

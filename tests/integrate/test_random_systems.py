@@ -57,3 +57,17 @@ def test_elastic_elements(systems, number):
     assert systems.distance(case, systems.reference(case, times, tolerance=1e-9), wanted) < 1e-6
     run = systems.fc.simulate(case.system, times[-1], initial=case.state, outputs=times, rtol=1e-8)
     assert systems.distance(case, run.states, wanted) < 1e-5
+
+
+@pytest.mark.parametrize("number", [51, 79, 107, 163, 247])
+def test_elastic_elements_in_space_where_the_normal_force_vanishes(systems, number):
+    """Runs pass touches and lift-offs; a tolerance of 1e-9 moves them by no more than their errors.
+
+    The reference takes too many steps here, as elements turn infinitely fast.
+    """
+    case = systems.random_case(number)
+    runs = [systems.fc.simulate(case.system, case.end, initial=case.state, outputs=201, rtol=rtol)
+            for rtol in (1e-6, 1e-9)]
+    assert [run.status for run in runs] == [systems.Status.FINISHED] * 2
+    assert systems.distance(case, *(run.states for run in runs)) < 1e-5
+    assert abs(runs[1].energies.imbalance) < 1e-5

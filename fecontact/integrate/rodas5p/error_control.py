@@ -45,13 +45,16 @@ def memory_error(error, problem, progress, room):
 
     Forces do not depend on the internal variables of nodes that are open at the end of the step.
     These fade within 1e-7 s: their rates jump at lift-off, and small tolerances of them would
-    need steps of rounding size.
+    need steps of rounding size. In space, elastic Coulomb elements of nodes that touch down turn at
+    once: steps end at the touch, from where their deflections are set.
     """
     control = problem.control
     m, n = len(control.largest), len(problem.system.gap)
     states, difference = len(control.memory_scale) // max(n, 1), room.stages[tableau.STAGES - 1]
     for j in range(n):
-        if room.nodes[2, n + j] != 0.0:
+        begins = (progress.signs[j] == 0 and control.slider_counts[j] > 0
+                  and in_space(problem.system))
+        if room.nodes[2, n + j] != 0.0 and not begins:
             for k in range(j * states, (j + 1) * states):
                 error = max(error, abs(difference[2 * m + k]) / (
                     control.memory_scale[k] * control.rtol))

@@ -10,7 +10,6 @@ Forces are continuous at both ends of slip, and the derivatives of a deflection 
 the limit become those of the limit.
 """
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -39,8 +38,9 @@ _ATTEND = Callable[[
 attend_at = function_at(_ATTEND)
 
 # Requests: the part of the step until slip ends or begins; a state at a time within its
-# limits; the end of a step, with its derivatives, within its limits.
-SWITCH, OUTPUT, END = range(3)
+# limits; the end of a step, with its derivatives, within its limits; the start of a step after a
+# touch.
+SWITCH, OUTPUT, END, BEGIN = range(4)
 
 # Parts of a step at which excesses are looked at, and a part by which their slopes are taken.
 _LOOKS, _ASIDE = 8, 1e-5
@@ -125,19 +125,15 @@ def _since_touch(j, contact, earlier, s):
 def _begin_contact(j, since, t, problem, progress, vary, force, rates):
     """Set the deflections of node j a time after its touch; True if any changes.
 
-    They are ``z = v since``, within their limits.
+    They are ``z = v since``, of which the part beyond the limit is the distance of slip.
     """
     s, y, changed = problem.system, progress.state, False
     count = problem.control.slider_counts[j]
     pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
-    z, slip = memory_of(j, y, s), math.hypot(contact.slip, contact.slip_across)
+    z, along, across = memory_of(j, y, s), contact.slip * since, contact.slip_across * since
     for i in range(count):
         limit = limit_of(j, i, count, pressing, s)
-        most, time = limit * (1.0 - SHORT), since
-        if slip * since > most:
-            time = most / slip
         first = 2 * i if in_space(s) else i
-        along, across = contact.slip * time, contact.slip_across * time
         if z[first] == along and (not in_space(s) or z[first + 1] == across):
             continue
         if len(vary.variation.columns):
@@ -150,9 +146,23 @@ def _begin_contact(j, since, t, problem, progress, vary, force, rates):
 
 
 @routine
-def _after_touch(earlier, t, problem, progress, vary, force, rates):
-    """Set the deflections of contacts that closed at most ``earlier`` ago; True if any changes."""
+def _set_rates(after_t, problem, progress, room):
+    """Set the rates and gradients of the state after its deflections have changed."""
+    s = problem.system
+    dynamics.set_given(after_t, s, room.given, room.load)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
+                                    room.nodes, progress.gradients, progress.rate)
+
+
+@routine
+def _after_touch(t, problem, progress, room, vary):
+    """Set the deflections of contacts that closed at the end of the last step."""
     s, control, changed = problem.system, problem.control, False
+    near = _NEAR_VARIED if len(vary.variation.columns) > 0 else _NEAR
+    earlier = _PAST * near * progress.numbers[LAST_STEP]
+    states = s.memory.max()
+    length, width = force_room(states, in_space(s))
+    force, rates = np.empty(length), np.empty((states, width))
     moved = ground_motion(t, s)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
@@ -161,7 +171,8 @@ def _after_touch(earlier, t, problem, progress, vary, force, rates):
         since = _since_touch(j, contact, earlier, s) if pressing > 0.0 else -1.0
         if since >= 0.0:
             changed |= _begin_contact(j, since, t, problem, progress, vary, force, rates)
-    return changed
+    if changed:
+        _set_rates(t, problem, progress, room)
 
 
 @routine
@@ -295,10 +306,8 @@ def _switch(step, problem, progress, room, vary):
     closed, starts = np.zeros((3, n)), np.full((n, states), -1.0)
     begins = varies or control.slider_counts.sum() <= _FEW
     near = _NEAR_VARIED if varies else _NEAR
-    first, t = 2.0, step.t
+    first, t, again = 2.0, step.t, False
     after_t = np.nextafter(t, np.inf)
-    again = _after_touch(_PAST * near * progress.numbers[LAST_STEP], after_t, problem, progress,
-                         vary, force, rates)
     for look in range(_LOOKS + 2):
         if again:
             break
@@ -321,8 +330,8 @@ def _switch(step, problem, progress, room, vary):
                 begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
                 place, just_after = _touch(begun, part, j, step, problem, progress, room, y, force,
                                            rates)
-                if just_after > _JUMP * pressing:
-                    if place > near and place * step.h > _BRIEFEST * abs(t):
+                if in_space(s) or just_after > _JUMP * pressing:
+                    if place * step.h > _BRIEFEST * abs(t):
                         first = min(first, place)
                     else:
                         again |= _begin_contact(j, 0.0, after_t, problem, progress, vary, force,
@@ -369,9 +378,7 @@ def _switch(step, problem, progress, room, vary):
                 again = True
     if not again:
         return 1.0
-    dynamics.set_given(after_t, s, room.given, room.load)
-    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
-                                    room.nodes, progress.gradients, progress.rate)
+    _set_rates(after_t, problem, progress, room)
     return 0.0
 
 
@@ -403,12 +410,16 @@ def _at_end(step, problem, progress, room, vary):
 def _attend(kind, step, problem, progress, room, vary, t, y):
     """Part of the step until slip ends, 0 if it was to end at its start, 1 if it does not.
 
-    Or fill in what ``kind`` asks for: ``y`` at the time t, or the end of the step, within limits.
+    Or fill in what ``kind`` asks for: ``y`` at the time t, or the end of the step, within limits,
+    or its start after a touch.
     """
     if kind == SWITCH:
         return _switch(step, problem, progress, room, vary)
     if kind == END:
         _at_end(step, problem, progress, room, vary)
+        return 1.0
+    if kind == BEGIN:
+        _after_touch(np.nextafter(t, np.inf), problem, progress, room, vary)
         return 1.0
     s = problem.system
     states = s.memory.max()

@@ -29,7 +29,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
     next_switch,
     note_events_at,
 )
-from fecontact.integrate.rodas5p.sliders import END, OUTPUT, SWITCH, attend_at
+from fecontact.integrate.rodas5p.sliders import BEGIN, END, OUTPUT, SWITCH, attend_at
 from fecontact.integrate.rodas5p.state import (
     CAUTIOUS,
     OUTPUTS,
@@ -383,6 +383,8 @@ def advance(
             choose_near(h, problem, progress, room)
         step = _aim(t, h, exactly, smallest, moved, end, problem, progress, room)
         G = 1.0 / (step.h * tableau.GAMMA)
+        if new and control.sliders != 0:
+            attend_at(control.sliders)(BEGIN, step, problem, progress, room, vary, t, room.right)
         switched = _attempt(step, G, new, end, problem, progress, room)
         new = False
 

@@ -18,8 +18,9 @@ from fecontact.laws.signatures import memory_friction_law, planar_friction_law
 RETURN_TIME = 1e-7
 # Parts of its limit by which an element may be short of it and slide all the same.
 AT_LIMIT = 1e-12
-# Deflection over limit up to which an element turns as on the edge of its disc.
-MOST_TURNS = 1e8
+# An element turns as on the edge of a disc of at least this part of its deflection: its rate stays
+# finite where the limit vanishes.
+NARROWEST = 1e-5
 
 
 @memory_friction_law
@@ -65,7 +66,8 @@ def _planar_maxwell_slip(law, v1, v2, F, z, p, force, rates):
     """Elements in two directions, each returned to the disc |c z| <= phi F along its own direction.
 
     With a return time of zero, an element that slides turns as on the edge of the disc:
-    n' = (v - (n.v) n) / l with n = z / |z| and the limit l, while |z| grows by n.v.
+    n' = (v - (n.v) n) / l with n = z / |z| and the limit l, at least NARROWEST |z|, while |z| grows
+    by n.v.
     """
     clear(force, rates)
     count, second = len(z) // 2, 4 + len(rates)
@@ -103,20 +105,25 @@ def _planar_maxwell_slip(law, v1, v2, F, z, p, force, rates):
             if return_time > 0.0:
                 rates[first + c, 0] -= excess * a / return_time
                 rates[first + c, 2] = mu * a / (spring * return_time)
-        if return_time == 0.0 and limit * MOST_TURNS > size:
-            radial, times = n1 * v1 + n2 * v2, size / limit
+        if return_time == 0.0 and limit > 0.0:
+            narrow = limit < NARROWEST * size
+            radial = n1 * v1 + n2 * v2
+            times = 1.0 / NARROWEST if narrow else size / limit
             for c in range(2):
                 a, v = (n1, v1) if c == 0 else (n2, v2)
                 across = v - radial * a
                 rates[first + c, 0] = radial * a + times * across
-                rates[first + c, 2] = -times * across / F
+                if not narrow:
+                    rates[first + c, 2] = -times * across / F
                 for k in range(2):
                     b, u = (n1, v1) if k == 0 else (n2, v2)
                     same = 1.0 if c == k else 0.0
                     rates[first + c, 1 if k == 0 else second - 1] = (
                         a * b + times * (same - a * b))
-                    rates[first + c, 3 + first + k] = across * b / limit + (1.0 - times) / size * (
+                    rates[first + c, 3 + first + k] = (1.0 - times) / size * (
                         a * (u - radial * b) + radial * (same - a * b))
+                    if not narrow:
+                        rates[first + c, 3 + first + k] += across * b / limit
 
 
 @dataclass(frozen=True)
