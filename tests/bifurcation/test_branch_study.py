@@ -8,6 +8,7 @@ import pytest
 from fecontact import InputError, Study, simulate
 from fecontact.bifurcation import BranchSettings
 from fecontact.bifurcation import tree as module
+from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.diagram import follow_branches
 from fecontact.cli import execute
 from fecontact.io import read_branch, read_branches, write_branches
@@ -147,6 +148,15 @@ def test_branches_that_cannot_be_followed_are_named(study, monkeypatch, capsys):
     monkeypatch.setattr(module, "_beyond", failing)
     assert execute(["branch", str(study)]) == 1
     assert "note: The branch 'orbits' was not followed: nothing there." in capsys.readouterr().out
+
+
+def test_messages_of_branches_are_shown(study, monkeypatch, capsys):
+    """A branch says there, for example, that a doubling may be hidden beside a fold."""
+    hidden = "Beside the fold at 1.4876 a period doubling may be hidden."
+    monkeypatch.setattr(Problem, "note", lambda *_: hidden)
+    assert execute(["branch", str(study), "--set=branch.switch=[]"]) == 0
+    assert f"note: {hidden}" in capsys.readouterr().out
+    assert read_branch("results/block-branch.h5").message == hidden
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
