@@ -9,6 +9,7 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 import pytest
+from scipy import sparse
 from synthetic import basis, run
 from systems import beam, friction_oscillator, lorenz_field, mass_in_plane, two_mass_field
 
@@ -43,6 +44,9 @@ def arrays(value, place, seen):
     """All arrays that are reached by public names, with their places, but those of models."""
     if isinstance(value, np.ndarray):
         yield place, value
+    elif sparse.issparse(value):
+        for part in ("data", "indices", "indptr"):
+            yield f"{place}.{part}", getattr(value, part)
     elif isinstance(value, Mapping):
         for name, item in value.items():
             yield from arrays(item, f"{place}[{name!r}]", seen)

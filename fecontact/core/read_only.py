@@ -1,6 +1,7 @@
 """Read-only arrays of results: NumPy raises ValueError where they are written to."""
 
 from collections.abc import Callable
+from copy import copy
 from functools import cached_property, wraps
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -13,7 +14,8 @@ _Owner = TypeVar("_Owner", bound=type)
 def read_only(value: Any) -> Any:
     """Return a read-only view of an array; in tuples, lists and mappings, of each array.
 
-    The array itself stays writeable, so that one given by a user is not frozen.
+    A sparse matrix by rows, columns or blocks is returned with sorted indices, since SciPy sorts
+    them in place. The array itself stays writeable, so that one given by a user is not frozen.
     """
     if isinstance(value, np.ndarray):
         if not value.flags.writeable:
@@ -21,6 +23,8 @@ def read_only(value: Any) -> Any:
         view = value.view()
         view.flags.writeable = False
         return view
+    if type(value).__module__.startswith("scipy.sparse") and hasattr(value, "indptr"):
+        return _read_only_sparse(value)
     if type(value) in (dict, MappingProxyType):
         frozen = {name: read_only(item) for name, item in value.items()}
         changed = any(frozen[name] is not item for name, item in value.items())
@@ -31,6 +35,16 @@ def read_only(value: Any) -> Any:
             return value
         return value._make(items) if hasattr(value, "_make") else type(value)(items)
     return value
+
+
+def _read_only_sparse(matrix: Any) -> Any:
+    parts = ("data", "indices", "indptr")
+    if not any(getattr(matrix, part).flags.writeable for part in parts):
+        return matrix
+    matrix = copy(matrix) if matrix.has_sorted_indices else matrix.sorted_indices()
+    for part in parts:
+        setattr(matrix, part, read_only(getattr(matrix, part)))
+    return matrix
 
 
 def read_only_arrays(owner: _Owner) -> _Owner:

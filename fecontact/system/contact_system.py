@@ -349,7 +349,10 @@ class ContactSystem(Summarised):
 
     @cached_property
     def arrays(self) -> SystemArrays:
-        """The system as arrays for the compiled kernels."""
+        """The system as arrays for the compiled kernels, not to be written to.
+
+        They stay writeable: kernels take read-only arrays by a conversion at each call.
+        """
         return system_arrays(
             self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
             self.drive, self.load, np.asarray(self.gap, dtype=float), self.prescribed_motion)
