@@ -337,7 +337,9 @@ class BranchPoint(Summarised):
         """Errors of :attr:`normal_form`.
 
         Of equilibria differences of two formulas for the derivatives, of orbits the change from
-        half the intervals, with that between two sizes of the amplitudes.
+        half the intervals, with that between two sizes of the amplitudes. Infinite for cubic and
+        quintic terms of orbits along which second derivatives jump, as those of friction with
+        exp(-b |v|) do at zero slip: the share of such jumps is not in the coefficients.
         """
         return self._by_name("normal_form_error")
 
@@ -345,7 +347,7 @@ class BranchPoint(Summarised):
         found = np.atleast_1d(self._details.get(detail, ()))
         names = _NORMAL_FORMS[str(self.kind)] if len(found) else ()
         return {name: value for name, value in zip(names, found.tolist(), strict=True)
-                if np.isfinite(value)}
+                if not np.isnan(value)}
 
     def _detail(self, name: str) -> Any:
         if name not in self._details:

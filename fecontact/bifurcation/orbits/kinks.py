@@ -202,5 +202,7 @@ class JacobianKinks:
         times = np.zeros(len(x))
         if not problem.autonomous:
             times = (problem.mesh[intervals] + places * problem.widths[intervals]) * self._at.period
-        return problem.field.derivatives(times, np.ascontiguousarray(x),
-                                         problem.parameters(self._at.u), ())[1]
+        x, values = np.ascontiguousarray(x), problem.parameters(self._at.u)
+        # Those at the points of the orbit have been checked; these need not be once more.
+        found = problem.field.rough_derivatives(times, x, values, (), problem.ranges, None)
+        return (found or problem.field.derivatives(times, x, values, ()))[1]

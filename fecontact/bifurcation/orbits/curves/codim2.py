@@ -29,6 +29,7 @@ from fecontact.bifurcation.orbits.curves.singularity import (
 )
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.floquet import resting
+from fecontact.bifurcation.orbits.kinks import JacobianKinks
 from fecontact.bifurcation.orbits.normal_forms import Expansion, Share
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import (
@@ -72,12 +73,16 @@ class OrbitCurve(Problem):
         The period [s] of all orbits, for the kind 'period'.
     sign : ContinuedSign
         Sign of the test function, continued along the curve.
+    has_kinks : bool
+        True if second derivatives of the field jump along the first orbit of the curve. Their share
+        in the coefficients of normal forms is then computed at every point.
     """
 
     orbit: CollocationProblem
     kind: str
     period: float = 1.0
     sign: ContinuedSign = field(default_factory=ContinuedSign)
+    has_kinks: bool = False
 
     keeps_matrix: ClassVar[bool] = True
     polishes: ClassVar[bool] = True
@@ -155,18 +160,24 @@ class OrbitCurve(Problem):
                     "fold-Neimark-Sacker": pair}
         at = linearisation.singularity
         expansion = Expansion(self.orbit, u, linearisation.orbit, at)
+
+        def coefficient(formula: Callable[[Sequence[Bend]], Share]) -> float:
+            """A coefficient, by better derivatives than are known where it is small."""
+            value, size = formula(linearisation.bends)
+            if abs(value) > _NEAR_ZERO * size and not self.has_kinks:
+                return value
+            return expansion.coefficient(formula, _NORMAL_FORM_STEP)[0].value
+
         if self.kind == "period doubling":
             # At a resonance 1:2 the coefficient has a pole.
-            return {"generalised period doubling": lambda: flip * _coefficient(
-                        expansion, expansion.doubling, linearisation.bends),
+            return {"generalised period doubling": lambda: flip * coefficient(expansion.doubling),
                     "resonance 1:2": flip, "fold-flip": unit, "flip-Neimark-Sacker": pair}
         tests: dict[str, float | Callable[[], float]] = {
             f"resonance 1:{order}": at.cosine - float(np.cos(2.0 * np.pi / order))
             for order in (1, 2, 3, 4)}
         # Next to the resonances 1:1 and 1:2 the coefficient grows beyond all numbers.
         if at.turns and abs(at.cosine) < 1.0 - _AT_RESONANCE:
-            tests["Chenciner"] = lambda: _coefficient(expansion, expansion.torus,
-                                                      linearisation.bends)
+            tests["Chenciner"] = lambda: coefficient(expansion.torus)
         return tests | {"fold-Neimark-Sacker": unit, "flip-Neimark-Sacker": flip,
                         "double Neimark-Sacker": pair}
 
@@ -315,8 +326,10 @@ def orbit_curve(
     if kind == "period" and not orbit.autonomous:
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
                          f"cannot keep; vary the frequency of the excitation instead.")
+    kinked = kind in ("period doubling", "Neimark-Sacker") and bool(
+        JacobianKinks(CollocationLinearisation(orbit, start)).passages)
     curve = (PeriodCurve if kind == "period" else OrbitCurve)(
-        orbit, kind, problem.period(u))
+        orbit, kind, problem.period(u), has_kinks=kinked)
     return curve, start, {**point.branch.attributes, "scales": orbit.scales,
                           "intervals": problem.intervals}
 
@@ -327,15 +340,6 @@ def _sizes(point: BranchPoint, least: int) -> Intervals | None:
     tolerance = known.get("state_tolerance")
     return None if tolerance is None else Intervals(
         least, max(least, int(known.get("most_intervals", least))), float(tolerance))
-
-
-def _coefficient(
-    expansion: Expansion, formula: Callable[[Sequence[Bend]], Share], known: list[Bend]
-) -> float:
-    """A coefficient from the derivatives that are known, and from better ones where it is small."""
-    value, size = formula(known)
-    return value if abs(value) > _NEAR_ZERO * size else formula(
-        expansion.bends(_NORMAL_FORM_STEP)).value
 
 
 def _unit(size: int, place: int) -> Array:

@@ -28,6 +28,7 @@ import numpy as np
 
 from fecontact.bifurcation.orbits.curves.centre_manifold import CentreManifold, Series
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
+from fecontact.bifurcation.orbits.kinks import JacobianKinks
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 
@@ -61,7 +62,9 @@ def orbit_form(
 
     ``pair`` is the critical multiplier with positive imaginary part of a curve of tori, and
     ``beside`` that of a pair besides the critical one. The error is the difference between two
-    radii; that of the mesh is not in it. Empty for other kinds, and where nothing is found.
+    radii; that of the mesh is not in it. It is infinite where second derivatives jump along the
+    orbit, as those of friction with exp(-b |v|) do at zero slip: the share of such jumps in third
+    derivatives is left out. Empty for other kinds, and where nothing is found.
     """
     if kind not in _FORMS:
         return {}
@@ -70,6 +73,8 @@ def orbit_form(
     try:
         manifold = CentreManifold(problem, u, linearised, multipliers, form.chain)
         value, error, _ = agreed(manifold, form.order, form.formula)
+        if form.order > 2 and JacobianKinks(linearised).passages:
+            error = np.full_like(error, np.inf)
     except (FecontactError, np.linalg.LinAlgError):
         return {}
     return {"normal_form": value, "normal_form_error": error} if np.isfinite(value).any() else {}

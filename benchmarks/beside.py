@@ -1,0 +1,85 @@
+"""Benchmarks of two checkouts in turn: every time that they print, and the ratio of the two.
+
+Each benchmark runs in the other checkout and in this one, one after the other, several rounds. Of
+the times of a row the least one counts. A row is a line of the output without its numbers.
+
+Usage: python benchmarks/beside.py OTHER [BENCHMARK+ARGUMENT... ...] [--rounds 3] [--within 1.1]
+BENCHMARK+ARGUMENT is as in the Makefile, `integrator+b+c+--quick` for `integrator.py b c --quick`.
+The exit code is 1 if a time of this checkout is more than `--within` times that of the other.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent.parent
+DEFAULT = ("integrator+a+b+b2+c+--quick", "ensemble+--quick", "many_contacts+--quick",
+           "bodies+--quick", "solids+--quick", "nonsmooth+--quick", "shooting+--quick")
+UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
+NUMBER = r"\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+TIME = re.compile(rf"(?<![\w.])({NUMBER}) *(ns|us|ms|s)\b")
+Rows = dict[str, list[float]]
+
+
+def rows(lines: Iterable[str]) -> Rows:
+    """Times [s] of each line of an output, by what the line says beside numbers."""
+    found: Rows = {}
+    for line in lines:
+        times = [float(value) * UNITS[unit] for value, unit in TIME.findall(line)]
+        if times:
+            label = " ".join(re.sub(r"[^\w.-]+", " ", TIME.sub("", line)).split())
+            while label in found:
+                label += "'"
+            found[label] = times
+    return found
+
+
+def run(tree: Path, benchmark: str) -> Rows:
+    """Times that a benchmark of a checkout prints."""
+    name, *arguments = benchmark.split("+")
+    done = subprocess.run(
+        [sys.executable, str(tree / "benchmarks" / f"{name}.py"), *arguments], check=True,
+        capture_output=True, text=True, cwd=tree / "benchmarks",
+        env={**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"})
+    return rows(done.stdout.splitlines())
+
+
+def least(all_rows: Iterable[Rows]) -> Rows:
+    """The least of each time over several runs; of rows that all of them have."""
+    first, *others = all_rows
+    return {label: [min(of_one) for of_one in
+                    zip(times, *(other[label] for other in others), strict=False)]
+            for label, times in first.items() if all(label in other for other in others)}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("other", type=Path, help="folder of the other checkout")
+    parser.add_argument("benchmarks", nargs="*", default=DEFAULT)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--within", type=float, default=1.1)
+    given = parser.parse_args()
+    slower = False
+    for benchmark in given.benchmarks:
+        # What a first run compiles is stored.
+        for tree in (given.other, HERE):
+            run(tree, benchmark)
+        turns = [(run(given.other.resolve(), benchmark), run(HERE, benchmark))
+                 for _ in range(given.rounds)]
+        before, after = (least(turn[side] for turn in turns) for side in (0, 1))
+        print(f"{benchmark.replace('+', ' ')}")
+        for label in sorted(before.keys() & after.keys()):
+            for old, new in zip(before[label], after[label], strict=False):
+                mark = " slower" if new > given.within * old else ""
+                slower |= bool(mark)
+                print(f"  {old:10.4g} s  {new:10.4g} s  {new / old:5.2f}{mark}  {label}", flush=True)
+    return int(slower)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
