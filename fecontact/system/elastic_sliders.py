@@ -29,6 +29,9 @@ from fecontact.system.space_nodes import scale_under
 # An element that sticks again is short of its limit by this part, so that a parameter that changes
 # for derivatives does not let it slide.
 SHORT = 2e-8
+# Parts of its limit within which an element is at it, and by which its deflection is kept on one
+# side of the limit: more than a parameter that changes for derivatives makes of the limit.
+_ROUNDING, _APART = 1e-11, 1e-4
 
 
 @helper
@@ -63,6 +66,44 @@ def return_deflection(z, i, size, target, s):
     first, last = (2 * i, 2 * i + 2) if in_space(s) else (i, i + 1)
     for k in range(first, last):
         z[k] *= target / size
+
+
+@helper
+def set_sides(moved, y, s, counts, force, rates, sides):
+    """Fill ``sides`` (n, elements): 1 for elements that slide in the state y, -1 that stick.
+
+    Zero for elements of open contacts, and for elements at their limit within rounding.
+    """
+    sides[:] = 0
+    for j in range(len(counts)):
+        if counts[j] == 0:
+            continue
+        z = memory_of(j, y, s)
+        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+        pressing = pressing_on(j, contact, F, s)
+        for i in range(counts[j]):
+            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            if limit > 0.0 and abs(size - limit) > _ROUNDING * limit:
+                sides[j, i] = 1 if size > limit else -1
+
+
+@helper
+def keep_sides(moved, y, s, counts, force, rates, sides):
+    """Move deflections of the state y that are beyond their limit to the other of its ``sides``.
+
+    Derivatives of the forces there are those of elements that slide, or stick, all along a step.
+    """
+    for j in range(len(counts)):
+        if counts[j] == 0:
+            continue
+        z = memory_of(j, y, s)
+        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+        pressing = pressing_on(j, contact, F, s)
+        for i in range(counts[j]):
+            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            target = limit * (1.0 + _APART * sides[j, i])
+            if size > 0.0 and (target - size) * sides[j, i] > 0.0:
+                return_deflection(z, i, size, target, s)
 
 
 @helper

@@ -216,6 +216,61 @@ def test_derivatives_are_those_of_differences(name):
         assert found.states[-1] == pytest.approx(ends(start), abs=1e-6)
 
 
+def complex_steps(end, values):
+    """Derivatives of the entries (size,) of an analytic function to each of its values."""
+    moved = np.array(values, dtype=complex) + 1e-30j * np.eye(len(values))
+    return np.array([end(*row) for row in moved]).imag.T / 1e-30
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 1e4])
+def test_derivatives_where_slip_begins(stiffness):
+    """A mass is thrown along the ground: x'' = -k x, and from k x = mu F on x'' = -mu F."""
+    limit, v, T = 0.3, 1.0, 1.0
+    row = np.array([[[1.0], [0.0], [0.0]]])
+    basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": row, "B": row[0]})
+    system = fc.ContactSystem(basis, normal=PrescribedForce(1.0),
+                              friction=JenkinsFriction(stiffness, limit))
+
+    def end(speed, mu):
+        w = np.sqrt(stiffness)
+        x, slower = mu / stiffness, np.sqrt(speed**2 - mu**2 / stiffness)
+        # Of sin(w t) = w x / speed; numpy's arcsine loses small imaginary parts.
+        left = T - np.arctan(w * x / slower) / w
+        return x + slower * left - 0.5 * mu * left**2, slower - mu * left
+
+    wanted = complex_steps(end, (v, limit))
+    found = fc.sensitivity(system, T, initial=[0.0, v, 0.0], rtol=1e-8,
+                           parameter="friction.friction_coefficient")
+    assert found.monodromy[:2, 1] == pytest.approx(wanted[:, 0], abs=1e-6)
+    assert found.parameter_derivative[:2] == pytest.approx(wanted[:, 1], abs=1e-6)
+    assert not found.note
+
+
+def test_derivatives_where_a_contact_closes_and_sticks():
+    """A mass falls on a spring over a belt: the normal force and the deflection begin at zero."""
+    c, k, T = 1e5, 1e4, 4e-3
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows[None], "B": rows})
+    system = fc.ContactSystem(basis, normal=LinearContact(c, 0.0),
+                              friction=JenkinsFriction(k, 0.3), ground=fc.Ground(speed=0.1))
+
+    def end(x, y, vx, vy, belt):
+        touch, w, wy = -y / vy, np.sqrt(k), np.sqrt(c)
+        s = T - touch
+        z = (vx - belt) * np.sin(w * s) / w
+        return (x + vx * touch + belt * s + z, vy * np.sin(wy * s) / wy,
+                belt + (vx - belt) * np.cos(w * s), vy * np.cos(wy * s), z)
+
+    state = [0.0, 1e-4, 0.02, -0.1]
+    wanted = complex_steps(end, (*state, 0.1))
+    found = fc.sensitivity(system, T, initial=[*state, 0.0], rtol=1e-8, parameter="ground.speed",
+                           outputs=[0.0, 0.53e-3, T])
+    size = np.abs(wanted).max(axis=1)
+    assert np.abs(found.states[-1] - end(*state, 0.1)).max() < 1e-8
+    assert (np.abs(found.monodromy[:, :4] - wanted[:, :4]).max(axis=1) < 1e-6 * size).all()
+    assert (np.abs(found.parameter_derivative - wanted[:, 4]) < 1e-6 * size).all()
+
+
 def test_what_does_not_serve_the_elements_says_so():
     system = mass(JenkinsFriction(0.5, 1.0))
     with pytest.raises(fc.InputError, match="CVODE does not locate where elastic Coulomb"):

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fecontact as fc
 from fecontact.laws import FrictionLaw, NormalLaw, law_names
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
@@ -71,3 +72,21 @@ def test_elastic_elements_in_space_where_the_normal_force_vanishes(systems, numb
     assert [run.status for run in runs] == [systems.Status.FINISHED] * 2
     assert systems.distance(case, *(run.states for run in runs)) < 1e-5
     assert abs(runs[1].energies.imbalance) < 1e-5
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.025, 0.03), (0.105, 0.11)])
+def test_derivatives_of_elastic_elements(systems, begin, end):
+    """An exponential normal law on a wavy ground, against central differences of runs."""
+    case = systems.random_case(8)
+    m, span = case.system.basis.modes, {"t_start": begin, "outputs": 2}
+    start = fc.simulate(case.system, begin, initial=case.state, outputs=2, rtol=1e-11).states[-1]
+    found = fc.sensitivity(case.system, end, initial=start, rtol=1e-8, **span)
+    moves = np.eye(2 * m, len(start)) * np.repeat([1e-10, 1e-7], m)[:, None]
+    ends = np.array([fc.simulate(case.system, end, initial=start + move, rtol=1e-12,
+                                 **span).states[-1, : 2 * m] for move in (*moves, *-moves)])
+    # Displacements in millimetres, velocities in metres per second.
+    units = np.repeat([1e-3, 1.0], m)
+    scale = units / units[:, None]
+    wanted = (ends[: 2 * m] - ends[2 * m :]).T / (2.0 * moves.max(axis=1)) * scale
+    apart = found.monodromy[: 2 * m, : 2 * m] * scale - wanted
+    assert np.abs(apart).max() < 3e-5 * np.abs(wanted).max()

@@ -4,8 +4,8 @@ The deflections of the elements follow the slip velocity all the time; see
 :mod:`fecontact.system.elastic_sliders`. Slip of an element ends where its excess over the limit is
 largest. A step with such a place inside is shortened to end there. The next step finds that the
 excess falls from its start: the deflection is returned to the limit, and the step is taken anew.
-Where the normal force of a contact that closes jumps, the limit jumps too. A step ends just past
-such a touch, and the next one begins with the deflections since then, ``z = v (t - t_touch)``.
+A step ends just past the touch of a contact that closes, and the next one begins with the
+deflections since then, ``z = v (t - t_touch)``.
 Forces are continuous at both ends of slip, and the derivatives of a deflection that is returned to
 the limit become those of the limit.
 """
@@ -51,10 +51,6 @@ _FALL = 1e-12
 # Parts of a step within which a switch counts as lying on its end, without and with derivatives.
 _NEAR, _NEAR_VARIED = 1e-3, 1e-6
 _PRECISION, _TRIALS = 1e-7, 50
-# A contact has just closed if it did within this part of a step.
-_TOUCH = 1e-3
-# Part of the force at the next look that a normal force has right after a touch at which it jumps.
-_JUMP = 1e-4
 # Steps do not end at a touch that is nearer to their start than this part of the time.
 _BRIEFEST = 1e-12
 # Steps that end at a touch go past it by at most this many times what counts as the end.
@@ -92,17 +88,16 @@ def _excess(part, j, i, step, problem, progress, room, y, force, rates):
 
 @routine
 def _touch(low, high, j, step, problem, progress, room, y, force, rates):
-    """Part of the step at which the open contact of node j closes, and the force just after."""
-    pressing = 0.0
+    """Part of the step at which the open contact of node j closes."""
     while high - low > _PRECISION:
         part = 0.5 * (low + high)
         moved = _look(part, step, problem, progress, room, y)
         found, _ = _pressing(j, y, moved, problem.system, force, rates)
         if found > 0.0:
-            high, pressing = part, found
+            high = part
         else:
             low = part
-    return high, pressing
+    return high
 
 
 @routine
@@ -275,21 +270,15 @@ def _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, 
 
 
 @routine
-def _return_one(j, i, within, t, h, y, g, problem, progress, vary, force, rates):
+def _return_one(j, i, within, t, y, g, problem, progress, vary, force, rates):
     """Return element i of node j to its limit, or a little below it, if it is beyond it."""
     s, count = problem.system, problem.control.slider_counts[j]
-    pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    pressing, _ = _pressing(j, y, ground_motion(t, s), s, force, rates)
     limit, size = limit_of(j, i, count, pressing, s), deflection_of(memory_of(j, y, s), i, s)
     if size <= limit:
         return
     if len(vary.variation.columns):
-        touched = False
-        for level in problem.control.levels[:, j]:
-            deep = contact.penetration - level
-            touched = touched or (g.partial[j, 2, 1] != 0.0 and
-                                  0.0 <= deep < _TOUCH * contact.rate * h)
-        _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, rates,
-                 within and touched)
+        _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, rates, False)
     part = 1.0 - SHORT if within else 1.0 + SHORT
     return_deflection(memory_of(j, y, s), i, size, limit * part, s)
 
@@ -328,14 +317,11 @@ def _switch(step, problem, progress, room, vary):
                 now[j, i] = deflection_of(z, i, s) - limit_of(j, i, count, pressing, s)
             if look > 0 and pressing > 0.0 and closed[(look + 2) % 3, j] == 0.0:
                 begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
-                place, just_after = _touch(begun, part, j, step, problem, progress, room, y, force,
-                                           rates)
-                if in_space(s) or just_after > _JUMP * pressing:
-                    if place * step.h > _BRIEFEST * abs(t):
-                        first = min(first, place)
-                    else:
-                        again |= _begin_contact(j, 0.0, after_t, problem, progress, vary, force,
-                                                rates)
+                place = _touch(begun, part, j, step, problem, progress, room, y, force, rates)
+                if place * step.h > _BRIEFEST * abs(t):
+                    first = min(first, place)
+                else:
+                    again |= _begin_contact(j, 0.0, after_t, problem, progress, vary, force, rates)
                 _look(part, step, problem, progress, room, y)
         if look == 0:
             starts[:, :] = now
@@ -373,7 +359,7 @@ def _switch(step, problem, progress, room, vary):
     for j in range(n):
         for i in range(control.slider_counts[j]):
             if places[j, i] <= near:
-                _return_one(j, i, True, after_t, step.h, progress.state, progress.gradients,
+                _return_one(j, i, True, after_t, progress.state, progress.gradients,
                             problem, progress, vary, force, rates)
                 again = True
     if not again:
@@ -401,7 +387,7 @@ def _at_end(step, problem, progress, room, vary):
         if before < 0.5 * after:
             continue
         for i in range(control.slider_counts[j]):
-            _return_one(j, i, False, step.latest, step.h, room.after, room.gradients_after,
+            _return_one(j, i, False, step.latest, room.after, room.gradients_after,
                         problem, progress, vary, force, rates)
     dynamics.set_rate_and_gradients(room.after, s, problem.blocks, room.given, room.load,
                                     room.nodes, room.gradients_after, room.rate_after)

@@ -28,6 +28,7 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.memory_saltation import switch_memory
+from fecontact.system.elastic_sliders import keep_sides, set_sides
 from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, SIZE, SystemArrays, ground_motion
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
@@ -278,6 +279,11 @@ def propagate(
     if varies:
         _begin_parameter(step, progress, blocks, vary)
     moved, last = step.moved, step.t
+    counts, sliders = problem.control.slider_counts, problem.control.sliders != 0
+    force, rates = np.empty(v.inside.force.shape[1]), np.empty(v.inside.rates.shape[1:])
+    sides = np.zeros((len(s.gap), len(rates)))
+    if sliders:
+        set_sides(moved, state, s, counts, force, rates, sides)
     for i in range(tableau.STAGES):
         tableau.combined(tableau.A[i], 1.0, state, stages, Y)
         if i == 0:
@@ -290,6 +296,8 @@ def propagate(
                     dynamics.set_given(now, vary.above, v.given[0], v.load[0])
                     dynamics.set_given(now, vary.below, v.given[1], v.load[1])
             last = now
+            if sliders:
+                keep_sides(moved, Y, s, counts, force, rates, sides)
             dynamics.set_gradients(Y, s, blocks, moved, v.nodes, v.inside)
             columns.learn(v.inside, v.usual)
         if varies:
