@@ -7,6 +7,7 @@ import fecontact as fc
 from fecontact import Status
 from fecontact.integrate import SetValued
 from fecontact.laws import ConstantFriction, LinearContact
+from fecontact.system import kernels
 
 DAMPING, END = 0.2, 0.5
 
@@ -71,3 +72,42 @@ def test_small_imbalances_count_where_energies_are_small():
                               friction=ConstantFriction(0.0), load=fc.Load(10.0))
     run = fc.simulate(system, 0.1, initial=[-10.0 / 1.01e6, 1e-6], outputs=101)
     assert run.energies.rounding < 1e-3 * 0.5e-12
+
+
+def two_nodes(seed, damping):
+    """Four modes with no load on two stops with friction, and a start that touches both."""
+    rng = np.random.default_rng(seed)
+    spring, dashpot = rng.standard_normal((2, 4, 4))
+    rows = np.concatenate([rng.standard_normal((2, 2, 4)), np.zeros((2, 1, 4))], axis=1)
+    basis = fc.basis_from_matrices(
+        np.eye(4), 1e6 * spring @ spring.T, {"contact": rows, "C": rows[0]},
+        damping=damping * dashpot @ dashpot.T)
+    system = fc.ContactSystem(basis, normal=LinearContact(1e6, 0.0),
+                              friction=ConstantFriction(0.3))
+    q, normal = rng.standard_normal(4), system.arrays.Ty
+    q -= np.linalg.pinv(normal) @ (normal @ q)
+    return system, 1e-3 * np.append(q, np.zeros(4))
+
+
+@pytest.mark.parametrize(("seed", "damping"), [(2, 10.0), (3, 1.0), (4, 100.0), (8, 10.0)])
+def test_fades_on_stops(seed, damping):
+    """Energy falls to nothing in few events, which do not stop the slip of other contacts."""
+    system, start = two_nodes(seed, damping)
+    calls = []
+
+    def few_calls(time):
+        calls.append(time)
+        assert len(calls) < 200, f"crawls at t = {time:.9g} s"
+
+    run = fc.simulate(system, 0.5, initial=start, outputs=101, solver=SetValued(restitution=0.5),
+                      progress=few_calls)
+    assert run.status is Status.FINISHED
+    assert run.statistics["events"] < 3000
+    q, rate = run.states[:, :4], run.states[:, 4:]
+    energy = 0.5 * (np.einsum("ti,ij,tj->t", q, system.arrays.stiffness, q)
+                    + (rate * rate).sum(axis=1))
+    assert np.diff(energy).max() < 1e-9 * energy[0]
+    assert energy[-1] < 1e-7 * energy[0]
+    assert run.energies.imbalance < 1e-6
+    penetration = system.contact_history(run.time, run.states)[:, :, kernels.PENETRATION]
+    assert penetration.max() < 1e-9 * np.abs(start).max()

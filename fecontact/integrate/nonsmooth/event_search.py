@@ -89,6 +89,9 @@ class Room(NamedTuple):
         move.
     released, arrived, held : (k,) boolean arrays
         Clusters that reach the limit of stick, that come to rest, and that stick.
+    gaining : (k,) array
+        Slip velocities in the sense of the status, above which clusters whose slip velocity grows
+        go on slipping through an event of others; infinite for other clusters.
     touched, parting : (n,) boolean arrays
         Stops that are struck and nodes that touch down, and stops that open.
     given, loads, pushes : (GIVEN,), (m,), (m,) arrays
@@ -118,6 +121,7 @@ class Room(NamedTuple):
     released: Annotated[Flags, CLUSTERS]
     arrived: Annotated[Flags, CLUSTERS]
     held: Annotated[Flags, CLUSTERS]
+    gaining: Annotated[Array, CLUSTERS]
     touched: Annotated[Flags, NODES]
     parting: Annotated[Flags, NODES]
     given: Annotated[Array, GIVEN]

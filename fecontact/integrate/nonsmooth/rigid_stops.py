@@ -46,7 +46,7 @@ from fecontact.integrate.nonsmooth.equations import (
     speed_rate,
     stick_limit,
 )
-from fecontact.integrate.nonsmooth.event_search import Room
+from fecontact.integrate.nonsmooth.event_search import ROUNDING, Room
 from fecontact.integrate.nonsmooth.problem import (
     CLOSED,
     CREEP,
@@ -280,11 +280,26 @@ def _strike(t, touching, p, progress, w):
 
 
 @routine
+def _set_gaining(t, p, progress, room, w, out):
+    """Fill ``room.gaining`` from w and Y' in ``out`` before contacts change."""
+    s, Y, status = p.system, progress.state, progress.status
+    m = p.rows.shape[1]
+    speed, ground = ground_motion(t, s).speed, speed_rate(t, p)
+    for c in range(len(p.rows)):
+        size, gain = abs(p.sliding[c] * speed), -p.sliding[c] * ground
+        for i in range(m):
+            size += abs(p.rows[c, i] * Y[m + i])
+            gain += p.rows[c, i] * out[m + i]
+        slips = (status[c] == 1 or status[c] == -1) and not (room.released[c] or room.arrived[c])
+        room.gaining[c] = ROUNDING * size if slips and status[c] * gain > 0.0 else math.inf
+
+
+@routine
 def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
     """Fill a case with the forces that ``fall`` (n,), u'' without contact, asks for.
 
-    Whether there is one solution. ``near`` is a slip velocity that counts as none; after a strike
-    only such clusters may stick.
+    Whether there is one solution. ``near`` is a slip velocity that counts as none, unless the
+    cluster slips ever faster; after a strike only clusters without slip may stick.
     """
     n, k = len(p.cluster), len(p.rows)
     status, friction = progress.status, False
@@ -304,7 +319,8 @@ def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
         if conditions.mode[c] != STICK:
             continue
         friction = True
-        still = abs(w.slip[c]) <= near
+        least = max(room.gaining[c], RATE_ROUNDING / _NEAR * near if struck else 0.0)
+        still = abs(w.slip[c]) <= near and not status[c] * w.slip[c] > least
         if room.released[c] and still:
             conditions.mode[c] = status[c]
         elif not (still or (not struck and (status[c] == STICK or room.arrived[c]))):
@@ -390,6 +406,7 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
     n = len(p.cluster)
     touching = np.zeros(n, np.bool_)
     derivative(t, Y, p, status, closed, w, out)
+    _set_gaining(t, p, progress, room, w, out)
     near = max(largest[SLIP_SIZE], largest[RATE_SIZE])
     for c in range(len(p.rows)):
         near = max(near, abs(w.slip[c]))
