@@ -114,14 +114,12 @@ $(READY): pyproject.toml | $(BIN)/python
 
 $(RUNS): | $(BASIC)
 	@echo "Compiling its kernels for runs, on two cores"
-	@$(BIN)/python .ci/compile bodies & bodies=$$!; \
-	  $(BIN)/python .ci/compile motions && wait $$bodies
+	@$(BIN)/python .ci/compile runs
 	@touch $@
 
 $(ALL): | $(READY)
 	@echo "Compiling all its kernels, on two cores"
-	@$(BIN)/python .ci/compile first & first=$$!; \
-	  $(BIN)/python .ci/compile second && wait $$first
+	@$(BIN)/python .ci/compile all
 	@touch $@ $(RUNS)
 
 $(SYSTEM): .ci/system-libraries fecontact/core/system_libraries.py | $(BIN)/python

@@ -275,7 +275,7 @@ def kernel(
     function = getattr(function, "py_func", function)
     settings: dict[str, Any] = {
         "nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": _FASTMATH,
-        "no_cpython_wrapper": by_address, **options,
+        "no_cpython_wrapper": by_address, "no_cfunc_wrapper": not by_address, **options,
     }
     kind = _RecordKernel if any(map(is_record, function.__annotations__.values())) else _Kernel
     made = kind(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))

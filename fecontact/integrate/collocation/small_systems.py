@@ -4,7 +4,8 @@ As in :mod:`fecontact.integrate.rodas5p.small_systems`, loops over one or two nu
 out for arrays of a known size.
 """
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 from fecontact.core.compiled import kernel
@@ -53,9 +54,7 @@ def _of_room(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     return shapes(small_systems.sizes_of(modes, nodes), Collocation)
 
 
-def compile_usual() -> None:
-    """Compile the loops of all sizes, and derivatives of steps of the usual ones."""
-    for size in small_systems.SIZES:
-        _advance(*size).ready()
-    for size in small_systems.USUAL:
-        _propagate(*size)
+def usual() -> list[Callable[[], object]]:
+    """Functions that each compile the loop of a size, or derivatives of steps of a usual one."""
+    return [*(partial(lambda size: _advance(*size).ready(), size) for size in small_systems.SIZES),
+            *(partial(_propagate, *size) for size in small_systems.USUAL)]

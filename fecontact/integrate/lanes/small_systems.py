@@ -1,6 +1,7 @@
 """The step loop of lanes for each usual size of small systems, whose loops are written out."""
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 from fecontact.core.compiled import kernel
@@ -13,10 +14,9 @@ from fecontact.integrate.rodas5p import small_systems
 USUAL = ((1, 1), (2, 1), (3, 1), (2, 2))
 
 
-def compile_usual() -> None:
-    """Compile the step loops of the usual sizes, or find them stored."""
-    for size in USUAL:
-        advance_for(*size).ready()
+def usual() -> list[Callable[[], object]]:
+    """Functions that each compile the step loop of a usual size, or find it stored."""
+    return [partial(lambda size: advance_for(*size).ready(), size) for size in USUAL]
 
 
 @cache

@@ -130,7 +130,9 @@ def _time(part, step):
 @helper
 def _between(x, places, values):
     """Linear interpolation, constant outside."""
-    right = np.searchsorted(places, x)
+    right = 0
+    while right < len(places) and places[right] < x:
+        right += 1
     if right == 0 or right == len(places):
         return values[min(right, len(places) - 1)]
     part = (x - places[right - 1]) / (places[right] - places[right - 1])
@@ -168,7 +170,8 @@ def _zone(j, part, y, view, watch):
 def _note(watch, t, kind, node, y):
     row = watch.counts[FOUND]
     watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
-    watch.states[row, :] = y
+    for k in range(len(y)):
+        watch.states[row, k] = y[k]
     watch.counts[FOUND] = row + 1
 
 
@@ -189,7 +192,8 @@ def _normal_zone(zone):
 def _look(part, view):
     """Put the state at a part of the step into view.y."""
     if part == 1.0:
-        view.y[:] = view.after
+        for k in range(len(view.y)):
+            view.y[k] = view.after[k]
     else:
         tableau.interpolated(part, view.before, view.after, view.dense, view.y)
 
@@ -246,8 +250,9 @@ def first_stop(step, begun, watch):
     kept = begun
     for row in range(begun, watch.counts[FOUND]):
         if watch.found[row, 0] <= stop:
-            watch.found[kept, :] = watch.found[row, :]
-            watch.states[kept, :] = watch.states[row, :]
+            for table in (watch.found, watch.states):
+                for k in range(table.shape[1]):
+                    table[kept, k] = table[row, k]
             kept += 1
     watch.counts[FOUND] = kept
     return (stop - step.t) / step.h

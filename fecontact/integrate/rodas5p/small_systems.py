@@ -6,7 +6,8 @@ It gives the same numbers up to rounding. So do derivatives of steps, which are 
 when they are first asked for.
 """
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -85,21 +86,18 @@ def _propagate(size: tuple[int, int] | None, parts: bool = False) -> int:
     return int((propagate_in_parts if parts else propagate).for_values(known).address)
 
 
-def compile_step_loops(last_first: bool = False) -> None:
-    """Compile the step loops of all sizes.
+def step_loops() -> list[Callable[[], object]]:
+    """Functions that each compile the step loop of one size.
 
-    This takes a fraction of the time while the step loop itself has just been compiled in this
-    process. Two processes in opposite order share the work.
+    They take a fraction of the time where the step loop of all systems has just been compiled.
     """
-    for size in reversed(SIZES) if last_first else SIZES:
-        _advance(*size).ready()
+    return [partial(lambda size: _advance(*size).ready(), size) for size in SIZES]
 
 
-def compile_usual() -> None:
-    """Compile the derivatives of steps of all systems, and of those of the usual sizes."""
-    for size in (None, *USUAL):
-        _propagate(size)
-    _propagate(None, True)
+def usual() -> list[Callable[[], object]]:
+    """Functions that each compile the derivatives of steps of all systems or of a usual size."""
+    return [*(partial(_propagate, size) for size in (None, *USUAL)),
+            partial(_propagate, None, True)]
 
 
 def sizes_of(modes: int, nodes: int) -> dict[Size, int]:

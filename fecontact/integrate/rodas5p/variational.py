@@ -411,7 +411,7 @@ def keep(v):
     for c in range(len(v.columns)):
         for k in range(v.columns.shape[1]):
             v.columns[c, k] = v.after[c, k]
-    v.norms[0] = v.norms[1]
+        v.norms[0, c] = v.norms[1, c]
 
 
 @helper
@@ -426,8 +426,8 @@ def write_columns(v, out):
 def begin_anew(v):
     """Let the columns be the unit matrix again."""
     v.columns[:] = 0.0
-    v.norms[0], v.norms[1] = v.least, v.least
     for k in range(v.columns.shape[1]):
+        v.norms[0, k], v.norms[1, k] = v.least[k], v.least[k]
         v.columns[k, k] = 1.0
 
 

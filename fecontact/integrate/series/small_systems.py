@@ -4,7 +4,8 @@ As in :mod:`fecontact.integrate.rodas5p.small_systems`, loops over one or two nu
 out for arrays of a known size. Those over coefficients are not, so that they are vectorised.
 """
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 from fecontact.core.constants import constants
@@ -37,7 +38,6 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
         small_systems.sizes_of(modes, nodes), Series)
 
 
-def compile_usual() -> None:
-    """Compile the loops of all sizes."""
-    for size in SIZES:
-        _advance(*size).ready()
+def usual() -> list[Callable[[], object]]:
+    """Functions that each compile the loop of one size."""
+    return [partial(lambda size: _advance(*size).ready(), size) for size in SIZES]

@@ -4,7 +4,8 @@ As in :mod:`fecontact.integrate.rodas5p.small_systems`, loops over one or two nu
 out for arrays of a known size.
 """
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,6 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     return found | {SystemArrays: small_systems.fixed_values(modes, nodes)[SystemArrays]}
 
 
-def compile_usual() -> None:
-    """Compile the runs of all sizes."""
-    for size in SIZES:
-        _run(*size).ready()
+def usual() -> list[Callable[[], object]]:
+    """Functions that each compile the loop of one size."""
+    return [partial(lambda size: _run(*size).ready(), size) for size in SIZES]
