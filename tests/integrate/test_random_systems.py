@@ -74,10 +74,11 @@ def test_elastic_elements_in_space_where_the_normal_force_vanishes(systems, numb
     assert abs(runs[1].energies.imbalance) < 1e-5
 
 
-@pytest.mark.parametrize(("begin", "end"), [(0.025, 0.03), (0.105, 0.11)])
-def test_derivatives_of_elastic_elements(systems, begin, end):
-    """An exponential normal law on a wavy ground, against central differences of runs."""
-    case = systems.random_case(8)
+@pytest.mark.parametrize(
+    ("number", "begin", "end"), [(8, 0.025, 0.03), (8, 0.105, 0.11), (78, 0.02, 0.03)])
+def test_derivatives_of_elastic_elements(systems, number, begin, end):
+    """Exponential normal law on a wavy ground, and play, against central differences of runs."""
+    case = systems.random_case(number)
     m, span = case.system.basis.modes, {"t_start": begin, "outputs": 2}
     start = fc.simulate(case.system, begin, initial=case.state, outputs=2, rtol=1e-11).states[-1]
     found = fc.sensitivity(case.system, end, initial=start, rtol=1e-8, **span)
@@ -90,3 +91,13 @@ def test_derivatives_of_elastic_elements(systems, begin, end):
     wanted = (ends[: 2 * m] - ends[2 * m :]).T / (2.0 * moves.max(axis=1)) * scale
     apart = found.monodromy[: 2 * m, : 2 * m] * scale - wanted
     assert np.abs(apart).max() < 3e-5 * np.abs(wanted).max()
+
+
+@pytest.mark.filterwarnings("ignore::fecontact.ModelWarning")
+def test_steps_that_end_just_short_of_slip_do_not_shrink_to_nothing(systems):
+    case = systems.random_case(78)
+    found = fc.sensitivity(case.system, case.end, initial=case.state, rtol=1e-8)
+    run = fc.simulate(case.system, case.end, initial=case.state, outputs=2, rtol=1e-11)
+    m = case.system.basis.modes
+    assert np.abs(found.states[-1] - run.states[-1])[:m].max() < 1e-6 * np.abs(run.states).max()
+    assert np.isfinite(found.monodromy).all()

@@ -293,6 +293,7 @@ def _switch(step, problem, progress, room, vary):
     y = np.empty(len(progress.state))
     found, places = np.empty((3, n, states)), np.full((n, states), 2.0)
     closed, starts = np.zeros((3, n)), np.full((n, states), -1.0)
+    at_once = np.zeros((n, states), dtype=np.bool_)
     begins = varies or control.slider_counts.sum() <= _FEW
     near = _NEAR_VARIED if varies else _NEAR
     first, t, again = 2.0, step.t, False
@@ -347,7 +348,11 @@ def _switch(step, problem, progress, room, vary):
                     begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
                     place = _root(False, begun, part, min(middle, -1e-300), high, j, i, step,
                                   problem, progress, room, y, force, rates)
-                    if place > near:
+                    size = deflection_of(memory_of(j, progress.state, s), i, s)
+                    if look == 1 and middle > -0.5 * SHORT * size:
+                        # The last step ended just short of where slip begins.
+                        at_once[j, i] = True
+                    elif place > near:
                         first = min(first, place)
         if first <= part:
             break
@@ -361,6 +366,10 @@ def _switch(step, problem, progress, room, vary):
             if places[j, i] <= near:
                 _return_one(j, i, True, after_t, progress.state, progress.gradients,
                             problem, progress, vary, force, rates)
+                again = True
+            elif at_once[j, i]:
+                z = memory_of(j, progress.state, s)
+                return_deflection(z, i, 1.0, 1.0 + SHORT, s)
                 again = True
     if not again:
         return 1.0
