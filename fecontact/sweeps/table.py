@@ -24,6 +24,7 @@ from fecontact.core.files.csv_text import csv_text, read_cell
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, html_table, listed, span
+from fecontact.laws.registry import trusting
 from fecontact.study.study import Study
 from fecontact.sweeps.store import write_whole
 from fecontact.system.parameter_labels import parameter_label
@@ -295,11 +296,15 @@ def read_table(path: str | Path) -> SweepTable:
 
 
 def _stored_labels(path: Path, parameters: Sequence[str]) -> dict[str, str]:
-    """Labels of parameters by the study that a sweep keeps; none without that file."""
+    """Labels of parameters by the study that a sweep keeps; none without that file.
+
+    Laws in files of their own are not run for labels.
+    """
     if not path.is_file():
         return {}
     try:
-        study = Study.read(path)
+        with trusting(False):
+            study = Study.read(path)
     except FecontactError:  # a label is no reason to refuse the numbers of a table
         return {}
     return {name: parameter_label(name, Study, study) for name in parameters}

@@ -305,6 +305,23 @@ def test_tables_read_from_files_know_the_places_of_forces(tmp_path):
     assert moved.label("load.normal") == "load normal [N]"
 
 
+def test_reading_a_table_runs_no_code(tmp_path):
+    """The study beside it may name a law in a file, which a stranger may have written."""
+    study = write_study(tmp_path)
+    sweep(study, {"ground.speed": [1e-3, 2e-3]}, summaries=["mean_normal_force"],
+          executor=Serial(), folder=tmp_path / "found")
+    file = tmp_path / "found/stranger.py"
+    file.write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
+    stored = tmp_path / "found/sweep.toml"
+    text = stored.read_text()
+    assert "[friction]\n" in text
+    foreign = f'[friction]\nlaw = "{file}:Law"\n'
+    stored.write_text(re.sub(r"\[friction\]\n(law = .*\n)?", foreign, text))
+    table = read_table(tmp_path / "found/index.csv")
+    assert table.label("ground.speed") == "ground speed [m/s]"
+    assert not (tmp_path / "ran").exists()
+
+
 def test_names_of_files_are_safe_and_different():
     names = ["own.py:f", "amplitude_x@B", "amplitude_x@a/b", "amplitude_x@a:B", "n" * 400]
     assert command._file_names(names) == dict(zip(names, [
