@@ -86,7 +86,7 @@ def main(quick: bool = False) -> None:
     """Print the table."""
     pieces, steps = (2, 5) if quick else (9, 20)
     sizes = (400, 1000) if quick else (400, 1000, 4000)
-    print(f"{'nodes':>6s} {'all closed [us]':>16s} {'few closed [us]':>16s} {'closed':>7s} "
+    print(f"{'nodes':>6s} {'all closed':>13s} {'few closed':>16s} {'closed':>10s} "
           f"{'ratio':>6s}")
     rows = []
     for nodes in sizes:
@@ -94,7 +94,7 @@ def main(quick: bool = False) -> None:
             step_time(nodes, crown, pieces, steps) for crown in (0.0, CROWN))
         assert part == 1.0
         rows.append((nodes, whole, few))
-        print(f"{nodes:6d} {whole:16.1f} {few:16.1f} {touching:7.2f} {few / whole:6.2f}")
+        print(f"{nodes:6d} {whole:10.1f} us {few:13.1f} us {touching:7.2f} {few / whole:6.2f}")
     for (n0, whole0, few0), (n1, whole1, few1) in pairwise(rows):
         print(f"us a node from {n0} to {n1}: {(whole1 - whole0) / (n1 - n0):.3f} all closed, "
               f"{(few1 - few0) / (n1 - n0):.3f} few closed")

@@ -54,7 +54,7 @@ def solid(modes: int, nodes: int) -> ContactSystem:
 def main(nodes: list[int], quick: bool = False) -> None:
     """Print the table: least processor time of a step in rounds of both in turn."""
     modes, t_end, rounds = (6, 2e-4, 1) if quick else (40, 2e-3, 5)
-    print(f"{'modes':>5s} {'nodes':>5s} {'plane [us]':>11s} {'solid [us]':>11s} {'ratio':>6s}")
+    print(f"{'modes':>5s} {'nodes':>5s} {'plane':>11s} {'solid':>14s} {'ratio':>9s}")
     for count in nodes or ([8] if quick else [40, 100, 400]):
         systems = (plane(modes, count), solid(modes, count))
         best = [np.inf, np.inf]
@@ -66,8 +66,8 @@ def main(nodes: list[int], quick: bool = False) -> None:
                 if turn > 0:
                     best[k] = min(best[k], 1e6 * spent / run.statistics["steps"])
         size = systems[1].basis.contact_nodes
-        print(f"{modes:5d} {size:5d} {best[0]:11.1f} {best[1]:11.1f} {best[1] / best[0]:6.2f}",
-              flush=True)
+        print(f"{modes:5d} {size:5d} {best[0]:11.1f} us {best[1]:11.1f} us "
+              f"{best[1] / best[0]:6.2f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """Every benchmark runs in its short form, and the answers whose times it takes are right."""
 
 import re
+import subprocess
+import sys
 
 import pytest
 from scripts_for_tests import ROOT, check_numbers, run_script
@@ -35,8 +37,20 @@ BENCHMARKS = {
     "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
-HELPERS = {"continuation_peer", "integrator", "integrator_peers", "integrator_problems",
+HELPERS = {"beside", "continuation_peer", "integrator", "integrator_peers", "integrator_problems",
            "kept_runs", "nonsmooth_peer"}
+
+# Two checkouts in turn: here one and the same, in which no row has another name.
+def test_two_checkouts_in_turn():
+    done = subprocess.run(
+        [sys.executable, "benchmarks/beside.py", ".", "solids+--quick", "--rounds", "1",
+         "--within", "1e9"], cwd=ROOT, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    title, *rows = done.stdout.splitlines()
+    assert title == "solids --quick"
+    ratios = [float(row.split()[4]) for row in rows]
+    assert ratios
+    assert all(0.01 < ratio < 100.0 for ratio in ratios)
 
 
 def test_every_benchmark_is_here():
