@@ -6,8 +6,8 @@ whose branches only choose values by :func:`fecontact.core.lanes.functions.selec
 eight numbers; one with other branches is called for one lane after the other.
 """
 
-from collections.abc import Callable
 from contextlib import suppress
+from types import FunctionType
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -27,59 +27,64 @@ node_lanes_at = function_at(_NODE, only_reads=True)
 signal_lanes_at = function_at(_SIGNAL, only_reads=True)
 
 
-def _at_once(law: Any, signal: bool) -> Callable[..., Any]:
+# Functions for eight lanes, in which ``law`` stands for a part of them; it is no variable of an
+# outer function, since numba would not find their stored code again.
+law: Any = None
+
+
+def _at_once(a, b, p):
     """The law with eight numbers in place of each."""
-    if signal:
-        return lambda t, p: law(t, rows(p))
-    return lambda a, b, p: law(a, b, rows(p))
+    return law(a, b, rows(p))
 
 
-def _one_by_one(law: Any, signal: bool) -> Callable[..., Any]:
-    """A loop over the lanes."""
+def _at_once_in_time(t, p):
+    return law(t, rows(p))
 
-    def at_times(t, p):
-        value, rate = spread(0.0), spread(0.0)
-        for lane in range(WIDTH):
-            found = law(lane_of(t, lane), p[:, lane])
-            value, rate = with_lane(value, lane, found[0]), with_lane(rate, lane, found[1])
-        return value, rate
 
-    def at_nodes(a, b, p):
-        force, by_first, by_second = spread(0.0), spread(0.0), spread(0.0)
-        for lane in range(WIDTH):
-            found = law(lane_of(a, lane), lane_of(b, lane), p[:, lane])
-            force = with_lane(force, lane, found[0])
-            by_first = with_lane(by_first, lane, found[1])
-            by_second = with_lane(by_second, lane, found[2])
-        return force, by_first, by_second
+def _one_by_one(a, b, p):
+    """The law for one lane after the other."""
+    force, by_first, by_second = spread(0.0), spread(0.0), spread(0.0)
+    for lane in range(WIDTH):
+        found = law(lane_of(a, lane), lane_of(b, lane), p[:, lane])
+        force = with_lane(force, lane, found[0])
+        by_first = with_lane(by_first, lane, found[1])
+        by_second = with_lane(by_second, lane, found[2])
+    return force, by_first, by_second
 
-    return at_times if signal else at_nodes
+
+def _one_by_one_in_time(t, p):
+    value, rate = spread(0.0), spread(0.0)
+    for lane in range(WIDTH):
+        found = law(lane_of(t, lane), p[:, lane])
+        value, rate = with_lane(value, lane, found[0]), with_lane(rate, lane, found[1])
+    return value, rate
 
 
 _MADE: WeakKeyDictionary[CompiledLaw, CompiledLaw | None] = WeakKeyDictionary()
 
 
-def simd_law(law: CompiledLaw) -> CompiledLaw | None:
+def simd_law(one: CompiledLaw) -> CompiledLaw | None:
     """The function for eight lanes of a normal law, a friction law without memory or a signal.
 
     None if the law cannot be compiled for them.
     """
-    if law not in _MADE:
-        _MADE[law] = _made(law)
-    return _MADE[law]
+    if one not in _MADE:
+        _MADE[one] = _made(one)
+    return _MADE[one]
 
 
-def _made(law: CompiledLaw) -> CompiledLaw | None:
-    signal = law.form.startswith("f(t")
-    one = part(law.python, error_model="numpy", forceinline=True)
-    for wrapped in (_at_once, _one_by_one):
-        function = wrapped(one, signal)
+def _made(one: CompiledLaw) -> CompiledLaw | None:
+    signal = one.form.startswith("f(t")
+    ways = (_at_once_in_time, _one_by_one_in_time) if signal else (_at_once, _one_by_one)
+    inside = part(one.python, error_model="numpy", forceinline=True)
+    for way in ways:
         # Compiled code is stored beside the law, under a name of its own.
-        function.__code__ = function.__code__.replace(co_filename=law.python.__code__.co_filename)
-        function.__module__ = law.python.__module__
-        function.__qualname__ = f"{law.python.__qualname__}.eight.{wrapped.__name__}"
-        function.__name__ = law.python.__name__
-        made = compile_law(_SIGNAL if signal else _NODE, f"{law.form}, eight of each", function)
+        function = FunctionType(
+            way.__code__.replace(co_filename=one.python.__code__.co_filename),
+            {**globals(), "law": inside}, one.python.__name__)
+        function.__module__ = one.python.__module__
+        function.__qualname__ = f"{one.python.__qualname__}.eight.{way.__name__}"
+        made = compile_law(_SIGNAL if signal else _NODE, f"{one.form}, eight of each", function)
         with suppress(InputError):
             made.address  # noqa: B018 - compiles it
             return made
@@ -88,5 +93,5 @@ def _made(law: CompiledLaw) -> CompiledLaw | None:
 
 def simd_address(address: int) -> int | None:
     """Address of the function for eight lanes of the law at an address; None if there is none."""
-    law = simd_law(law_at(address))
-    return None if law is None else law.address
+    found = simd_law(law_at(address))
+    return None if found is None else found.address
