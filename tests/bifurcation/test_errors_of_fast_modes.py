@@ -119,7 +119,7 @@ def beam_branch():
 
 
 def test_errors_of_a_beam():
-    """With and without stick; elastic modes turn once to ten times in an interval."""
+    """With and without stick; elastic modes turn once to some five or ten times in an interval."""
     field, frequencies, branch = beam_branch()
     assert branch.message == ""
     assert branch.column("state_error").max() <= 1e-5
@@ -132,7 +132,7 @@ def test_errors_of_a_beam():
         alone.append(state_error(problem, u) / true)
         turns = frequencies[3:] * problem.period(u) * np.median(problem.widths)
         assert turns.min() > 0.8
-        assert turns.max() > 7.0
+        assert turns.max() > 4.0
     # Each interval for itself shows a third and less of it.
     assert min(alone) < 0.3
     assert max(alone) > 0.8

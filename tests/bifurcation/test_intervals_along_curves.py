@@ -141,7 +141,8 @@ def test_doublings_of_stick_slip_on_finer_meshes():
     assert curve.message == ""
     assert curve.column("state_error").max() <= 1e-7
     assert max(counts(curve)) > intervals[0] <= min(counts(curve))
-    assert set(counts(fine)) == {400}
+    # The orbits of the curve; an error may need one on twice the intervals.
+    assert min(counts(fine)) == 400
     ends = [each.points[-1] for each in curves]
     assert [end.values["slope"] for end in ends] == pytest.approx(2 * [1000.0], rel=1e-11)
     assert ends[0].parameter == pytest.approx(ends[1].parameter, rel=1e-8)

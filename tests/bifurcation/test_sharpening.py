@@ -75,17 +75,20 @@ def slow_doubling():
     return found
 
 
-def test_a_mesh_that_is_too_coarse_claims_nothing(slow_doubling):
-    """On 40 intervals the doubling moves farther than it is looked for, or the branch stalls."""
-    branch = slow_doubling(40)
+@pytest.mark.parametrize("intervals", [40, 50])
+def test_a_mesh_that_is_too_coarse_claims_nothing_wrong(slow_doubling, intervals):
+    """The doubling moves farther than it is looked for, or is found, or the branch stalls: that
+    hangs on rounding.
+    """
+    branch = slow_doubling(intervals)
     assert branch.special or branch.status is BranchStatus.STALLED
     for point in branch.special:
-        assert point.kind == "unresolved"
-        assert point.instead_of == "period doubling"
+        assert point.kind in ("unresolved", "period doubling")
         assert abs(point.parameter - 0.04009165) <= 1.2 * point.parameter_error + 1e-8
+        assert point.kind == "unresolved" or point.criticality in ("undecided", "subcritical")
 
 
-@pytest.mark.parametrize("intervals", [50, 60, 80, 100])
+@pytest.mark.parametrize("intervals", [60, 80, 100])
 def test_criticality_is_that_of_finer_meshes_or_undecided(slow_doubling, intervals):
     """Multipliers of this orbit span many decades: on the finest meshes rounding spreads the
     coefficient with a standard deviation of 0.003; on 60 intervals it is -55, on 100 -1.1.
@@ -97,10 +100,9 @@ def test_criticality_is_that_of_finer_meshes_or_undecided(slow_doubling, interva
     point, = slow_doubling(intervals).special
     assert abs(point.parameter - 0.04009165) <= 1.2 * point.parameter_error + 1e-8
     assert point.criticality in ("undecided", "subcritical")
-    if intervals >= 60:
-        assert abs(point.coefficient - 0.462) <= point.coefficient_error + 0.006
-        assert abs(point.coefficient - 0.462) < 0.03
-        assert point.coefficient_error >= 0.002
+    assert abs(point.coefficient - 0.462) <= point.coefficient_error + 0.006
+    assert abs(point.coefficient - 0.462) < 0.03
+    assert point.coefficient_error >= 0.002
 
 
 @pytest.fixture(scope="module")

@@ -63,7 +63,7 @@ def rod(length, m):
 
 
 @pytest.mark.parametrize(("reduction", "modes", "error"), [
-    ("residual", 14, 1e-4), ("craig-bampton", 10, 2e-4), ("vibration", 14, None)])
+    ("residual", 14, 1e-4), ("craig-bampton", 10, 5e-8), ("vibration", 14, None)])
 def test_two_welded_bars_vibrate_as_one_of_double_length(reduction, modes, error):
     """Axial frequencies k c / (2 (2 l)); without residual vectors the joint is too stiff."""
     bases = bars(reduction, modes)
@@ -79,6 +79,9 @@ def test_two_welded_bars_vibrate_as_one_of_double_length(reduction, modes, error
         assert off > 1e-3
         return
     assert off < error
+    # Both bars are the same, in two places; rounding of places is not amplified.
+    a, b = (one.angular_frequencies[one.rigid_modes :] for one in bases.values())
+    assert a == pytest.approx(b, rel=1e-7)
     axial = 5188.74521 / 4.0  # sqrt(E / rho) / (2 * 2 l)
     assert np.abs(whole.frequencies_hz / axial - 1.0).min() < 1e-4
 

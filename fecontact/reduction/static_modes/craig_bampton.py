@@ -17,6 +17,9 @@ from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.static_modes.flexibility import Flexibility
 from fecontact.reduction.static_modes.residual_vectors import diagonalised, flexibility_of
 
+# Squared size of a direction, in that of the largest, below which products know nothing of it.
+_LEAST = 1e-15
+
 
 def craig_bampton(
     system: FreeSystem, rows: Any, count: int, loads: Array | None = None
@@ -47,11 +50,25 @@ def craig_bampton(
     fixed = _fixed_interface_modes(system, flexibility.rows.T @ patterns, deflections, motion,
                                    count)
     answers = [] if loads is None else [system.deflection(loads)]
-    squares, shapes = diagonalised(
-        system, system.without_rigid(np.hstack([deflections, fixed, *answers])))
+    squares, shapes = diagonalised(system, _told_apart(
+        system, system.without_rigid(np.hstack([deflections, fixed, *answers]))))
     rigid = system.rigid.shape[1]
     return (np.concatenate([np.zeros(rigid), np.sqrt(squares)]),
             np.hstack([system.rigid, shapes]))
+
+
+def _told_apart(system: FreeSystem, vectors: Array) -> Array:
+    """Vectors (f, p) of the same span, with similar energies and nearly orthogonal.
+
+    Products of vectors that nearly depend on each other lose what tells them apart to rounding,
+    about 1e-16 of their squares; their differences lose its root alone. Constraint modes and
+    fixed-interface modes of slender bodies are such vectors.
+    """
+    stiffness = vectors.T @ (system.stiffness @ vectors)
+    scale = 1.0 / np.sqrt(np.diag(stiffness))
+    values, directions = np.linalg.eigh(stiffness * np.outer(scale, scale))
+    values = np.maximum(values, _LEAST * values[-1])
+    return np.asarray(vectors @ (scale[:, None] * directions / np.sqrt(values)))
 
 
 def _independent(flexibility: Flexibility) -> Array:
