@@ -64,12 +64,12 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--within", type=float, default=1.1)
     given = parser.parse_args()
-    slower = False
+    other, slower = given.other.resolve(), False
     for benchmark in given.benchmarks:
         # What a first run compiles is stored.
-        for tree in (given.other, HERE):
+        for tree in (other, HERE):
             run(tree, benchmark)
-        turns = [(run(given.other.resolve(), benchmark), run(HERE, benchmark))
+        turns = [(run(other, benchmark), run(HERE, benchmark))
                  for _ in range(given.rounds)]
         before, after = (least(turn[side] for turn in turns) for side in (0, 1))
         print(f"{benchmark.replace('+', ' ')}")
