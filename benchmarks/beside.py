@@ -31,7 +31,9 @@ def rows(lines: Iterable[str]) -> Rows:
     for line in lines:
         times = [float(value) * UNITS[unit] for value, unit in TIME.findall(line)]
         if times:
-            label = " ".join(re.sub(r"[^\w.-]+", " ", TIME.sub("", line)).split())
+            words = re.sub(r"[^\w.-]+", " ", TIME.sub("", line)).split()
+            # Without ratios and errors, which differ from run to run.
+            label = " ".join(word for word in words if not re.fullmatch(r"-|.*\d\.\d.*", word))
             while label in found:
                 label += "'"
             found[label] = times
