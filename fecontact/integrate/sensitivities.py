@@ -131,7 +131,7 @@ def sensitivity(
     is a function of its start that is smooth except where a jump appears or vanishes; derivatives
     are central differences of this function, which contain the saltation at the jumps, of relative
     accuracy 1e-6. Each costs two runs. At a start that touches a rigid stop they are differences
-    into the open. A ModelWarning tells of those to one side that are apart: there are none then.
+    into the open. A ModelWarning names starts where the derivatives to both sides differ.
 
     Parameters
     ----------

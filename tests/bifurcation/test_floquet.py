@@ -52,8 +52,9 @@ def test_product_keeps_large_and_small_eigenvalues(multipliers):
     assert len(found) == len(expected)
     assert (np.diff(np.abs(found)) <= 1e-9 * np.abs(found[:-1])).all()
     for mu in expected:
-        # Rounding of 80 factors with condition numbers of up to 1e5 each.
-        assert np.abs(found - mu).min() < 1e-10 * abs(mu)
+        # The last product is one of 80 factors with condition numbers of 1e5 each.
+        within = 1e-10 if abs(mu) == 1e-200 else 3e-11
+        assert np.abs(found - mu).min() < within * abs(mu)
 
 
 def test_product_of_random_matrices_agrees_with_the_product():
