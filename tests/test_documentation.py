@@ -150,7 +150,8 @@ def check_orbits(names, printed, folder):
     assert (folder / "diagram.png").stat().st_size > 10000
     counts = [len(point.values["mesh"]) - 1 for point in names["exact"].points]
     assert min(counts) == 20
-    assert 150 <= max(counts) <= 250
+    # One orbit comes so near to the tolerance that rounding decides whether its mesh suffices.
+    assert max(counts) in (200, 400)
     assert names["exact"].column("state_error").max() <= 1e-8
     second = names["doubled"].of_kind("period doubling")[0]
     assert second.parameter == pytest.approx(9.2619, abs=1e-3)
