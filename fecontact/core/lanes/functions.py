@@ -25,7 +25,9 @@ from numba.extending import intrinsic, lower_cast, overload, register_model
 
 from fecontact.core.compiled import helper
 from fecontact.core.lanes.vectors import (
+    _VECTOR,
     WIDTH,
+    _spread,
     chosen,
     exponent,
     fused,
@@ -169,19 +171,12 @@ def reciprocal_root(x):
 
 # A float where eight numbers are wanted, in a result or at the end of a branch.
 default_type_manager.set_promote(types.float64, lanes)
-_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _JIT = {"error_model": "numpy", "forceinline": True}
-
-
-def _repeated(builder: Any, number: Any) -> Any:
-    empty, index = ir.Constant(_VECTOR, ir.Undefined), ir.IntType(32)
-    first = builder.insert_element(empty, number, ir.Constant(index, 0))
-    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(index, WIDTH), None))
 
 
 @lower_cast(types.float64, lanes)
 def _float_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _repeated(builder, value)
+    return _spread(builder, value)
 
 
 @intrinsic
@@ -189,7 +184,7 @@ def _select(typingctx: Any, where: Any, then: Any, otherwise: Any) -> Any:
     kind = lanes if lanes in (then, otherwise) or where == mask else types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        values = [_repeated(builder, value) if kind == lanes != given else value
+        values = [_spread(builder, value) if kind == lanes != given else value
                   for given, value in zip(signature.args[1:], args[1:], strict=True)]
         return builder.select(args[0], *values)
 
@@ -203,8 +198,8 @@ def select(where, then, otherwise):
     return _select(where, then, otherwise)
 
 
-def _folded(instruction: str) -> Any:
-    """Intrinsic that makes one truth value of those of all lanes."""
+def _folded(all_lanes: bool) -> Any:
+    """Intrinsic that makes one truth value of those of the lanes: of all of them, or of any."""
 
     @intrinsic
     def fold(typingctx: Any, where: Any) -> Any:
@@ -212,16 +207,15 @@ def _folded(instruction: str) -> Any:
             if where != mask:
                 return args[0]
             truths = builder.bitcast(args[0], ir.IntType(WIDTH))
-            none = instruction == "or"
-            return builder.icmp_unsigned("!=" if none else "==", truths,
-                                         ir.Constant(truths.type, 0 if none else -1))
+            sign, number = ("==", -1) if all_lanes else ("!=", 0)
+            return builder.icmp_unsigned(sign, truths, ir.Constant(truths.type, number))
 
         return types.boolean(where), codegen
 
     return fold
 
 
-_any, _all = _folded("or"), _folded("and")
+_any, _all = _folded(all_lanes=False), _folded(all_lanes=True)
 
 
 @helper
@@ -295,7 +289,7 @@ def _whole_power(x, exponent):
     return power if exponent >= 0 else 1.0 / power
 
 
-@overload(operator.pow, jit_options={"error_model": "numpy", "forceinline": True})
+@overload(operator.pow, jit_options=_JIT)
 def _typed_power(a, b):
     if a != lanes:
         return None
