@@ -4,8 +4,7 @@ Usage: python benchmarks/many_contacts.py [--quick]
 
 A free beam of 40 modes on a belt, with 400, 1000 and 4000 contact nodes. A level face touches with
 all nodes, a crowned one with about a tenth of them. Processor time of one step, the median of
-several pieces of a run, and what each further node costs. Then the time by the clock of a step with
-all nodes closed, the least of many short pieces of runs by one and by two threads in turn.
+several pieces of a run, and what each further node costs.
 """
 
 import os
@@ -46,11 +45,11 @@ def system(nodes: int, crown: float) -> ContactSystem:
         drive=Drive(stiffness_x=5610.0, damping_x=0.768, motion_x=Constant(-9.5 / 5610.0)))
 
 
-def run_of(tried: ContactSystem, workers: int = 1) -> Run:
+def run_of(tried: ContactSystem) -> Run:
     """A run that has begun."""
     start = np.zeros(2 * MODES)
     start[1] = -3e-6 * np.sqrt(MASS)
-    run = driver.start(tried, start, np.array([0.0, 10.0]), rtol=1e-5, work=False, workers=workers)
+    run = driver.start(tried, start, np.array([0.0, 10.0]), rtol=1e-5, work=False)
     run.advance(10)
     return run
 
@@ -66,20 +65,6 @@ def step_time(nodes: int, crown: float, pieces: int, steps: int) -> tuple[float,
         found.append((time.process_time() - begin) / (run.attempts - before))
     force = tried.contact_history(np.array([run.time]), run.progress.state[None])[0, :, 0]
     return float(np.median(found)) * 1e6, float((force != 0.0).mean())
-
-
-def clock_times(nodes: int, pieces: int, steps: int) -> list[float]:
-    """Least clock time of a step [us] with all nodes closed, by one and by two threads."""
-    tried = system(nodes, 0.0)
-    runs = [run_of(tried, workers) for workers in (1, 2)]
-    least = [np.inf, np.inf]
-    for _ in range(pieces):
-        for k, run in enumerate(runs):
-            before, begin = run.attempts, time.perf_counter()
-            run.advance(steps)
-            least[k] = min(least[k], (time.perf_counter() - begin) / (run.attempts - before))
-    assert np.array_equal(runs[0].progress.state, runs[1].progress.state)
-    return [one * 1e6 for one in least]
 
 
 def main(quick: bool = False) -> None:
@@ -98,10 +83,6 @@ def main(quick: bool = False) -> None:
     for (n0, whole0, few0), (n1, whole1, few1) in pairwise(rows):
         print(f"us a node from {n0} to {n1}: {(whole1 - whole0) / (n1 - n0):.3f} all closed, "
               f"{(few1 - few0) / (n1 - n0):.3f} few closed")
-    for nodes in sizes:
-        one, two = clock_times(nodes, 3 * pieces, 5 * steps)
-        print(f"{nodes} nodes, all closed, by the clock: one thread {one:.1f} us, two threads "
-              f"{two:.1f} us, {one / two:.2f} times as fast")
 
 
 if __name__ == "__main__":

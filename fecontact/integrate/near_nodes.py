@@ -17,8 +17,6 @@ from fecontact.core.compiled import helper, routine
 from fecontact.integrate.courses import HIGHEST
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p.blocks import FEW
-from fecontact.integrate.shared_nodes.tasks import END, share_at
-from fecontact.integrate.shared_nodes.team import shares
 
 # Chosen for so many times the motion that is expected.
 _AMPLE = 1.5
@@ -78,12 +76,9 @@ def set_end(problem, progress, room):
     n = len(s.gap)
     extend_near(room.after, problem, progress, room)
     every = near.used[0] == n
-    if shares(room):
-        share_at(room.team.share)(END, 0.0, problem, progress, room)
-    else:
-        dynamics.set_rate_and_gradients(room.after, s, near, room.given, room.load,
-                                        room.nodes if every else room.slots, room.gradients_after,
-                                        room.rate_after)
+    dynamics.set_rate_and_gradients(room.after, s, near, room.given, room.load,
+                                    room.nodes if every else room.slots, room.gradients_after,
+                                    room.rate_after)
     if every:
         return
     dynamics.project(problem.blocks, room.after, room.nodes[0], room.nodes[1])

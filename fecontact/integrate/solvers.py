@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.core.checks import as_count, as_floats, as_path, require_kind
+from fecontact.core.checks import as_floats, as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.integrate.coefficients import Coefficient
@@ -99,11 +99,6 @@ class Rodas5P(Solver):
         resumed from it with bit-for-bit the same results; it is removed at the end.
     keep_checkpoint : bool
         Keep the file at the end, to be removed once the run is written.
-    workers : int, optional
-        Number of threads that share the contact nodes of each step, where 256 or more may touch;
-        results do not depend on it. By default two, from 1000 nodes on four, at most one per core,
-        and not more than the environment variable OMP_NUM_THREADS says. Runs of ensembles and
-        sweeps have one.
 
     Raises
     ------
@@ -120,7 +115,6 @@ class Rodas5P(Solver):
     keep_checkpoint: bool = False
     series: str = "auto"
     collocation: str = "auto"
-    workers: int | None = None
 
     locates_events: ClassVar[bool] = True
     uses: ClassVar[tuple[str, ...]] = ("auto", "always", "never")
@@ -137,8 +131,6 @@ class Rodas5P(Solver):
         if self.checkpoint is not None:
             as_path(self.checkpoint, "a checkpoint")
         require_kind("Rodas5P", bool, keep_checkpoint=self.keep_checkpoint)
-        if self.workers is not None:
-            as_count(self.workers, "Rodas5P: workers")
 
     @property
     def name(self) -> str:
@@ -156,7 +148,7 @@ class Rodas5P(Solver):
         found = integrate(task.system, task.state, task.times, rtol=task.rtol,
                           max_step=task.max_step, progress=task.progress, checkpoint=path,
                           events=task.events, series=self.series,
-                          collocation=self.collocation, workers=self.workers)
+                          collocation=self.collocation)
         if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
             path.unlink(missing_ok=True)
         return found

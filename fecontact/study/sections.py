@@ -245,9 +245,6 @@ class SimulationSettings:
     collocation : str, optional
         For 'rodas5p': 'auto', 'always' or 'never'; whether steps are of order 9, which are longer
         where little error is allowed.
-    workers : int, optional
-        For 'rodas5p': threads that share the contact nodes of a step, where 256 or more may touch;
-        by default as many as pay, in a sweep one.
     events : bool
         For 'rodas5p' and 'set-valued': locate touch-down, lift-off, stick and slip of every
         contact node and store them with the run.
@@ -273,7 +270,6 @@ class SimulationSettings:
     scheme: str | None = None
     series: str | None = None
     collocation: str | None = None
-    workers: int | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding", "preload"] | RigidStart | PointStart = "rest"
@@ -303,8 +299,7 @@ class SimulationSettings:
             "restitution": self.restitution, "impact_law": self.impact_law,
             "tangential_restitution": self.tangential_restitution,
             "static_coefficient": self.static_coefficient, "scheme": self.scheme,
-            "series": self.series, "collocation": self.collocation,
-            "workers": self.workers})
+            "series": self.series, "collocation": self.collocation})
 
 
 @dataclass(frozen=True)

@@ -387,19 +387,17 @@ class Study(Summarised, StudyModels):
 
     def run(
         self, progress: bool | Callable[[float], None] | None = None,
-        checkpoint: Path | None = None, workers: int | None = None,
+        checkpoint: Path | None = None,
     ) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
 
         Solvers without checkpoints ignore ``checkpoint``. The file is kept after the run: remove
-        it once the run is written. ``workers`` are those of :class:`fecontact.integrate.Rodas5P`
-        where ``[simulation]`` gives none.
+        it once the run is written.
         """
         settings, t_end, system = self.simulation, self.t_end, self.system()
         solver = settings.chosen_solver()
         if isinstance(solver, Rodas5P):
-            solver = replace(solver, checkpoint=checkpoint, keep_checkpoint=True,
-                             workers=workers if solver.workers is None else solver.workers)
+            solver = replace(solver, checkpoint=checkpoint, keep_checkpoint=True)
         with located(f"{_title(self.path)}: [output]:"):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fecontact as fc
-from fecontact.integrate import ContactEvents, near_nodes
+from fecontact.integrate import ContactEvents, Rodas5P, near_nodes
 from fecontact.integrate.rodas5p import driver, stage_solver
 from fecontact.integrate.rodas5p.blocks import FEW
 from fecontact.laws import (
@@ -14,6 +14,7 @@ from fecontact.laws import (
     ExponentialContact,
     ExponentialFriction,
     Harmonic,
+    LinearContact,
     LuGreFriction,
     RoughSurface,
 )
@@ -194,3 +195,20 @@ def test_products_of_rows(rows, columns, length):
     out = np.full((rows, columns), np.nan)
     stage_solver.products(a, b, out)
     assert out == pytest.approx(a @ b.T, rel=1e-13, abs=1e-12)
+
+
+def test_a_body_bounces_on_many_nodes_as_on_one_spring():
+    """y = -F/k (1 - cos w t), w^2 = k/m, until it would lift off."""
+    mass, stiffness, force, nodes = 0.5, 2e6, 30.0, 400
+    rows = np.zeros((nodes, 3, 1))
+    rows[:, 1] = 1.0
+    basis = fc.basis_from_matrices([[mass]], [[0.0]], {"contact": rows, "C": rows[0]},
+                                   contact_places=np.column_stack([np.linspace(0, 1, nodes)] * 2),
+                                   tributary=np.full(nodes, 1.0 / nodes), damping=0.0)
+    moving = fc.ContactSystem(basis, LinearContact(stiffness, 0.0), load=fc.Load(force))
+    w = np.sqrt(stiffness / mass)
+    run = fc.simulate(moving, 6.0 / w, initial=[0.0, 0.0], outputs=50, rtol=1e-9,
+                      solver=Rodas5P(series="never", collocation="never"))
+    y = run.modal_coordinates[:, 0] / np.sqrt(mass)
+    assert y == pytest.approx(-force / stiffness * (1.0 - np.cos(w * run.time)),
+                              abs=1e-7 * force / stiffness)

@@ -34,7 +34,6 @@ from fecontact.cli.templates import TEMPLATES, template
 from fecontact.core.dotted_parameters import flattened
 from fecontact.fem.shapes import Beam, Block, Pendulum
 from fecontact.integrate import SetValued
-from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.solvers import SOLVERS
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.study.study import with_given_keys
@@ -507,17 +506,6 @@ def test_loads_of_a_study(tmp_path):
 def test_loads_of_a_study_that_do_not_fit_its_body(changes, message):
     with pytest.raises(InputError, match=message):
         Study.from_toml(LOADED).with_(**changes).system()
-
-
-def test_workers_are_those_of_the_study_before_those_of_the_run(tiny, monkeypatch):
-    seen = []
-    monkeypatch.setattr(driver, "workers_for", lambda nodes, workers: seen.append(workers) or 1)
-    three = tiny.with_(**{"simulation.workers": 3})
-    for study, asked in ((tiny, None), (tiny, 1), (three, None), (three, 1)):
-        study.run(workers=asked)
-    assert seen == [None, 1, 3, 3]
-    with pytest.raises(InputError, match="workers = 3 is only for solver = 'rodas5p', not 'radau'"):
-        three.with_(**{"simulation.solver": "radau"})
 
 
 def test_friction_and_thickness_have_to_be_given(tiny):

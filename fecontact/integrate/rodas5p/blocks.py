@@ -76,13 +76,6 @@ def block_at(table, k):
     return table[k, 0], table[k, 1], np.uint64(table[k, 2]), np.uint64(table[k, 3])
 
 
-@helper
-def within(left, right, begin, end):
-    """The part between two places of a range of columns, which may be empty."""
-    first = max(left, np.uint64(begin))
-    return first, max(first, min(right, np.uint64(end)))
-
-
 def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
     """The blocks of a system, by its bodies and interfaces and by what is zero."""
     n, m = arrays.Tx.shape

@@ -38,8 +38,6 @@ from fecontact.integrate.rodas5p.state import (
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.series.branches import chosen_series, from_state
-from fecontact.integrate.shared_nodes.helpers import workers_for
-from fecontact.integrate.shared_nodes.team import ALONE, Team, parts_for
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
@@ -81,7 +79,6 @@ def start(
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
     collocation: str = "auto",
-    workers: int = 1,
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -118,8 +115,6 @@ def start(
         Whether to expand the motion in power series; see :class:`fecontact.integrate.Rodas5P`.
     collocation : 'auto', 'always' or 'never'
         Whether to take steps by collocation; see there.
-    workers : int
-        Threads that share the contact nodes; results do not depend on it.
     """
     require_state(state, np.inf)
     basis = system.basis
@@ -152,8 +147,7 @@ def start(
     return Run(
         problem,
         _progress(system, control, times, state),
-        room_for(m, n, states, basis.dimension, blocks,
-                 _team(m, n, 0 if expanded else workers - 1)),
+        room_for(m, n, states, basis.dimension, blocks),
         Output(times, np.zeros((len(times), len(state))),
                np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
         Vary(exact_arrays(above.arrays, counts), exact_arrays(below.arrays, counts), width,
@@ -186,16 +180,6 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
         None if run.series is None else from_state(run.series, system, state),
         None if run.collocation is None else collocation_for(
             system.basis.modes, system.basis.contact_nodes, control.rtol))
-
-
-def _team(modes: int, nodes: int, helpers: int) -> Team:
-    """What threads share the nodes with, if they are many."""
-    if not parts_for(nodes):
-        return ALONE
-    # Compiled for runs that need it only.
-    from fecontact.integrate.shared_nodes.node_work import team_for
-
-    return team_for(modes, nodes, helpers)
 
 
 def _progress(system: ContactSystem, control: Control, times: Array, state: Array) -> Progress:
@@ -345,13 +329,11 @@ def integrate(
     events: Sequence[AnyEvent] = (),
     series: str = "auto",
     collocation: str = "auto",
-    workers: int | None = None,
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
     run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series,
-                collocation=collocation,
-                workers=workers_for(system.basis.contact_nodes, workers))
+                collocation=collocation)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()

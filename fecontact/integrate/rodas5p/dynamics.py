@@ -156,14 +156,6 @@ def push_block(ends, shapes, forces, out):
 def gather(y, s, blocks, load, forces, rate):
     """Fill the first 2 m entries of ``rate`` from the node forces (d n,) of :func:`push`."""
     m = len(load)
-    set_free_rate(y, s, blocks, load, rate)
-    push(blocks, forces, rate[m : 2 * m])
-
-
-@helper
-def set_free_rate(y, s, blocks, load, rate):
-    """Fill the first 2 m entries of ``rate`` with what they are without node forces."""
-    m = len(load)
     v = y[m : 2 * m]
     for i in range(m):
         rate[i] = v[i]
@@ -175,6 +167,7 @@ def set_free_rate(y, s, blocks, load, rate):
             for k in range(left, right):
                 total += s.stiffness[i, k] * y[k] + s.damping[i, k] * v[k]
             rate[m + i] -= total
+    push(blocks, forces, rate[m : 2 * m])
 
 
 @helper
@@ -183,17 +176,11 @@ def set_forces(y, s, blocks, moved, w, scratch, rate):
 
     ``w`` (3, d n) holds the nodes as :func:`project` puts them there, ``scratch`` is room.
     """
-    set_some_forces(0, blocks.used[0], y, s, blocks, moved, w, scratch, rate)
-
-
-@helper
-def set_some_forces(begin, end, y, s, blocks, moved, w, scratch, rate):
-    """As :func:`set_forces`, from one place of the nodes of ``blocks`` to another."""
     m, n = len(blocks.position), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
-    force, rates = scratch.force[begin], scratch.rates[begin]
-    for at in range(begin, end):
+    force, rates = scratch.force[0], scratch.rates[0]
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         first = 2 * m + j * states
         F, R, contact = kernels.node_forces(j, motion_of(at, w, s), moved,
@@ -225,16 +212,10 @@ def set_gradients(y, s, blocks, moved, w, out):
     The node forces go to w[2], in the order of :func:`push`.
     """
     project(blocks, y, w[0], w[1])
-    set_some_gradients(0, blocks.used[0], y, s, blocks, moved, w, out)
-
-
-@helper
-def set_some_gradients(begin, end, y, s, blocks, moved, w, out):
-    """As :func:`set_gradients` from one place to another, with the nodes' motion in w."""
     m, n = len(blocks.position), len(s.gap)
     states = out.rates.shape[1]
     forces = w[2]
-    for at in range(begin, end):
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         first = 2 * m + j * states
         F, T, contact = kernels.node_gradients(j, motion_of(at, w, s), moved,
@@ -251,17 +232,11 @@ def set_some_gradients(begin, end, y, s, blocks, moved, w, out):
 def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
     set_gradients(y, s, blocks, motion_given(given), w, out)
-    set_memory_rates(len(load), s, out, rate)
-    gather(y, s, blocks, load, w[2], rate)
-
-
-@helper
-def set_memory_rates(m, s, g, rate):
-    """Fill the z' of ``rate`` from the Gradients g, behind those of m modes."""
-    states = g.rates.shape[1]
+    m, states = len(load), out.rates.shape[1]
     for j in range(len(s.gap)):
         for k in range(states):
-            rate[2 * m + j * states + k] = g.rates[j, k, 0] if k < s.memory[j] else 0.0
+            rate[2 * m + j * states + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
+    gather(y, s, blocks, load, w[2], rate)
 
 
 @helper
@@ -331,16 +306,8 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     speed with x'. ``acceleration`` (2,) is that of the ground's motions, ``rate_of_loads`` (m,) the
     rate of the modal loads.
     """
-    m = len(rate_of_loads)
-    set_free_time_rate(s, given, rate_of_loads, out)
-    set_some_time_rates(0, blocks.used[0], s, blocks, given, acceleration, g, w[2], out)
-    push(blocks, w[2], out[m : 2 * m])
-
-
-@helper
-def set_free_time_rate(s, given, rate_of_loads, out):
-    """Fill the first 2 m entries of ``out`` with df/dt without node forces."""
-    m = len(rate_of_loads)
+    m, n = len(rate_of_loads), len(s.gap)
+    states, forces = g.rates.shape[1], w[2]
     for i in range(m):
         out[i] = 0.0
         out[m + i] = (rate_of_loads[i] + given[PULL_RATE] * s.drive_shapes[0, i]
@@ -349,16 +316,7 @@ def set_free_time_rate(s, given, rate_of_loads, out):
         for i in range(m):
             out[m + i] += given[PULL_RATE + 2] * s.drive_shapes[2, i]
 
-
-@helper
-def set_some_time_rates(begin, end, s, blocks, given, acceleration, g, forces, out):
-    """Fill ``forces`` with the rates of node forces from one place to another, and z' of ``out``.
-
-    The other arguments are those of :func:`set_time_rate`.
-    """
-    m, n = len(blocks.position), len(s.gap)
-    states = g.rates.shape[1]
-    for at in range(begin, end):
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         v = nodes.moved_along(j, given[SPEED], given[SECOND_SPEED], s)
         a = nodes.moved_along(j, acceleration[0], acceleration[1], s)
@@ -381,6 +339,7 @@ def set_some_time_rates(begin, end, s, blocks, given, acceleration, g, forces, o
                 if nodes.in_space(s):
                     rate -= a2 * g.rates[j, k, 3 + states]
             out[2 * m + j * states + k] = rate
+    push(blocks, forces, out[m : 2 * m])
 
 
 @routine

@@ -9,8 +9,6 @@ from fecontact.integrate.near_nodes import extend_near
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, RATES, SPEED_SCALE, WORST_NODE
-from fecontact.integrate.shared_nodes.tasks import POWERS, SLIP_ERROR, STAGE, share_at
-from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
 
@@ -87,11 +85,8 @@ def switches(places, nodes, forces, signs):
 def set_stage_rate(problem, progress, room):
     """Fill ``room.base`` with the rates of ``room.stage``, by ``room.given``, ``room.load``."""
     extend_near(room.stage, problem, progress, room)
-    if shares(room):
-        share_at(room.team.share)(STAGE, 0.0, problem, progress, room)
-    else:
-        dynamics.set_rate(room.stage, problem.system, room.near, room.given, room.load, room.nodes,
-                          room.scratch, room.base)
+    dynamics.set_rate(room.stage, problem.system, room.near, room.given, room.load, room.nodes,
+                      room.scratch, room.base)
 
 
 @routine
@@ -131,26 +126,11 @@ def slip_error(error, problem, progress, room):
     Only where friction has no memory: there the force follows the slip velocity alone.
     """
     s, control = problem.system, problem.control
-    m = len(control.largest)
-    if shares(room):
-        return share_at(room.team.share)(SLIP_ERROR, error, problem, progress, room)
-    dynamics.project_one(room.near, room.stages[tableau.STAGES - 1, m : 2 * m], room.between[0])
-    error, worst = largest_slip_error(0, room.near.used[0], error, s, control, room)
-    if worst >= 0:
-        progress.counts[WORST_NODE] = worst
-    return error
-
-
-@helper
-def largest_slip_error(begin, end, error, s, control, room):
-    """The larger of the error and those of nodes from one place to another, and the worst node.
-
-    That is -1 if no node has a larger one. ``room.between[0]`` holds errors of velocities.
-    """
-    n, worst = len(s.gap), -1
+    n, m = len(s.gap), len(control.largest)
     near, slips = room.near, room.between[0]
+    dynamics.project_one(near, room.stages[tableau.STAGES - 1, m : 2 * m], slips)
     moved = dynamics.motion_given(room.given)
-    for at in range(begin, end):
+    for at in range(near.used[0]):
         j = near.nodes[at]
         if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
             slip = slips[at]
@@ -161,8 +141,9 @@ def largest_slip_error(begin, end, error, s, control, room):
                     j, moved.speed, moved.second_speed, s))
             part = abs(slip) / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
-                error, worst = part, j
-    return error, worst
+                error = part
+                progress.counts[WORST_NODE] = j
+    return error
 
 
 @helper
@@ -235,26 +216,12 @@ def _powers(point, t, y, problem, progress, room):
         matrix_powers(block_at(blocks.own, part), y, s, out)
     for j in range(POWER_COUNT, len(out)):
         out[j] = 0.0
-    if shares(room):
-        room.team.numbers[0] = t
-        share_at(room.team.share)(POWERS, point, problem, progress, room)
-        return
     dynamics.project(near, y, room.between[0], room.between[1])
-    add_some_powers(0, near.used[0], t, y, problem, room, out, out[POWER_COUNT:])
-
-
-@helper
-def add_some_powers(begin, end, t, y, problem, room, out, node_powers):
-    """Add to ``out`` (p,) the powers of the nodes from one place to another; fill their own (2 n,).
-
-    ``room.between`` holds the motion of the nodes.
-    """
-    s, near = problem.system, room.near
-    n, m = len(s.gap), len(problem.blocks.position)
+    n, m = len(s.gap), len(blocks.position)
     states = (len(y) - 2 * m) // n
-    force, rates = room.scratch.force[begin], room.scratch.rates[begin]
+    force, rates, node_powers = room.scratch.force[0], room.scratch.rates[0], out[POWER_COUNT:]
     moved = ground_motion(t, s)
-    for at in range(begin, end):
+    for at in range(near.used[0]):
         j = near.nodes[at]
         first = 2 * m + j * states
         add_node_powers(j, dynamics.motion_of(at, room.between, s), moved,

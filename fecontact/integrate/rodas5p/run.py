@@ -17,7 +17,6 @@ from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.step_length import TIME
 from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.integrate.series.branches import Series
-from fecontact.integrate.shared_nodes.helpers import assisted
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +137,7 @@ class Run:
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""
         try:
-            with assisted(self.problem, self.progress, self.room):
-                status = self._advance(steps)
+            status = self._advance(steps)
         finally:
             # An interrupt shows when the compiled code has returned, and its events are there.
             take_events(self.watch, self.found, self.time)

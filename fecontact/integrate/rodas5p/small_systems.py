@@ -23,7 +23,6 @@ from fecontact.integrate.rodas5p.variational import (
     propagate,
     propagate_in_parts,
 )
-from fecontact.integrate.shared_nodes.team import ALONE, Team
 from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, SystemArrays
 
 # Modes and nodes.
@@ -114,7 +113,6 @@ def fixed_values(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     found[Blocks] = {"shapes": blocks.shapes.shape, **tables}
     found[SystemArrays] |= {"memory": np.zeros(nodes, dtype=np.int64), "second_motion": 0}
     found[state.Control]["sliders"] = 0
-    found[Team] = {**_shapes(ALONE), "most": 0}
     found[stage_solver.Reduced]["solver"] = (modes, 2 * modes)
     found[Variation] = {"columns": (0, None)}
     return found
@@ -128,7 +126,3 @@ def values_of_derivatives(modes: int, nodes: int) -> dict[Any, dict[str, Any]]:
     gradients = {name: (None, *shape[1:]) for name, shape in values[dynamics.Gradients].items()}
     return {**values, dynamics.Gradients: gradients}
 
-
-def _shapes(arrays: Any) -> dict[str, Any]:
-    return {name: value.shape for name, value in arrays._asdict().items()
-            if isinstance(value, np.ndarray)}

@@ -22,7 +22,7 @@ from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise_within, solve_within
 from fecontact.core.records import Matrix, allocate
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.rodas5p.blocks import block_at, within
+from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.dynamics import project
 from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, in_space
 
@@ -204,18 +204,12 @@ def set_answers(blocks, g, w, answers):
 
     ``g`` are the Gradients, ``w`` holds the weights and room for coefficients.
     """
-    set_some_answers(0, blocks.used[0], blocks, g, w, answers)
-
-
-@helper
-def set_some_answers(begin, end, blocks, g, w, answers):
-    """As :func:`set_answers`, from one place of the nodes of ``blocks`` to another."""
     shapes = blocks.shapes
     m, n = len(shapes), len(g.partial)
     states = w.inverse.shape[1]
     c = w.coefficients
     space = len(c) > 4
-    for at in range(begin, end):
+    for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         p = g.partial[j]
         pressing, slip = 0.0, 0.0
@@ -230,7 +224,6 @@ def set_some_answers(begin, end, blocks, g, w, answers):
             _set_coefficients_across(at, j, g, w, pressing)
     for part in range(len(blocks.parts)):
         top, bottom, left, right = block_at(blocks.parts, part)
-        left, right = within(left, right, begin, end)
         for k in range(top, bottom):
             along, away, across = shapes[k, :n], shapes[k, n:], shapes[k, n:]
             if space:
@@ -274,23 +267,17 @@ def _set_coefficients_across(at, j, g, w, pressing):
 def assemble(s, blocks, g, w):
     """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
     set_answers(blocks, g, w, w.answers)
-    set_free_jacobian(s, blocks, w.J)
-    for pair in range(len(blocks.pairs)):
-        add_products(blocks.shapes, w.answers, block_at(blocks.pairs, pair),
-                     (np.uint64(blocks.pairs[pair, 4]), np.uint64(blocks.pairs[pair, 5])), w.J)
-
-
-@helper
-def set_free_jacobian(s, blocks, J):
-    """Fill J = [Jq, Jv] (m, 2 m) with what it is without node forces."""
-    m = len(J)
+    m = len(w.J)
     for part in range(len(blocks.coupled)):
         top, bottom, left, right = block_at(blocks.coupled, part)
         for i in range(top, bottom):
-            by_place, by_speed = J[i, :m], J[i, m:]
+            by_place, by_speed = w.J[i, :m], w.J[i, m:]
             for k in range(left, right):
                 by_place[k] = -s.stiffness[i, k]
                 by_speed[k] = -s.damping[i, k]
+    for pair in range(len(blocks.pairs)):
+        add_products(blocks.shapes, w.answers, block_at(blocks.pairs, pair),
+                     (np.uint64(blocks.pairs[pair, 4]), np.uint64(blocks.pairs[pair, 5])), w.J)
 
 
 @routine

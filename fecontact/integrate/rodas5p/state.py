@@ -11,7 +11,6 @@ from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import Blocks, near_blocks
 from fecontact.integrate.rodas5p.step_length import LAST_ROOT, STEP, TIME
-from fecontact.integrate.shared_nodes.team import ALONE, Team
 from fecontact.system.nodes import (
     AXES,
     CONTACT_FIELDS,
@@ -184,7 +183,7 @@ class Room(NamedTuple):
     :func:`fecontact.integrate.rodas5p.error_control.set_creeps` fills it. ``ends`` to ``places``
     serve to look at the course of a step: the nodes at its ends, its coefficients, those of the
     nodes, and room for what they may do. ``sums`` (2, size, 8) are what stages add to those after
-    them. ``team`` is for systems of many nodes, which threads may share.
+    them.
     """
 
     near: Blocks
@@ -215,7 +214,6 @@ class Room(NamedTuple):
     halves: Annotated[Array, bernstein.DEPTH, courses.COEFFICIENTS + 1]
     places: Annotated[Array, courses.MOST]
     sums: Annotated[Array, 2, SIZE, tableau.STAGES]
-    team: Team
 
 
 def gradients_for(
@@ -232,12 +230,12 @@ def gradients_for(
 
 
 def room_for(
-    modes: int, nodes: int, states: int, dimension: int, blocks: Blocks, team: Team = ALONE,
+    modes: int, nodes: int, states: int, dimension: int, blocks: Blocks,
 ) -> Room:
     """Room for a system of so many modes, contact nodes and internal variables per node."""
     return allocate(
         Room, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension},
-        near=near_blocks(blocks), team=team,
+        near=near_blocks(blocks),
         reduced=stage_solver.reduced_for(modes, nodes, states, dimension),
         scratch=gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1),
         gradients_after=gradients_for(nodes, states, dimension))

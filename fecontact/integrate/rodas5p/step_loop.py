@@ -57,8 +57,6 @@ from fecontact.integrate.rodas5p.variational import (
     propagate_at,
     write_columns,
 )
-from fecontact.integrate.shared_nodes.tasks import JACOBIAN, TIME_RATE, share_at
-from fecontact.integrate.shared_nodes.team import shares
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
@@ -134,12 +132,8 @@ def _linearise(step, after_t, problem, progress, room):
     acceleration = dynamics.ground_acceleration(step.t, later,
                                                 dynamics.motion_given(room.given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, room.pull_rate)
-    if shares(room):
-        room.team.numbers[0], room.team.numbers[1] = acceleration
-        share_at(room.team.share)(TIME_RATE, 0.0, problem, progress, room)
-    else:
-        dynamics.set_time_rate(s, room.near, room.given, acceleration, progress.gradients,
-                               room.pull_rate, room.nodes, room.time_rate)
+    dynamics.set_time_rate(s, room.near, room.given, acceleration, progress.gradients,
+                           room.pull_rate, room.nodes, room.time_rate)
     for i in range(m):
         progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
         speed = abs(progress.state[m + i]) * control.largest[i]
@@ -196,10 +190,7 @@ def _attempt(step, G, new, end, problem, progress, room):
     if memory:
         stage_solver.eliminate_memory(G, s, progress.gradients, room.reduced)
     if new or memory:
-        if shares(room):
-            share_at(room.team.share)(JACOBIAN, 0.0, problem, progress, room)
-        else:
-            stage_solver.assemble(s, room.near, progress.gradients, room.reduced)
+        stage_solver.assemble(s, room.near, progress.gradients, room.reduced)
     stage_solver.factorise_step(G, problem.blocks, room.reduced)
     return _stages(step, G, problem, progress, room)
 
