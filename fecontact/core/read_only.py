@@ -23,6 +23,8 @@ def read_only(value: Any) -> Any:
         view = value.view()
         view.flags.writeable = False
         return view
+    if value is None or isinstance(value, str | int | float):
+        return value
     if type(value).__module__.startswith("scipy.sparse") and hasattr(value, "indptr"):
         return _read_only_sparse(value)
     if type(value) in (dict, MappingProxyType):

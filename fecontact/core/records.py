@@ -17,7 +17,7 @@ Springs(array(float64, 1d, C), array(int64, 2d, C), float64)
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from operator import add, mul, sub
 from types import NoneType
 from typing import Annotated, Any, TypeVar, get_args, get_origin
@@ -161,20 +161,32 @@ def allocate(record: type[Record], sizes: Mapping[Size, int], **given: Any) -> R
     unknown = given.keys() - _fields(record).keys()
     if unknown:
         raise TypeError(f"{record.__name__} has no {', '.join(sorted(unknown))}")
-    return record(**{name: given[name] if name in given else _zeros(record, name, kind, sizes)
-                     for name, kind in _fields(record).items()})
+    return record(*(given[name] if name in given else make()
+                    for name, make in _makers(record, frozenset(sizes.items())).items()))
 
 
-def _zeros(record: Any, name: str, kind: Any, sizes: Mapping[Size, int]) -> Any:
+@cache
+def _makers(record: Any, sizes: frozenset[tuple[Size, int]]) -> dict[str, Callable[[], Any]]:
+    """What makes the zeros of each field."""
+    return {name: _maker(record, name, kind, dict(sizes))
+            for name, kind in _fields(record).items()}
+
+
+def _maker(record: Any, name: str, kind: Any, sizes: Mapping[Size, int]) -> Callable[[], Any]:
     if is_record(kind):
-        return allocate(kind, sizes)
+        return partial(allocate, kind, sizes)
     if get_origin(kind) is not Annotated:
-        return kind()
+        return partial(kind)
     entries, *axes = get_args(kind)
     shape = [_length(axis, sizes) for axis in axes]
     if None in shape:
-        raise TypeError(f"the shape {axes} of {record.__name__}.{name} does not follow from sizes")
-    return np.zeros(shape, dtype=_ENTRIES[entries].name)
+        return partial(_refuse, f"the shape {axes} of {record.__name__}.{name} does not follow "
+                                f"from sizes")
+    return partial(np.zeros, shape, _ENTRIES[entries].name)
+
+
+def _refuse(why: str) -> None:
+    raise TypeError(why)
 
 
 def shapes(sizes: Mapping[Size, int], *records: Any) -> dict[Any, dict[str, Any]]:
