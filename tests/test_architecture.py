@@ -91,3 +91,40 @@ def test_imports_are_absolute_and_found_by_this_test():
                 if isinstance(node, ast.ImportFrom) and node.level]
     assert not relative
     assert sum(map(len, arrows().values())) > 800
+
+
+COMPILERS = {"helper", "routine", "borrowing", "overload", "event", "signal", "normal_law",
+             "friction_law", "memory_friction_law", "planar_friction_law", "ground_profile",
+             "ground_surface"}
+
+
+def name_of(node: ast.expr) -> str:
+    return ast.unparse(node.func if isinstance(node, ast.Call) else node)
+
+
+def untyped(node: ast.AST, known: frozenset[str]) -> Iterator[str]:
+    """Functions without types that are not ``known`` to be parts of compiled ones."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.FunctionDef):
+            yield from untyped(child, known)
+            continue
+        given = child.args
+        entries = [*given.posonlyargs, *given.args, *given.kwonlyargs]
+        if isinstance(node, ast.ClassDef) and entries and entries[0].arg in ("self", "cls"):
+            entries = entries[1:]
+        entries += [one for one in (given.vararg, given.kwarg) if one is not None]
+        if (child.returns is not None or child.name == "__init__") and all(
+                entry.annotation is not None for entry in entries):
+            yield from untyped(child, known)
+        elif child.name not in known and not COMPILERS & set(map(name_of, child.decorator_list)):
+            yield child.name
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_functions_without_types_are_parts_of_compiled_ones(module):
+    """The type checker lets them pass; they are decorated, or handed to what compiles them."""
+    handed = frozenset(
+        one.id for node in ast.walk(tree(module)) if isinstance(node, ast.Call | ast.Tuple)
+        for one in (node.args if isinstance(node, ast.Call) else node.elts)
+        if isinstance(one, ast.Name))
+    assert not list(untyped(tree(module), handed))

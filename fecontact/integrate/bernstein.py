@@ -21,6 +21,7 @@ from math import comb
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.types import Array
 
 # Resolution within a step, and the depth of bisection that reaches it plus two.
 FINEST = 2.0**-46
@@ -194,7 +195,7 @@ def largest(b):
     return most
 
 
-def fit(places):
+def fit(places: Array) -> Array:
     """Matrix from values at n + 1 distinct points to Bernstein coefficients."""
     degree = len(places) - 1
     return np.ascontiguousarray(np.linalg.inv(np.array(
@@ -202,7 +203,7 @@ def fit(places):
          for s in places])))
 
 
-def of_nested(degree):
+def of_nested(degree: int) -> Array:
     """Bernstein coefficients, row by row, of 1, s, s (1 - s), s^2 (1 - s), s^2 (1 - s)^2, ...
 
     These are what :func:`from_nested` sums up.

@@ -104,7 +104,7 @@ SPEEDS_AT, PLACES_AT = (
 
 def _to_bernstein() -> Array:
     s = np.linspace(0.0, 1.0, PLACE_TERMS)
-    matrix = bernstein.fit(s)  # type: ignore[no-untyped-call]
+    matrix = bernstein.fit(s)
     return np.ascontiguousarray(matrix @ np.vander(2.0 * s - 1.0, PLACE_TERMS, True))
 
 
