@@ -111,3 +111,52 @@ def test_fades_on_stops(seed, damping):
     assert run.energies.imbalance < 1e-6
     penetration = system.contact_history(run.time, run.states)[:, :, kernels.PENETRATION]
     assert penetration.max() < 1e-9 * np.abs(start).max()
+
+
+def on_the_edge(seed, side):
+    """Stops that the load would just reach, a last digit nearer or farther, and a small speed."""
+    rng = np.random.default_rng(seed + 10**6)
+    m, n, tangent = [(1, 1, 0), (2, 1, 1), (4, 2, 1), (2, 1, 0), (3, 2, 0), (2, 2, 0),
+                     (4, 2, 1)][rng.integers(7)]
+    spring = rng.standard_normal((m, m))
+    stiffness = spring @ spring.T * 10 ** rng.uniform(0, 6)
+    dashpot = rng.standard_normal((m, m))
+    damping = dashpot @ dashpot.T * 10 ** rng.uniform(-2, 2) * (rng.random() < 0.7)
+    rows = [[rng.standard_normal(m) * tangent, rng.standard_normal(m), np.zeros(m)]
+            for _ in range(n)]
+    basis = fc.basis_from_matrices(np.eye(m), stiffness, {"contact": rows, "C": rows[0]},
+                                   damping=damping)
+    load = rng.choice([0.0, 1.0, 50.0])
+    normal = np.array([row[1] for row in rows])
+    start = np.linalg.solve(stiffness, -normal[0] * load)
+    gap = np.maximum(-normal @ start, 0.0)
+    gap = np.maximum(np.nextafter(gap, side * np.inf) if side else gap, 0.0)
+    rng.integers(-1, 2)
+    free = np.eye(m) - np.linalg.pinv(normal) @ normal
+    rate = free @ rng.standard_normal(m) * 10.0 ** rng.integers(-4, 1) * (rng.random() < 0.5)
+    if rng.random() < 0.6:
+        rate += np.linalg.pinv(normal) @ (rng.choice([-1, 0, 1], n) * 1e-3)
+    system = fc.ContactSystem(basis, normal=LinearContact(1e6, 0.0), load=fc.Load(load),
+                              friction=ConstantFriction(0.3 * tangent), gap=gap)
+    return system, np.append(start, rate), rng.choice([0.0, 0.5])
+
+
+@pytest.mark.parametrize("side", [-1, 0, 1])
+@pytest.mark.parametrize("seed", [185, 206, 298, 329, 574, 636, 673, 721, 798, 980])
+def test_starts_where_the_load_just_reaches(seed, side):
+    """Forces within the rounding of their terms neither open stops nor start slip."""
+    system, start, restitution = on_the_edge(seed, side)
+    calls = []
+
+    def few_calls(time):
+        calls.append(time)
+        assert len(calls) < 200, f"crawls at t = {time:.9g} s"
+
+    run = fc.simulate(system, 1.0, initial=start, outputs=101, progress=few_calls,
+                      solver=SetValued(restitution=restitution))
+    assert run.status is Status.FINISHED
+    assert run.statistics["events"] < 3000
+    # Ten times the relative tolerance.
+    assert run.energies.imbalance < 1e-5
+    heights = run.states[:, : system.basis.modes] @ system.arrays.Ty.T + system.arrays.gap
+    assert heights.min() > -1e-12
