@@ -168,7 +168,7 @@ def _first_state(motion: Motion, progress: Progress, room: Room, t: float) -> No
     phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
     d = 2 * motion.modes
     heights = motion.observed(np.array([t]), progress.state[None, :d], phase)[0][0]
-    for flags in (room.released, room.arrived, room.returned, room.touched, room.parting):
+    for flags in (room.released, room.arrived, room.touched, room.parting):
         flags[:] = False
     if motion.problem.rigid:
         scale = float(motion.sizes[: motion.modes].max())
@@ -192,7 +192,7 @@ def _decided(
     d, event, k = 2 * motion.modes, phase.event, motion.clusters
     progress.state[:d] = state
     progress.status[:], progress.closed[:] = phase.arrays
-    for flags in (room.released, room.arrived, room.returned, room.touched, room.parting):
+    for flags in (room.released, room.arrived, room.touched, room.parting):
         flags[:] = False
     if event < 2 * k:
         c = event // 2

@@ -41,8 +41,6 @@ _SWEEPS = 2000
 # What is left of the conditions in a solution, and the difference between two that are not the
 # same, relative to the largest terms.
 _RESIDUAL, _APART = 1e-13, 1e-6
-# Rounding of accelerations or velocities relative to their terms, and numbers that are zero.
-_ROUNDING, _NOTHING = 2e-15, 1e-290
 # Accelerations or velocities that are the same, relative to the terms of b.
 _SAME = 1e-10
 
@@ -170,12 +168,6 @@ def _solve_case(c, case):
             x[n + d] = case.mode[d] * _limit(d, c.slipping, c, x)
 
 
-@helper
-def _slack(r, largest, c):
-    """Rounding of force or impulse r, of which the ``largest`` is known, and that of b."""
-    return _RESIDUAL * largest + (_ROUNDING * c.size + _NOTHING) / c.matrix[r, r]
-
-
 @routine
 def _holds(c, sticking, case):
     """Whether x and y of a case meet the conditions; fills y."""
@@ -186,22 +178,21 @@ def _holds(c, sticking, case):
         if not math.isfinite(x[r]):
             return False
         largest = max(largest, abs(x[r]))
-    rest, sense = _RESIDUAL * size + _NOTHING, _ROUNDING * size + _NOTHING
+    slack, rest = _RESIDUAL * largest, _RESIDUAL * size
     holds = True
     for j in range(n):
         if c.touching[j]:
             if case.pressed[j]:
-                slack = _slack(j, largest, c)
                 holds = holds and x[j] >= c.least[j] - slack and abs(y[j]) <= rest
             else:
-                holds = holds and y[j] >= -sense
+                holds = holds and y[j] >= -rest
     for d in range(len(c.mode)):
         if c.mode[d] == STICK:
             if case.mode[d] == STICK:
-                limit = _limit(d, sticking, c, x) + _slack(n + d, largest, c)
-                holds = holds and abs(x[n + d]) <= limit and abs(y[n + d]) <= rest
+                limit = _limit(d, sticking, c, x)
+                holds = holds and abs(x[n + d]) <= limit + slack and abs(y[n + d]) <= rest
             elif case.mode[d] != OPEN:
-                holds = holds and case.mode[d] * y[n + d] <= sense
+                holds = holds and case.mode[d] * y[n + d] <= rest
     return holds
 
 
@@ -325,7 +316,7 @@ def _try_all(c, sticking, first_only, trial, case):
             for r in range(len(trial.x)):
                 apart = max(apart, c.matrix[r, r] * abs(trial.x[r] - case.x[r]))
                 scale = max(scale, c.matrix[r, r] * max(abs(trial.x[r]), abs(case.x[r])))
-            if apart > max(_APART * scale, _SAME * c.size) + _NOTHING:
+            if apart > max(_APART * scale, _SAME * c.size):
                 found = 2
                 break
     return found

@@ -109,7 +109,7 @@ def _start(t, p, limits, progress, w, room):
     largest = progress.largest
     derivative(t, progress.state, p, progress.status, progress.closed, w, room.rate)
     for c in range(len(p.rows)):
-        room.released[c] = room.arrived[c] = room.returned[c] = False
+        room.released[c] = room.arrived[c] = False
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
     if p.rigid != 0:
         for j in range(len(p.cluster)):
@@ -270,7 +270,6 @@ def _mark_clusters(again, p, progress, w, room):
         past = room.past[c]
         room.released[c] = past and status[c] == STICK and w.pressing[c] > 0.0 and not again
         room.arrived[c] = past and (status[c] == 1 or status[c] == -1)
-        room.returned[c] = room.arrived[c] and again and room.fresh[c]
         if room.released[c]:
             status[c] = 1 if w.total[c] > 0.0 else -1
 

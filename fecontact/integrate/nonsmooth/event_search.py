@@ -89,8 +89,6 @@ class Room(NamedTuple):
         move.
     released, arrived, held : (k,) boolean arrays
         Clusters that reach the limit of stick, that come to rest, and that stick.
-    returned : (k,) boolean array
-        Clusters whose slip has begun from no slip velocity and ends at once: there is none.
     gaining : (k,) array
         Slip velocities in the sense of the status, above which clusters whose slip velocity grows
         go on slipping through an event of others; infinite for other clusters.
@@ -123,7 +121,6 @@ class Room(NamedTuple):
     released: Annotated[Flags, CLUSTERS]
     arrived: Annotated[Flags, CLUSTERS]
     held: Annotated[Flags, CLUSTERS]
-    returned: Annotated[Flags, CLUSTERS]
     gaining: Annotated[Array, CLUSTERS]
     touched: Annotated[Flags, NODES]
     parting: Annotated[Flags, NODES]

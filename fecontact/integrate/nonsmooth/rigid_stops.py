@@ -40,7 +40,6 @@ from fecontact.integrate.nonsmooth.equations import (
     derivative,
     force_size,
     held_row,
-    place_size,
     pushing_row,
     slipping_force,
     solve_small,
@@ -70,7 +69,6 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
 from fecontact.integrate.nonsmooth.steps.rates import set_prescribed
-from fecontact.integrate.nonsmooth.transitions import set_gaining
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
@@ -219,16 +217,12 @@ def _omit_fixed(status, conditions):
 def _strike(t, touching, p, progress, w):
     """Change q' by the impact of the touching nodes, as w sees them; whether it was solved.
 
-    Open nodes at a distance within rounding touch if the impact presses them. Its losses go to the
-    works of normal damping and friction; that of friction never falls.
+    Its losses go to the works of normal damping and friction; that of friction never falls.
     """
     s, Y = p.system, progress.state
     n, m = s.Tx.shape
     k = len(p.rows)
-    near = touching.copy()
-    for j in range(n):
-        near[j] = near[j] or -w.nodes[j, PENETRATION] <= ROUNDING * place_size(j, Y, p)
-    conditions, case = _conditions(near, np.abs(Y[m : 2 * m]), p, w), new_case(n, k)
+    conditions, case = _conditions(touching, np.abs(Y[m : 2 * m]), p, w), new_case(n, k)
     _omit_fixed(progress.status, conditions)
     given, x = conditions.given, np.zeros(n + k)
     # An impact knows one coefficient, whether its contact sticks or slips.
@@ -248,8 +242,6 @@ def _strike(t, touching, p, progress, w):
         if not solve_conditions(conditions, case):
             return False
         x += case.x
-    for j in range(n):
-        touching[j] = touching[j] or x[j] > 0.0
 
     speed, first = ground_motion(t, s).speed, 2 * m
     energy, lost = 0.0, 0.0
@@ -285,6 +277,21 @@ def _strike(t, touching, p, progress, w):
     if lost < -_GAIN * energy:
         progress.counts[GAINED] += 1
     return True
+
+
+@routine
+def _set_gaining(t, p, progress, room, w, out):
+    """Fill ``room.gaining`` from w and Y' in ``out`` before contacts change."""
+    s, Y, status = p.system, progress.state, progress.status
+    m = p.rows.shape[1]
+    speed, ground = ground_motion(t, s).speed, speed_rate(t, p)
+    for c in range(len(p.rows)):
+        size, gain = abs(p.sliding[c] * speed), -p.sliding[c] * ground
+        for i in range(m):
+            size += abs(p.rows[c, i] * Y[m + i])
+            gain += p.rows[c, i] * out[m + i]
+        slips = (status[c] == 1 or status[c] == -1) and not (room.released[c] or room.arrived[c])
+        room.gaining[c] = ROUNDING * size if slips and status[c] * gain > 0.0 else math.inf
 
 
 @routine
@@ -366,7 +373,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
         status[c] = OPEN
         for j in range(n):
             if closed[j] and p.cluster[j] == c:
-                status[c] = STICK if room.returned[c] else case.mode[c]
+                status[c] = case.mode[c]
         room.fresh[c] = room.fresh[c] and (status[c] == 1 or status[c] == -1)
         # What begins to slip does so from no slip velocity.
         before[c] = STICK if room.fresh[c] else status[c]
@@ -389,8 +396,7 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
     An approach at a penetration rate within rounding is stopped, but is no impact;
     ``room.touched`` tells afterwards which nodes had one.
     ``room.parting`` nodes were closed and lift off, ``room.released`` clusters begin to slip in the
-    sense of their status, ``room.arrived`` ones have come to rest; HELD stops that rest close and
-    ``room.returned`` clusters stick.
+    sense of their status, ``room.arrived`` ones have come to rest; HELD stops that rest close.
     After an impact, stops whose penetration rate is below ``slow``, or whose rebound is lower than
     the rounding of the ``height`` [m] or shorter than the time ``brief`` [s], close if a force
     presses them. Returns the longest flight that a rebound may take [s], infinite if none,
@@ -400,7 +406,7 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
     n = len(p.cluster)
     touching = np.zeros(n, np.bool_)
     derivative(t, Y, p, status, closed, w, out)
-    set_gaining(t, p, progress, room, w, out)
+    _set_gaining(t, p, progress, room, w, out)
     near = max(largest[SLIP_SIZE], largest[RATE_SIZE])
     for c in range(len(p.rows)):
         near = max(near, abs(w.slip[c]))

@@ -9,11 +9,9 @@ A touch-down is decided by its event. The state there has a penetration of zero 
 either sign; :func:`press` moves it to the side on which the normal law acts.
 """
 
-import math
-
 import numpy as np
 
-from fecontact.core.compiled import helper, routine
+from fecontact.core.compiled import helper
 from fecontact.integrate.nonsmooth.equations import (
     derivative,
     place_size,
@@ -22,7 +20,6 @@ from fecontact.integrate.nonsmooth.equations import (
 )
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, pressed
 from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, PENETRATION, RATE, SLOPE, STICK
-from fecontact.system.nodes import ground_motion
 
 SWEEPS = 20000
 # Rounding of a time relative to it or to the longest step, in which a problem has so many ticks.
@@ -110,30 +107,14 @@ def press(t, p, touched, w, Y):
             depth *= 4.0
 
 
-@routine
-def set_gaining(t, p, progress, room, w, out):
-    """Fill ``room.gaining`` from w and Y' in ``out`` before contacts change."""
-    s, Y, status = p.system, progress.state, progress.status
-    m = p.rows.shape[1]
-    speed, ground = ground_motion(t, s).speed, speed_rate(t, p)
-    for c in range(len(p.rows)):
-        size, gain = abs(p.sliding[c] * speed), -p.sliding[c] * ground
-        for i in range(m):
-            size += abs(p.rows[c, i] * Y[m + i])
-            gain += p.rows[c, i] * out[m + i]
-        slips = (status[c] == 1 or status[c] == -1) and not (room.released[c] or room.arrived[c])
-        room.gaining[c] = ROUNDING * size if slips and status[c] * gain > 0.0 else math.inf
-
-
 @helper
 def decide_clusters(t, p, progress, room, near, w, out):
     """Set the status of all clusters at a moment at which some may change.
 
     ``room.released`` clusters have reached the limit of stick and slip in the sense of ``status``;
     those whose slip has ``arrived`` at its end, up to the error of the step, and others with a
-    slip velocity below ``near`` that does not grow stick or slip by their forces;
-    ``room.touched`` nodes touch down. ``room.fresh`` tells clusters that begin to slip from no slip
-    velocity. Fills ``out`` with Y'.
+    slip velocity below ``near`` stick or slip by their forces; ``room.touched`` nodes touch down.
+    ``room.fresh`` tells clusters that begin to slip from no slip velocity. Fills ``out`` with Y'.
     """
     clusters, m = p.rows.shape
     Y, status, closed = progress.state, progress.status, progress.closed
@@ -143,14 +124,12 @@ def decide_clusters(t, p, progress, room, near, w, out):
         press(t, p, room.touched, w, Y)
         room.touched[:] = False
         derivative(t, Y, p, status, closed, w, out)
-    set_gaining(t, p, progress, room, w, out)
     candidate, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
     for c in range(clusters):
         fresh[c] = False
         if status[c] == FIXED:
             continue
-        still = (status[c] == STICK or arrived[c]
-                 or (abs(w.slip[c]) <= near and not status[c] * w.slip[c] > room.gaining[c]))
+        still = status[c] == STICK or arrived[c] or abs(w.slip[c]) <= near
         if not w.pressing[c] > 0.0:
             status[c] = OPEN
         elif released[c]:

@@ -10,21 +10,12 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.bernstein import NOWHERE, fit
 from fecontact.integrate.nonsmooth.dop853 import interpolate
-from fecontact.integrate.nonsmooth.equations import (
-    force_size,
-    lifting_row,
-    set_limits,
-    sinking_row,
-)
-from fecontact.integrate.nonsmooth.problem import FORCE, GRIP, OPEN, STICK
+from fecontact.integrate.nonsmooth.equations import set_limits
+from fecontact.integrate.nonsmooth.problem import FORCE, OPEN, STICK
 from fecontact.integrate.nonsmooth.steps.rates import set_rates
 
 # Rounding of forces that come from a system of equations, relative to their size.
 _FORCE_ROUNDING = 1e-13
-# The same relative to the terms of which such forces are what is left.
-_TERM_ROUNDING = 1e-14
-# Squares of rows and sizes of forces that are zero.
-_NO_ROW, _NO_FORCE = 1e-300, 1e-280
 # Forces are looked at in quarters of a part of the step.
 QUARTERS = 4
 _FIT_QUARTERS = fit(np.arange(QUARTERS + 1) / QUARTERS)
@@ -74,40 +65,6 @@ def _forces(part, step, p, progress, w, room, out):
     set_rates(min(step.t + part * step.h, step.latest), room.state, p, progress, w, room,
               room.rate)
     set_left(p, progress, w, out)
-
-
-@routine
-def _set_sizes(p, progress, w, room):
-    """Fill ``room.scale`` with the sizes of forces whose rounding is that of their terms.
-
-    The limit of stick of a cluster is as uncertain as the forces of its stops.
-    """
-    s, status, closed, size = p.system, progress.status, progress.closed, room.scale
-    clusters = len(p.rows)
-    size[:] = _NO_FORCE
-    for i in range(p.rows.shape[1]):
-        terms = _TERM_ROUNDING / _FORCE_ROUNDING * force_size(i, progress.state, room.pushes, s)
-        for k in range(clusters):
-            if status[k] == STICK:
-                size[k] += abs(p.rows[k, i]) * terms
-        for j in range(len(closed)):
-            if closed[j]:
-                size[2 * clusters + j] += abs(sinking_row(j, i, w, s)) * terms
-    for k in range(clusters):
-        own = 0.0
-        for i in range(p.rows.shape[1]):
-            own += p.rows[k, i] * p.rows[k, i]
-        size[k] /= max(own, _NO_ROW)
-    for j in range(len(closed)):
-        if closed[j]:
-            own = 0.0
-            for i in range(p.rows.shape[1]):
-                own += sinking_row(j, i, w, s) * lifting_row(j, i, w, s)
-            size[2 * clusters + j] /= max(own, _NO_ROW)
-            if status[p.cluster[j]] == STICK:
-                size[p.cluster[j]] += abs(w.nodes[j, GRIP]) * size[2 * clusters + j]
-    for k in range(clusters):
-        size[clusters + k] = size[k]
 
 
 @helper
@@ -196,7 +153,7 @@ def _lowest(begin, width, step, p, progress, w, room):
 def first_let_go(end, step, p, progress, w, room):
     """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
     left, size, known = room.left, room.scale, holding(progress)
-    _set_sizes(p, progress, w, room)
+    size[:] = 0.0
     room.waiting[0, 0], room.waiting[0, 1], waiting = 0.0, end, 1
     while waiting > 0:
         begin, width = room.waiting[waiting - 1, 0], room.waiting[waiting - 1, 1]
