@@ -103,9 +103,12 @@ class ContactMotion:
         Raises
         ------
         InputError
-            For nodes that do not exist, and for runs with rigid stops, where impacts are
-            instantaneous.
+            For nodes that do not exist, for systems without contact nodes, and for runs with rigid
+            stops, where impacts are instantaneous.
         """
+        if not trajectory.system.basis.contact_nodes:
+            raise InputError("The system has no contact nodes, so that its run has no contact "
+                             "phases.")
         held = trajectory.held_normal_force
         if held is not None:
             system = trajectory.system

@@ -8,6 +8,7 @@ import numpy as np
 from fecontact.analysis.histories import point_name
 from fecontact.analysis.periodicity import Steadiness, drive_period, steadiness
 from fecontact.analysis.sampling import alias_message
+from fecontact.analysis.spectra import FEWEST_PERIODS
 from fecontact.analysis.summaries import RUN_SUMMARIES, Point, usual_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
@@ -33,7 +34,7 @@ class KeyNumbers:
     interval : (float, float)
         Time over which the values are taken [s].
     titles : mapping of name to text
-        Names for display.
+        Names for display, also of frequencies that the interval is too short to tell.
     drive_period : float or None
         Period of the drive [s].
     """
@@ -51,8 +52,9 @@ class KeyNumbers:
     def rows(self) -> list[tuple[str, str]]:
         """Names and values with units as text, and the state of the motion."""
         return [("steady", self.motion), *(
-            (self.titles[name], quantity(value, self.unit(name), 4))
-            for name, value in self.values.items())]
+            (title, quantity(self.values[name], self.unit(name), 4) if name in self.values
+             else f"fewer than {FEWEST_PERIODS:g} periods; run for longer")
+            for name, title in self.titles.items())]
 
     @property
     def motion(self) -> str:
@@ -82,8 +84,8 @@ def key_numbers(
     Dominant frequency (largest peak of the velocity spectrum), amplitudes (half the range) of
     points in each direction, mean and peak of the total normal and friction forces, of several
     interfaces of each, mean power lost by friction. Without friction its numbers are left out.
-    Frequencies need even output times; without them, and of points that do not move, they are left
-    out.
+    Frequencies need even output times and five periods; without them, and of points that do not
+    move, they are left out.
 
     Parameters
     ----------
@@ -115,8 +117,11 @@ def key_numbers(
             if bare == "dominant_frequency":  # uneven or too few output times
                 return
             raise
-        if np.isfinite(value):
-            values[name], titles[name] = value, title
+        if not np.isfinite(value):
+            return
+        titles[name] = title
+        if bare != "dominant_frequency" or value * np.ptp(late.time) >= FEWEST_PERIODS:
+            values[name] = value
 
     found = steadiness(trajectory)
     chosen = tuple(points) or (usual_point(trajectory.system.basis),)
@@ -133,7 +138,7 @@ def key_numbers(
     largest = max((values[name] for name in amplitudes), default=0.0)
     for name in amplitudes:
         if values[name] <= _STILL * largest < largest:
-            del values[name]
+            del values[name], titles[name]
     if basis.contact_nodes:
         faces = [face.name for face in contact_faces(basis) if face.name]
         rubbing = bool(trajectory.friction_forces.any())

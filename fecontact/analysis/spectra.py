@@ -13,7 +13,7 @@ from fecontact.core.types import Array, ArrayLike
 
 _EVEN = 1e-6  # largest deviation of times from even spacing, relative to the spacing
 # Fewest periods of the mean frequency in a window, and those in a window by default.
-_FEWEST, _USUAL = 5.0, 10.0
+FEWEST_PERIODS, _USUAL = 5.0, 10.0
 
 
 class Peak(NamedTuple):
@@ -301,11 +301,11 @@ def mean_frequency(time: Array, values: Array) -> float:
 def require_periods(t: Array, x: Array, window: float) -> None:
     """Refuse a window [s] of fewer than five periods of the mean frequency of a history."""
     frequency = mean_frequency(t, x)
-    if 0.0 < window * frequency < _FEWEST:
+    if 0.0 < window * frequency < FEWEST_PERIODS:
         raise InputError(f"A spectrum: a window of {window:.4g} s has {window * frequency:.2g} "
                          f"periods of the mean frequency of the history, {frequency:.4g} Hz, but "
-                         f"needs {_FEWEST:g}; run for longer, or take windows of at least "
-                         f"{_FEWEST / frequency:.4g} s.")
+                         f"needs {FEWEST_PERIODS:g}; run for longer, or take windows of at least "
+                         f"{FEWEST_PERIODS / frequency:.4g} s.")
 
 
 def _piece(t: Array, x: Array, piece: float | None, parts: float) -> int:

@@ -34,7 +34,7 @@ SMALL_ANGLE = 0.1
 
 # Plausible ranges: extents of bodies [m], Young's moduli [Pa], densities [kg/m^3]. Largest friction
 # coefficient, roughness as a part of the body, speed of the ground [m/s], gap in extents of the
-# body, and duration in periods of the fastest mode.
+# body, and duration in periods of the fastest mode or excitation.
 SIZES, MODULI, DENSITIES = (1e-4, 5.0), (1e6, 2e12), (1.0, 25000.0)
 FRICTION, ROUGHNESS, SPEED, GAP, PERIODS = 2.0, 0.01, 100.0, 100.0, 1e6
 
@@ -256,11 +256,15 @@ def _ground(planned: Planned) -> Iterator[str]:
 
 
 def _duration(planned: Planned) -> Iterator[str]:
-    """Duration in periods of the fastest mode."""
-    highest = float(planned.system.basis.frequencies_hz.max())
-    if planned.duration * highest > PERIODS:
-        yield (f"it lasts {planned.duration * highest:.2g} periods of the fastest mode, "
-               f"{highest:.4g} Hz, and will take long; end it earlier, or keep fewer modes.")
+    """Duration in periods of the fastest mode and of the fastest excitation."""
+    system, duration = planned.system, planned.duration
+    for what, highest, remedy in (
+            ("mode", float(system.basis.frequencies_hz.max()), "keep fewer modes"),
+            ("of drive, loads, ground and waves", 1.0 / system.shortest_period(0.0, duration),
+             "lower that frequency")):
+        if duration * highest > PERIODS:
+            yield (f"it lasts {duration * highest:.2g} periods of the fastest {what}, "
+                   f"{highest:.4g} Hz, and will take long; end it earlier, or {remedy}.")
 
 
 def _unheld(planned: Planned) -> Iterator[str]:

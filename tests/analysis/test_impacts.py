@@ -198,6 +198,15 @@ def test_nodes_that_do_not_exist():
         find_impacts(bouncing(outputs=301), 1)
 
 
+def test_systems_without_contact_have_no_impacts():
+    linear = ContactSystem(basis_from_matrices([[1.0]], [[1.0]], {"B": [[0.0], [1.0], [0.0]]}))
+    run = simulate(linear, 1.0, initial=[1e-3, 0.0], outputs=11)
+    with pytest.raises(InputError, match="has no contact nodes"):
+        find_impacts(run)
+    with pytest.raises(InputError, match="has no contact nodes"):
+        find_rests(run, longer_than=0.1)
+
+
 def test_contacts_that_never_open_have_no_impacts():
     run = simulate(ball(BilateralCubic(1e5, 1e9)), 0.05, initial=state(1e-4, 0.0), outputs=101)
     with pytest.raises(InputError, match="contact node 0 presses and pulls"):

@@ -52,6 +52,18 @@ def test_key_numbers_of_a_harmonic_motion():
     assert found.interval == (0.5, 1.0)
 
 
+def test_frequencies_need_five_periods():
+    """The second half of the run has 4.5 or 5.5 periods."""
+    for hertz, told in ((9.0, False), (11.0, True)):
+        run = moved(lambda t, w=TURN * hertz: np.cos(w * t),
+                    lambda t, w=TURN * hertz: -w * np.sin(w * t))
+        found = key_numbers(run, ["B"])
+        assert ("dominant_frequency@B" in found.values) is told
+        row = dict(found.rows())["dominant frequency at B"]
+        assert row.endswith("Hz") is told
+        assert ("fewer than 5 periods" in row) is not told
+
+
 def test_a_subharmonic_has_its_own_period():
     run = moved(lambda t: np.sin(TURN * 60.0 * t) + 0.2 * np.sin(TURN * 20.0 * t),
                 lambda t: TURN * (60.0 * np.cos(TURN * 60.0 * t)

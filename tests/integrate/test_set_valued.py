@@ -23,6 +23,7 @@ from fecontact.laws import (
     Constant,
     ConstantFriction,
     ExponentialFriction,
+    Frictionless,
     HyperbolicFriction,
     LinearContact,
     LuGreFriction,
@@ -294,6 +295,19 @@ def test_options_are_checked(options, message):
     system = block(friction=ConstantFriction(0.5), load=Load(1.0))
     with pytest.raises(InputError, match=message):
         simulate(system, 1.0, initial=start(system, 0.0), outputs=3, solver=SetValued(**options))
+
+
+@pytest.mark.parametrize("scheme", ["events", "stepping"])
+def test_bodies_without_friction_swing_on(scheme):
+    """A mass on a spring that is pressed on a belt: cos(w t), whatever moves below it."""
+    rows = [[1.0], [0.0], [0.0]]
+    system = ContactSystem(
+        basis_from_matrices([[1.0]], [[9.0]], {"contact": [rows]}), normal=PrescribedForce(10.0),
+        friction=Frictionless(), ground=Ground(speed=0.5))
+    run = simulate(system, 5.0, initial=[1.0, 0.0], outputs=51, rtol=1e-9,
+                   solver=SetValued(scheme=scheme))
+    assert run.states[:, 0] == pytest.approx(np.cos(3.0 * run.time), abs=1e-5)
+    assert not run.friction_force.any()
 
 
 def test_friction_with_memory_has_no_set_valued_limit():

@@ -562,7 +562,9 @@ def test_a_decimal_comma_is_recognised(tiny):
     ({"ground.speed": 1000.0}, r"ground\.speed = 1e\+03 m/s is above 100 m/s"),
     ({"gap": 50.0}, "no contact can close: the smallest gap is 50 m"),
     ({"gap": 50.0, "simulation.t_end": 2.0}, "smallest gap of 50 m is more than 100 times"),
-    ({"simulation.t_end": 1e5}, "periods of the fastest mode")])
+    ({"simulation.t_end": 1e5}, "periods of the fastest mode"),
+    ({"drive.amplitude_x": 1e-6, "drive.stiffness_x": 1.0, "drive.angular_frequency": 1e11},
+     r"lasts 1\.6e\+07 periods of the fastest of drive")])
 def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
     found, = implausible(tiny.with_(**changes))
     assert re.search(message, found)

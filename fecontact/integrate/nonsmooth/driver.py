@@ -23,6 +23,7 @@ from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_kernels import FOUND
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
+from fecontact.laws.friction.stribeck import Frictionless
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import POWER_COUNT
 
@@ -322,6 +323,8 @@ def by_events(
 
 
 def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
+    if isinstance(law, Frictionless):
+        return law
     if law.memory or "smoothing_slope" not in (entry.name for entry in fields(law)):
         raise InputError(f"{type(law).__name__} has no smoothing_slope that could become infinite; "
                          f"set-valued friction needs a law with one, without memory.")
