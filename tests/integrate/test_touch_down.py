@@ -13,7 +13,7 @@ from scipy.linalg import expm
 import fecontact as fc
 from fecontact import Status
 from fecontact.integrate import ContactEvents, SetValued
-from fecontact.laws import ConstantFriction, LinearContact, RoughSurface
+from fecontact.laws import ConstantFriction, LinearContact, PrescribedForce, RoughSurface
 
 GAP, WEIGHT, STIFFNESS = 10e-3, 9.81, 1e7
 
@@ -88,6 +88,39 @@ def test_touch_down_of_a_rubbing_mass_agrees_with_the_closed_form():
     assert run.events.states[1, 3] == pytest.approx(speed, rel=1e-6)
     impulse = 2.0 * speed + WEIGHT * (run.events.time[1] - fall)
     assert run.states[-1, 2] == pytest.approx(1.0 - mu * impulse, rel=1e-8)
+
+
+def test_motion_along_the_ground_by_rounding_alone_does_not_stop_runs():
+    """Coulomb's oscillator turns twelve times and loses 2 R / k each time; the other mode swings.
+
+    Its component of the slip of 4e-14 is passed over.
+    """
+    force, stiffness, turns = 0.1, 9.0, np.arange(13)
+    rows = np.array([[1.0, 4e-14], [0.0, 0.0], [0.0, 0.0]])
+    system = fc.ContactSystem(
+        fc.basis_from_matrices(np.eye(2), np.diag([stiffness, 1e4]), {"contact": [rows]}),
+        normal=PrescribedForce(1.0), friction=ConstantFriction(force, 1e3))
+    run = fc.simulate(system, 4.0 * np.pi, initial=[2.0, 1.0, 0.0, 0.0], rtol=1e-9,
+                      outputs=turns * np.pi / 3.0, solver=SetValued())
+    assert run.status is Status.FINISHED
+    expected = (-1.0) ** turns * (2.0 - 2.0 * turns * force / stiffness)
+    assert run.modal_coordinates[:, 0] == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("nodes", [3, 4])
+def test_a_free_beam_falls_on_the_ground(nodes):
+    """By symmetry its middle node moves along x in half of the modes, in the others by rounding."""
+    body = fc.ElasticBody(fc.generate(fc.Beam(0.2, 0.01)), fc.Material.named("steel"), 0.02)
+    basis = fc.modal_basis(body, 8, contact_nodes=nodes, C=fc.Patch("C", 0.01), damping=0.02)
+    system = fc.ContactSystem(basis, normal=LinearContact(1e7, damping=300.0), gap=2e-4,
+                              friction=ConstantFriction(0.3, 1e4), load=fc.Load(20.0))
+    rng = np.random.default_rng(1)
+    for _ in range(4):
+        start = np.zeros(16)
+        start[8:11] = 0.05 * rng.normal(size=3)
+        run = fc.simulate(system, 0.04, initial=start, outputs=3, solver=SetValued())
+        assert run.status is Status.FINISHED
+        assert run.energies.imbalance < 1e-3
 
 
 @pytest.mark.parametrize("side", [-1, 0, 1])

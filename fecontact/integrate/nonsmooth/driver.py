@@ -285,6 +285,8 @@ def nonsmooth_problem(
         cluster, rows = np.arange(n), arrays.Tx
     else:
         cluster, rows = _clusters(arrays.Tx, arrays.sliding)
+        # Nodes slip exactly as their cluster does.
+        arrays = arrays._replace(Tx=rows[cluster])
     sliding = np.zeros(len(rows))
     sliding[cluster] = arrays.sliding
     ground = system.ground
