@@ -75,7 +75,8 @@ def test_elastic_elements_in_space_where_the_normal_force_vanishes(systems, numb
 
 
 @pytest.mark.parametrize(
-    ("number", "begin", "end"), [(8, 0.025, 0.03), (8, 0.105, 0.11), (78, 0.02, 0.03)])
+    ("number", "begin", "end"), [(8, 0.025, 0.03), (8, 0.105, 0.11), (78, 0.01, 0.015),
+                                 (78, 0.02, 0.03), (78, 0.12665, 0.127), (135, 0.002, 0.0025)])
 def test_derivatives_of_elastic_elements(systems, number, begin, end):
     """Exponential normal law on a wavy ground, and play, against central differences of runs."""
     case = systems.random_case(number)

@@ -23,6 +23,7 @@ from fecontact.laws.base import NormalLaw
 from fecontact.laws.signatures import normal_at
 from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import slider_counts
 
 # Parts of the penetration scale: how far from a level forces are looked at, within what an event is
 # at a level, and by what nodes are moved for derivatives of their penetration.
@@ -148,6 +149,10 @@ def _passage(
 
     # Both sides up to the level.
     way = np.sign(rate) * near
+    if slider_counts(system)[node] and not system.contact_history(
+            np.array([time]), (middle - way)[None])[0, node, kernels.NORMAL_FORCE]:
+        # Elastic elements begin without deflection; in the open they have followed the slip.
+        middle[2 * m :].reshape(len(alone), -1)[node] = 0.0
     after, further = rates(middle + way), rates(middle + 2.0 * way)
     before, earlier = rates(middle - way), rates(middle - 2.0 * way)
     jump = 2.0 * after - further - (2.0 * before - earlier)

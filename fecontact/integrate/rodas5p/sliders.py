@@ -55,6 +55,9 @@ _PRECISION, _TRIALS = 1e-7, 50
 _BRIEFEST = 1e-12
 # Steps that end at a touch go past it by at most this many times what counts as the end.
 _PAST = 4.0
+# Least deflection of elements that slide since a touch, in parts of its scale: the shorter it is,
+# the faster they turn in space.
+_LEAST = 1e-4
 
 
 @routine
@@ -120,15 +123,20 @@ def _since_touch(j, contact, earlier, s):
 def _begin_contact(j, since, t, problem, progress, vary, force, rates):
     """Set the deflections of node j a time after its touch; True if any changes.
 
-    They are ``z = v since``, of which the part beyond the limit is the distance of slip.
+    They are ``z = v since``, of which the part beyond the limit is the distance of slip. It may be
+    longer by any amount.
     """
     s, y, changed = problem.system, progress.state, False
     count = problem.control.slider_counts[j]
     pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
-    z, along, across = memory_of(j, y, s), contact.slip * since, contact.slip_across * since
+    speed = np.hypot(contact.slip, contact.slip_across) if in_space(s) else abs(contact.slip)
+    z, scales = memory_of(j, y, s), problem.control.memory_scale
     for i in range(count):
         limit = limit_of(j, i, count, pressing, s)
-        first = 2 * i if in_space(s) else i
+        first, time = 2 * i if in_space(s) else i, since
+        if speed * since > limit:
+            time = max(since, _LEAST * scales[j * s.memory.max() + first] / speed)
+        along, across = contact.slip * time, contact.slip_across * time
         if z[first] == along and (not in_space(s) or z[first + 1] == across):
             continue
         if len(vary.variation.columns):
@@ -349,9 +357,11 @@ def _switch(step, problem, progress, room, vary):
                     place = _root(False, begun, part, min(middle, -1e-300), high, j, i, step,
                                   problem, progress, room, y, force, rates)
                     size = deflection_of(memory_of(j, progress.state, s), i, s)
-                    if look == 1 and middle > -0.5 * SHORT * size:
-                        # The last step ended just short of where slip begins.
-                        at_once[j, i] = True
+                    if look == 1 and middle >= -0.5 * SHORT * size:
+                        # The last step ended just short of where slip begins. Without deflection
+                        # and limit, at a touch, the element slides by itself.
+                        if size > 0.0:
+                            at_once[j, i], first = True, 0.0
                     elif place > near:
                         first = min(first, place)
         if first <= part:

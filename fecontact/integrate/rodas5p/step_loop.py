@@ -360,11 +360,11 @@ def advance(
     if counts[STARTED] == 0:
         _start(t, problem, progress, room, output, watch)
     set_ends(t, progress.state, s, problem.blocks, control.ground, room.ends)
-    new, attempts, exactly, again = True, 0, False, 0
+    new, fresh, attempts, exactly, again = True, True, 0, False, 0
     moved = ground_motion(t, s)
     while counts[OUTPUTS] < len(output.times):
         # A step that failed is repeated before the call returns: derivatives are not kept.
-        if new and (attempts >= most or (_watched(watch) and full(watch))):
+        if fresh and (attempts >= most or (_watched(watch) and full(watch))):
             break
         attempts += 1
         if new:
@@ -374,10 +374,10 @@ def advance(
             choose_near(h, problem, progress, room)
         step = _aim(t, h, exactly, smallest, moved, end, problem, progress, room)
         G = 1.0 / (step.h * tableau.GAMMA)
-        if new and control.sliders != 0:
+        if fresh and control.sliders != 0:
             attend_at(control.sliders)(BEGIN, step, problem, progress, room, vary, t, room.right)
         switched = _attempt(step, G, new, end, problem, progress, room)
-        new = False
+        new = fresh = False
 
         error, part = _error_at_end(step, end, problem, progress, room), 1.0
         if error <= 1.0:
@@ -430,7 +430,7 @@ def advance(
             numbers[TIME], numbers[STEP] = reached, step.h
             return STOPPED
         _go_on(step, problem, progress, room, output)
-        t, new, again = step.target, True, 0
+        t, new, fresh, again = step.target, True, True, 0
         h = next_length(step.h, root, control.longest, numbers)
         if step.caution > 0.0:
             numbers[CAUTIOUS] = step.caution

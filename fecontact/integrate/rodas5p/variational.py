@@ -29,7 +29,16 @@ from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.memory_saltation import switch_memory
 from fecontact.system.elastic_sliders import keep_sides, set_sides
-from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, SIZE, SystemArrays, ground_motion
+from fecontact.system.nodes import (
+    AXES,
+    MEMORY,
+    MODES,
+    NODES,
+    SIZE,
+    SystemArrays,
+    ground_motion,
+    memory_of,
+)
 
 # Parameters are moved by this part of their value for differences of the right-hand side.
 MOVE = 1e-5
@@ -251,6 +260,18 @@ def _largest_error(scale, v):
     return largest
 
 
+@helper
+def _leave_turns(y, progress, s, counts, here, inside):
+    """Let elastic elements of contacts that are open at the start y of a step turn as there.
+
+    In space they turn at once where the contact closes, which is at the end of the step; the next
+    one sets their deflections.
+    """
+    for j in range(len(counts)):
+        if counts[j] > 0 and progress.signs[j] == 0 and np.any(memory_of(j, y, s) != 0.0):
+            inside.rates[j] = here.rates[j]
+
+
 @kernel(by_address=True)
 def propagate(
     step: run_arrays.Step, problem: run_arrays.Problem, progress: run_arrays.Progress,
@@ -299,6 +320,8 @@ def propagate(
             if sliders:
                 keep_sides(moved, Y, s, counts, force, rates, sides)
             dynamics.set_gradients(Y, s, blocks, moved, v.nodes, v.inside)
+            if sliders:
+                _leave_turns(state, progress, s, counts, gradients, v.inside)
             columns.learn(v.inside, v.usual)
         if varies:
             _set_forced(tableau.TIME[i] * step.h, Y, stages[i], blocks, vary, forced)
