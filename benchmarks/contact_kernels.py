@@ -29,7 +29,8 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     """The same equations with numpy, all nodes at once."""
     s, m = system.arrays, system.basis.modes
     q, v = y[:m], y[m:]
-    x, height, x_rate, height_rate = s.Tx @ q, s.Ty @ q, s.Tx @ v, s.Ty @ v
+    along, away = s.rows[:, 0], s.rows[:, 1]
+    x, height, x_rate, height_rate = along @ q, away @ q, along @ v, away @ v
     ground, speed = system.ground, system.ground.speed
     k = 2.0 * np.pi / ground.wavelength
     xi = s.abscissa + x - speed * t
@@ -47,7 +48,7 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     drive = system.drive
     pull = s.drive_stiffness[0] * drive.amplitude_x * np.sin(drive.angular_frequency * t)
     force = (s.constant_load + pull * s.drive_shapes[0] - s.stiffness @ q - s.damping @ v
-             + s.Ty.T @ F - s.Tx.T @ (friction + F * tilt))
+             + away.T @ F - along.T @ (friction + F * tilt))
     return np.concatenate([v, force])
 
 

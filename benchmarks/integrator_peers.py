@@ -44,7 +44,7 @@ def _pointer(typingctx: Any, address: Any) -> Any:
 def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     """Compiled ``rate(t, y, out)`` and ``jacobian(t, y, out)``, and what must outlive them."""
     arrays = problem.system.arrays
-    n, m = arrays.Tx.shape
+    n, _, m = arrays.rows.shape
     room = {"given": np.zeros(dynamics.GIVEN), "pull": np.zeros(m),
             "nodes": np.zeros((3, 2 * n))}
     scratch = run_arrays.gradients_for(n, problem.system.memory, 2)

@@ -85,7 +85,7 @@ def as_mass(problem: Problem) -> nonsmooth_peer.Mass:
     drive, friction = system.drive, system.friction
     w, size = drive.angular_frequency, drive.amplitude_x
     return nonsmooth_peer.Mass(
-        arrays.stiffness, arrays.damping, arrays.Tx[0], arrays.drive_shapes[0],
+        arrays.stiffness, arrays.damping, arrays.rows[0, 0], arrays.drive_shapes[0],
         arrays.drive_stiffness[0] * size, arrays.drive_damping[0] * size * w, w,
         system.ground.speed, float(system.normal.force), friction.static_coefficient,
         friction.kinetic_coefficient, friction.decay)

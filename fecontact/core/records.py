@@ -167,7 +167,7 @@ def allocate(record: type[Record], sizes: Mapping[Size, int], **given: Any) -> R
 
 @cache
 def _makers(record: Any, sizes: frozenset[tuple[Size, int]]) -> dict[str, Callable[[], Any]]:
-    """What makes the zeros of each field."""
+    """Function of each field that returns its zeros."""
     return {name: _maker(record, name, kind, dict(sizes))
             for name, kind in _fields(record).items()}
 

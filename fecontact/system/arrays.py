@@ -38,7 +38,7 @@ def system_arrays(
     The groups are contact nodes that share a law: their place, each one's part of their face, and
     the law; see :meth:`fecontact.ContactSystem.law_groups`.
     """
-    d, n, m = basis.dimension, basis.contact_nodes, basis.modes
+    d, n = basis.dimension, basis.contact_nodes
     friction_groups = list(friction_groups)
     normal, normal_parameters = _law_table(normal_groups)
     friction, friction_parameters = _law_table(friction_groups)
@@ -54,9 +54,7 @@ def system_arrays(
         **drive_arrays(basis, drive),
         **load_arrays(basis, load),
         modal_damping=basis.damping.copy(),
-        Tx=rows[:, 0].copy(),
-        Ty=rows[:, d - 1].copy(),
-        T2=rows[:, 1].copy() if d == 3 else np.zeros((0, m)),
+        rows=rows[:, [0, 2, 1] if d == 3 else [0, 1]].copy(),
         abscissa=basis.contact_x.copy(),
         ordinate=basis.contact_places[:, 1].copy() if d == 3 else np.zeros(0),
         gap=np.array(np.broadcast_to(gap, n)),
@@ -160,7 +158,7 @@ def _multilinear(name: str, parts: Mapping[str, Any]) -> bool:
 
 def with_sides(arrays: SystemArrays) -> SystemArrays:
     """The arrays with what functions of nodes in space take from them, if they are in space."""
-    if not len(arrays.T2):
+    if arrays.rows.shape[1] == 2:
         return arrays
     n = len(arrays.gap)
     columns = [arrays.gap, arrays.abscissa, arrays.ordinate, arrays.sliding,

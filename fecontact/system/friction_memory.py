@@ -29,7 +29,7 @@ def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) 
     force, rates = np.empty(length), np.empty((count, width))
     for i in range(len(times)):
         y, moved = states[i], ground_motion(times[i], s)
-        for j in range(len(s.Tx)):
+        for j in range(len(s.rows)):
             z = memory_of(j, y, s)
             F = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)[0]
             stored = 0.0
@@ -43,7 +43,7 @@ def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) 
 @kernel
 def _settle(t: float, y: Vector, s: SystemArrays) -> None:
     """Bring z of each node to z' = 0 by implicit Euler steps of increasing length."""
-    n = len(s.Tx)
+    n = len(s.rows)
     states = s.memory.max()
     length, width = force_room(states, in_space(s))
     force, rates = np.empty(length), np.empty((states, width))

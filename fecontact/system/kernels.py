@@ -1,7 +1,7 @@
 """Compiled right-hand side of the reduced contact system.
 
 State y = [q, q', z] of m modes and, node by node, the internal variables of friction with memory.
-With x = Tx q and y = Ty q at the n contact nodes, per node j
+With x, y = T q at the n contact nodes, per node j
 
     xi = X_j + x_j - travel_j(t)    u_j = y_R(xi) - y_j - g_j      v_j = u_j'
     F_j = normal(u_j, v_j)          R_j = friction(x_j' - V_j, s(xi) |F_j|, z_j)
@@ -45,7 +45,7 @@ STATE_COLUMNS, SPACE_STATE_COLUMNS = 6, 8
 
 def state_columns(arrays: SystemArrays) -> int:
     """Number of columns of the per-node results of a system."""
-    return SPACE_STATE_COLUMNS if len(arrays.T2) else STATE_COLUMNS
+    return SPACE_STATE_COLUMNS if arrays.rows.shape[1] > 2 else STATE_COLUMNS
 
 
 @helper
@@ -80,19 +80,19 @@ def node_forces(j, motion, moved, z, s, force, rates):
 def normal_gradients(j, contact, s, out):
     """F of node j and the force that friction sees under it.
 
-    Fills out[0] and out[2] with their derivatives to x, y, x', y' of the node.
+    Fills out[1] and out[2] with their derivatives to x, y, x', y' of the node.
     """
     slope = contact.slope
     F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
                                          s.normal_parameters[j])
-    out[0, 0] = F_u * slope + F_v * contact.curvature * contact.slip
-    out[0, 1] = -F_u
-    out[0, 2] = F_v * slope
-    out[0, 3] = -F_v
+    out[1, 0] = F_u * slope + F_v * contact.curvature * contact.slip
+    out[1, 1] = -F_u
+    out[1, 2] = F_v * slope
+    out[1, 3] = -F_v
     sign = 1.0 if F >= 0.0 else -1.0
     pressing = abs(F)
     for k in range(4):
-        out[2, k] = sign * out[0, k]
+        out[2, k] = sign * out[1, k]
     if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
         scale, scale_x, _ = ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)
         for k in range(4):
@@ -106,9 +106,10 @@ def normal_gradients(j, contact, s, out):
 def node_gradients(j, motion, moved, z, s, force, rates, out):
     """F of node j, its force T in -x, and a :class:`~fecontact.system.nodes.NodeContact`.
 
-    Fills out (3, 4) with those of F, T and the force that friction sees to x, y, x', y'; in space
-    (4, 6), with the force against the second tangent and derivatives to the motion across.
-    ``force`` begins with R and its derivatives to slip velocity and pressing force for all laws.
+    Fills out (d + 1, 2 d) with the derivatives of the forces on the node along its axes, -T, F and
+    in space -T_2, and last of the force that friction sees, to displacements and velocities along
+    the axes. ``force`` begins with R and its derivatives to slip velocity and pressing force for
+    all laws.
     """
     if in_space(s):
         F, contact = tell(j, motion, moved, z, s, force, rates)
@@ -124,12 +125,12 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
         R, R_v, R_F = friction_at(s.friction[j])(contact.slip, pressing, s.friction_parameters[j])
     force[0], force[1], force[2] = R, R_v, R_F
     for k in range(4):
-        out[1, k] = R_F * out[2, k]
-    out[1, 2] += R_v
+        out[0, k] = -R_F * out[2, k]
+    out[0, 2] -= R_v
     if s.leans:
         for k in range(4):
-            out[1, k] += contact.slope * out[0, k]
-        out[1, 0] += F * contact.curvature
+            out[0, k] -= contact.slope * out[1, k]
+        out[0, 0] -= F * contact.curvature
     return F, leaning(F, R, contact.slope, s), contact
 
 
@@ -139,7 +140,7 @@ def contact_state(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
 
     In space (n, 8): with friction force and slip velocity along the second tangent.
     """
-    n = len(s.Tx)
+    n = len(s.rows)
     moved = ground_motion(t, s)
     states = s.memory.max()
     length, width = force_room(states, in_space(s))
@@ -222,7 +223,7 @@ def body_rates(load, y, s, out):
 @helper
 def rates_under(load, moved, y, s, force, rates, out):
     """Fill out (2 m + n s,) with y'; ``force`` and ``rates`` are room for laws of friction."""
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     states = len(rates)
     body_rates(load, y, s, out)
     for j in range(n):
@@ -231,11 +232,11 @@ def rates_under(load, moved, y, s, force, rates, out):
         if F != 0.0:
             T = leaning(F, R, contact.slope, s)
             for i in range(m):
-                out[m + i] += s.Ty[j, i] * F - s.Tx[j, i] * T
+                out[m + i] += s.rows[j, 1, i] * F - s.rows[j, 0, i] * T
             if in_space(s):
                 T = leaning(F, friction_across(force, rates), contact.slope_across, s)
                 for i in range(m):
-                    out[m + i] -= s.T2[j, i] * T
+                    out[m + i] -= s.rows[j, 2, i] * T
         for k in range(s.memory[j]):
             out[2 * m + j * states + k] = rates[k, 0]
 
@@ -244,7 +245,7 @@ def rates_under(load, moved, y, s, force, rates, out):
 def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     """Fill out (2 m + n s,) with y'."""
     states = s.memory.max()
-    load = np.empty(s.Tx.shape[1])
+    load = np.empty(s.rows.shape[2])
     moved = given_at(t, s, load)
     length, width = force_room(states, in_space(s))
     rates_under(load, moved, y, s, np.empty(length), np.empty((states, width)), out)

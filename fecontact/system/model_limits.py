@@ -5,6 +5,7 @@ They reveal wrong units and unsupported loads. ``CHECKS_OF_BODIES``, ``CHECKS_BE
 its states after it.
 """
 
+import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -37,6 +38,8 @@ SMALL_ANGLE = 0.1
 # body, and duration in periods of the fastest mode or excitation.
 SIZES, MODULI, DENSITIES = (1e-4, 5.0), (1e6, 2e12), (1.0, 25000.0)
 FRICTION, ROUGHNESS, SPEED, GAP, PERIODS = 2.0, 0.01, 100.0, 100.0, 1e6
+# Most periods of drive, loads, ground and waves, or steps of max_step, in a run, which takes hours.
+MOST_PERIODS = 1e9
 
 # Distance of chords from their arc, in penetration scales, and part of a load, below which neither
 # counts.
@@ -258,11 +261,11 @@ def _ground(planned: Planned) -> Iterator[str]:
 def _duration(planned: Planned) -> Iterator[str]:
     """Duration in periods of the fastest mode and of the fastest excitation."""
     system, duration = planned.system, planned.duration
-    for what, highest, remedy in (
-            ("mode", float(system.basis.frequencies_hz.max()), "keep fewer modes"),
+    for what, highest, most, remedy in (
+            ("mode", float(system.basis.frequencies_hz.max()), math.inf, "keep fewer modes"),
             ("of drive, loads, ground and waves", 1.0 / system.shortest_period(0.0, duration),
-             "lower that frequency")):
-        if duration * highest > PERIODS:
+             MOST_PERIODS, "lower that frequency")):
+        if PERIODS < duration * highest <= most:
             yield (f"it lasts {duration * highest:.2g} periods of the fastest {what}, "
                    f"{highest:.4g} Hz, and will take long; end it earlier, or {remedy}.")
 
@@ -282,13 +285,13 @@ def _unheld(planned: Planned) -> Iterator[str]:
         return
     open_below = _untouched(system) > -np.inf
     # Friction, springs and laws that may pull resist both ways along their rows.
-    both = [arrays.Ty[~open_below]]
+    both = [arrays.rows[~open_below, 1]]
     for nodes, _, law in system.law_groups("friction"):
         if not _frictionless(law):
-            both += [arrays.Tx[nodes], arrays.T2[nodes] if len(arrays.T2) else arrays.Tx[:0]]
+            both += list(arrays.rows[nodes, ::2].swapaxes(0, 1))
     held = np.concatenate(both) @ free
     slack = np.eye(free.shape[1]) - np.linalg.pinv(held, rcond=1e-9) @ held
-    normals = _unit_rows(arrays.Ty[open_below] @ free) @ slack
+    normals = _unit_rows(arrays.rows[open_below, 1] @ free) @ slack
     remaining = slack @ load
     from scipy.optimize import nnls
 
@@ -355,7 +358,7 @@ def _reach(planned: Planned) -> float:
         elastic, np.abs(q) + (np.abs(v) + varying * lasting) / safe + 2.0 * load / safe**2,
         np.abs(q) + np.abs(v) * T + 0.5 * (varying + load) * T**2)
     low, high = system.ground.height_range
-    reach = float((np.abs(arrays.Ty @ shapes) @ largest).max() + max(abs(low), abs(high)))
+    reach = float((np.abs(arrays.rows[:, 1] @ shapes) @ largest).max() + max(abs(low), abs(high)))
     return reach if np.isfinite(reach) else np.inf
 
 

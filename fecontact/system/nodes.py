@@ -23,8 +23,11 @@ class SystemArrays(NamedTuple):
     ``bristle_stiffness`` (2, n, s) are a and b of the stored ``(a + b |F|) z^2 / 2``; ``on_ground``
     is 0 for nodes between bodies, ``leans`` where contact forces stay vertical, else 1.
 
-    In space, else of length zero: rows ``T2`` (n, m) and reference places ``ordinate`` (n,) along
-    the second tangent; ``sliding_across`` (3, n), factors of the first motion for the second
+    ``rows`` (n, d, m) are those of the displacements of the nodes along their axes: the first
+    tangent, the normal and, in space, the second tangent.
+
+    In space, else of length zero: reference places ``ordinate`` (n,) along the second tangent;
+    ``sliding_across`` (3, n), factors of the first motion for the second
     tangent, of the second motion for the first and for the second one; ``planar`` (n,), addresses
     of friction in two directions; ``sides`` (n, 11), what :mod:`fecontact.system.space_nodes`
     evaluates, and ``space_node``, its address. Heights of the ground are those of ``surface``, or
@@ -39,9 +42,7 @@ class SystemArrays(NamedTuple):
     drive_stiffness: Annotated[Array, AXES]
     drive_damping: Annotated[Array, AXES]
     load_shapes: Annotated[Array, ANY, MODES]
-    Tx: Annotated[Array, NODES, MODES]
-    Ty: Annotated[Array, NODES, MODES]
-    T2: Annotated[Array, NODES * (AXES - 2), MODES]
+    rows: Annotated[Array, NODES, AXES, MODES]
     abscissa: Annotated[Array, NODES]
     ordinate: Annotated[Array, NODES * (AXES - 2)]
     gap: Annotated[Array, NODES]
@@ -123,7 +124,22 @@ class NodeContact(NamedTuple):
 @helper
 def in_space(s):
     """Whether nodes have a second tangent."""
-    return len(s.T2) > 0
+    return s.rows.shape[1] > 2
+
+
+@helper
+def slip_entry(tangent, states):
+    """Place of the derivative to the slip velocity along a tangent.
+
+    Among the results of friction with so many internal variables, for a force or for a rate.
+    """
+    return 3 + states if tangent else 1
+
+
+@helper
+def friction_entry(tangent, states):
+    """First place in the results of friction of those for the force along a tangent."""
+    return 4 + states if tangent else 0
 
 
 @helper
@@ -152,20 +168,42 @@ def moved_across(j, first, second, s):
 
 
 @helper
+def ground_moved(axis, j, first, second, s):
+    """Two motions of the ground along an axis of node j; zero along its normal."""
+    if axis == 1:
+        return 0.0
+    return moved_along(j, first, second, s) if axis == 0 else moved_across(j, first, second, s)
+
+
+@helper
 def node_motion(j, y, s):
     """Motion of node j in the state y."""
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     x, height, x_rate, height_rate, across, across_rate = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(m):
-        x += s.Tx[j, i] * y[i]
-        height += s.Ty[j, i] * y[i]
-        x_rate += s.Tx[j, i] * y[m + i]
-        height_rate += s.Ty[j, i] * y[m + i]
+        x += s.rows[j, 0, i] * y[i]
+        height += s.rows[j, 1, i] * y[i]
+        x_rate += s.rows[j, 0, i] * y[m + i]
+        height_rate += s.rows[j, 1, i] * y[m + i]
     if in_space(s):
         for i in range(m):
-            across += s.T2[j, i] * y[i]
-            across_rate += s.T2[j, i] * y[m + i]
+            across += s.rows[j, 2, i] * y[i]
+            across_rate += s.rows[j, 2, i] * y[m + i]
     return NodeMotion(x, height, x_rate, height_rate, across, across_rate)
+
+
+@helper
+def change_by(row, j, x, s):
+    """Change of what has the derivatives ``row`` (2 d,) at node j by a change x of the state."""
+    _, d, m = s.rows.shape
+    total = 0.0
+    for axis in range(d):
+        place, speed = 0.0, 0.0
+        for i in range(m):
+            place += s.rows[j, axis, i] * x[i]
+            speed += s.rows[j, axis, i] * x[m + i]
+        total += row[axis] * place + row[d + axis] * speed
+    return total
 
 
 @helper
@@ -184,7 +222,7 @@ def node_contact(j, motion, moved, s):
 @helper
 def memory_of(j, y, s):
     """Internal variables of node j: a view of the state y."""
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     first = 2 * m + j * ((len(y) - 2 * m) // n)
     return y[first : first + s.memory[j]]
 

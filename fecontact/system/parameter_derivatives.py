@@ -23,10 +23,8 @@ from fecontact.laws.signatures import (
 )
 from fecontact.system.nodes import (
     GroundMotion,
+    ground_moved,
     in_space,
-    moved_across,
-    moved_along,
-    node_motion,
 )
 
 # Fourth-order differences: offsets in steps, and weights in twelfths of a step.
@@ -163,29 +161,27 @@ def _surface_rates(contact, s, laws):
 
 @helper
 def set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts):
-    """Fill ``shifts`` with what the parameter alone adds to xi, height, slip and rate of a node.
+    """Fill ``shifts`` (2 d,) with what the parameter alone adds to the motion of a node.
 
-    In space place and slip velocity along the second tangent follow.
+    To its displacements along the axes against the other side, and to their rates.
     """
-    space = in_space(s)
-    if basis_moves:
-        motion = node_motion(j, y, r)
-        shifts[0], shifts[1], shifts[2], shifts[3] = (
-            motion.along, motion.height, motion.along_rate, motion.height_rate)
-        if space:
-            shifts[4], shifts[5] = motion.across, motion.across_rate
-    else:
-        shifts[:] = 0.0
-    shifts[0] += (r.abscissa[j] - moved_along(j, moved_p.travel, moved_p.second_travel, s)
-                  - moved_along(j, moved.travel, moved.second_travel, r))
+    _, d, m = s.rows.shape
+    for axis in range(d):
+        place, speed = 0.0, 0.0
+        if basis_moves:
+            for i in range(m):
+                place += r.rows[j, axis, i] * y[i]
+                speed += r.rows[j, axis, i] * y[m + i]
+        shifts[axis] = place - (
+            ground_moved(axis, j, moved_p.travel, moved_p.second_travel, s)
+            + ground_moved(axis, j, moved.travel, moved.second_travel, r))
+        shifts[d + axis] = speed - (
+            ground_moved(axis, j, moved_p.speed, moved_p.second_speed, s)
+            + ground_moved(axis, j, moved.speed, moved.second_speed, r))
+    shifts[0] += r.abscissa[j]
     shifts[1] += r.gap[j]
-    shifts[2] -= (moved_along(j, moved_p.speed, moved_p.second_speed, s)
-                  + moved_along(j, moved.speed, moved.second_speed, r))
-    if space:
-        shifts[4] += (r.ordinate[j] - moved_across(j, moved_p.travel, moved_p.second_travel, s)
-                      - moved_across(j, moved.travel, moved.second_travel, r))
-        shifts[5] -= (moved_across(j, moved_p.speed, moved_p.second_speed, s)
-                      + moved_across(j, moved.speed, moved.second_speed, r))
+    if in_space(s):
+        shifts[2] += r.ordinate[j]
 
 
 class NodeRates(NamedTuple):
@@ -210,15 +206,15 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
     internal variables; the others are overwritten.
     """
     room_force, room_rates, memory = room
-    slip, h, space = contact.slip, laws.step, in_space(s)
+    slip, h, space, d = contact.slip, laws.step, in_space(s), s.rows.shape[1]
     second = 4 + len(memory)
     ground, slope, across = 0.0, 0.0, 0.0
     if s.on_ground[j]:
         ground, slope, across = _surface_rates(contact, s, laws)
-    F_p = -partial[0, 1] * ground - partial[0, 3] * (
+    F_p = -partial[1, 1] * ground - partial[1, d + 1] * (
         slope * slip + across * contact.slip_across)
     for k in range(len(shifts)):
-        F_p += partial[0, k] * shifts[k]
+        F_p += partial[1, k] * shifts[k]
     for k in range(len(laws.normal)):
         F_p += _WEIGHTS[k] / (12.0 * h) * normal_at(s.normal[j])(
             contact.penetration, contact.rate, laws.normal[k, j])[0]
@@ -229,7 +225,7 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
         if space:
             a, b = s.wave_direction[0], s.wave_direction[1]
             place = a * contact.place + b * contact.place_across
-            shift = a * shifts[0] + b * shifts[4]
+            shift = a * shifts[0] + b * shifts[2]
         scale, scale_x, _ = ground_at(s.friction_scale)(place, s.friction_scale_parameters)
         pressing = scale * size
         pressing_p = scale * pressing_p + size * (
@@ -245,11 +241,11 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
             R_F, R_F2 = R_F * e1, R_F * e2
         else:
             R_F = friction_at(s.friction[j])(slip, 0.0, s.friction_parameters[j])[2]
-    R_p, R_p2, slip_across = force[1] * shifts[2] + R_F * pressing_p, 0.0, 0.0
+    R_p, R_p2, slip_across = force[1] * shifts[d] + R_F * pressing_p, 0.0, 0.0
     if space:
         slip_across = shifts[5]
         R_p += force[3 + len(memory)] * slip_across
-        R_p2 = (force[second + 1] * shifts[2] + force[second + 3 + len(memory)] * slip_across
+        R_p2 = (force[second + 1] * shifts[d] + force[second + 3 + len(memory)] * slip_across
                 + R_F2 * pressing_p)
     for i in range(s.memory[j]):
         memory[i] = 0.0
@@ -271,7 +267,7 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
     if s.leans:
         if space:
             R_p2 += contact.slope_across * F_p + F * (
-                across + contact.twist * shifts[0] + contact.curvature_across * shifts[4])
-            R_p += F * contact.twist * shifts[4]
+                across + contact.twist * shifts[0] + contact.curvature_across * shifts[2])
+            R_p += F * contact.twist * shifts[2]
         R_p += contact.slope * F_p + F * (slope + contact.curvature * shifts[0])
-    return NodeRates(F_p, R_p, R_p2, shifts[2], slip_across, pressing_p)
+    return NodeRates(F_p, R_p, R_p2, shifts[d], slip_across, pressing_p)

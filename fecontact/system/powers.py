@@ -35,7 +35,7 @@ WORKS = NODE_POWERS * NODES + POWER_COUNT
 @helper
 def given_powers(t, y, s, out):
     """Fill out (p,) with the powers of drive and loads, the others with zero."""
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     out[:POWER_COUNT] = 0.0
     for axis in range(len(s.drive)):
         value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
@@ -57,7 +57,7 @@ def given_powers(t, y, s, out):
 @helper
 def matrix_powers(ends, y, s, out):
     """Add to out (p,) the powers of a block of the matrices: first and last row and column."""
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     top, bottom, left, right = ends
     modal, relative, circulatory = 0.0, 0.0, 0.0
     for i in range(top, bottom):
@@ -74,7 +74,7 @@ def matrix_powers(ends, y, s, out):
 @helper
 def body_powers(t, y, s, out):
     """Fill out (p,) with the powers outside the contact, the others with zero."""
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     given_powers(t, y, s, out)
     matrix_powers((0, m, 0, m), y, s, out)
 
@@ -87,7 +87,7 @@ def drive_jump(before, after, y, s):
         old = signal_at(s.drive[axis])(before, s.drive_parameters[axis])[0]
         new = signal_at(s.drive[axis])(after, s.drive_parameters[axis])[0]
         stretch = 0.5 * (old + new)
-        for i in range(s.Tx.shape[1]):
+        for i in range(s.rows.shape[2]):
             stretch -= s.drive_shapes[axis, i] * y[i]
         work += s.drive_stiffness[axis] * stretch * (new - old)
     return work
@@ -145,7 +145,7 @@ def set_powers(t, y, s, stick_speed, out, nodes):
 
     Its friction's losses, then those by creep, at slip velocities below ``stick_speed`` (n,).
     """
-    n = len(s.Tx)
+    n = len(s.rows)
     moved = ground_motion(t, s)
     states = s.memory.max()
     length, width = force_room(states, in_space(s))

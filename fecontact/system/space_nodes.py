@@ -86,14 +86,14 @@ def scale_under(contact, a, b, address, p):
 
 @helper
 def _normal_part(contact, F_u, F_v, out):
-    """Fill a row (6,) of derivatives of the normal force to x, y, x', y', and across."""
+    """Fill a row (6,) of derivatives of the normal force to the motion along the axes."""
     out[0] = F_u * contact.slope + F_v * (
         contact.curvature * contact.slip + contact.twist * contact.slip_across)
     out[1] = -F_u
-    out[2] = F_v * contact.slope
-    out[3] = -F_v
-    out[4] = F_u * contact.slope_across + F_v * (
+    out[2] = F_u * contact.slope_across + F_v * (
         contact.twist * contact.slip + contact.curvature_across * contact.slip_across)
+    out[3] = F_v * contact.slope
+    out[4] = -F_v
     out[5] = F_v * contact.slope_across
 
 
@@ -101,9 +101,9 @@ def _space_node(motion, moved, laws, z, side, normal_parameters, friction_parame
                 profile_parameters, scale_parameters, force, rates):
     """Fill ``force`` and ``rates`` of friction in two directions, and behind it what is told.
 
-    That is the :class:`~fecontact.system.nodes.NodeContact`, F, and derivatives (4, 6) of F, of the
-    force against the first tangent, of the pressing force and of the force against the second
-    tangent; these are left out where ``force`` has no room for them.
+    That is the :class:`~fecontact.system.nodes.NodeContact`, F, and derivatives (4, 6) as
+    :func:`fecontact.system.kernels.node_gradients` gives them; these are left out where ``force``
+    has no room for them.
     """
     states = len(rates)
     second, told = 4 + states, 2 * (4 + states)
@@ -122,30 +122,29 @@ def _space_node(motion, moved, laws, z, side, normal_parameters, friction_parame
     first = told + CONTACT_FIELDS + 1
     if len(force) <= first:
         return
-    normal = force[first : first + 6]
-    tangential, pressed = force[first + 6 : first + 12], force[first + 12 : first + 18]
-    across = force[first + 18 : first + 24]
+    along, normal = force[first : first + 6], force[first + 6 : first + 12]
+    across, pressed = force[first + 12 : first + 18], force[first + 18 : first + 24]
     _normal_part(contact, F_u, F_v, normal)
     sign = scale if F >= 0.0 else -scale
     for k in range(SPACE_COLUMNS):
         pressed[k] = sign * normal[k]
     pressed[0] += a * scale_slope * pressing
-    pressed[4] += b * scale_slope * pressing
+    pressed[2] += b * scale_slope * pressing
     for k in range(SPACE_COLUMNS):
-        tangential[k] = force[2] * pressed[k]
-        across[k] = force[second + 2] * pressed[k]
-    tangential[2] += force[1]
-    tangential[5] += force[3 + states]
-    across[2] += force[second + 1]
-    across[5] += force[second + 3 + states]
+        along[k] = -force[2] * pressed[k]
+        across[k] = -force[second + 2] * pressed[k]
+    along[3] -= force[1]
+    along[5] -= force[3 + states]
+    across[3] -= force[second + 1]
+    across[5] -= force[second + 3 + states]
     if side[LEANS] != 0.0:
         for k in range(SPACE_COLUMNS):
-            tangential[k] += contact.slope * normal[k]
-            across[k] += contact.slope_across * normal[k]
-        tangential[0] += F * contact.curvature
-        tangential[4] += F * contact.twist
-        across[0] += F * contact.twist
-        across[4] += F * contact.curvature_across
+            along[k] -= contact.slope * normal[k]
+            across[k] -= contact.slope_across * normal[k]
+        along[0] -= F * contact.curvature
+        along[2] -= F * contact.twist
+        across[0] -= F * contact.twist
+        across[2] -= F * contact.curvature_across
 
 
 space_node = compile_law(_SPACE_NODE, "space_node(motion, moved, laws, z, side, ...)", _space_node)

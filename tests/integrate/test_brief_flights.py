@@ -106,7 +106,7 @@ def test_many_lift_offs_open_the_stop_once(count):
         system = two_masses(random.uniform(1.77, 1.80))
         start = 10.0 ** random.uniform(-9.0, -3.0) * random.standard_normal(4)
         # Not in the ground.
-        start[:2] *= np.copysign(1.0, (system.arrays.Ty @ start[:2])[0])
+        start[:2] *= np.copysign(1.0, (system.arrays.rows[:, 1] @ start[:2])[0])
         run = fc.simulate(system, 4.0 * period, initial=start, rtol=1e-12, solver=INELASTIC,
                           outputs=2, events=ContactEvents())
         kinds, times = changes(run)

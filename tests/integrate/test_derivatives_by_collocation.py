@@ -111,7 +111,8 @@ def test_a_step_on_ground_that_accelerates():
     system = oscillator(friction=SMOOTH, normal=RoughSurface(1e6, 1e-5, 40.0),
                         ground=Ground(motion=HarmonicSpeed(0.05, 300.0)))
     level = oscillator(friction=SMOOTH, ground=Ground(speed=0.0))
-    states = [state + speed * np.append([0.0, 0.0], system.arrays.Tx[0]) for speed in (0.02, -0.03)
+    states = [state + speed * np.append([0.0, 0.0], system.arrays.rows[0, 0])
+              for speed in (0.02, -0.03)
               for state in states_of(level, (0.0, 0.01), (4e-6, 4e-5))]
     assert compared(system, states, 2e-6) >= 6
 
@@ -237,7 +238,7 @@ def test_several_impacts_with_a_dashpot(slope):
     gap = 1e-4
     system = mass_in_plane(spring=1e3, normal=LinearContact(3e4, 30.0), friction=friction,
                            ground=Ground(speed=0.02), load=Load(GRAVITY), gap=gap)
-    along, away = system.arrays.Tx[0], system.arrays.Ty[0]
+    along, away = system.arrays.rows[0, 0], system.arrays.rows[0, 1]
     begin = np.concatenate([1e-5 * along + 5e-3 * away, 0.01 * along])
     times = np.linspace(0.0, 0.2, 3)
     beside = _moved(system, (lambda one, to: one.with_(gap=to), gap), times, begin)

@@ -98,7 +98,7 @@ def tried(system, states, tolerance, stiff=0.5):
 def states_of(system, slips, depths, seed=0):
     """States of a mass in the plane at slip velocities and penetrations, the rest at random."""
     rng = np.random.default_rng(seed)
-    speed, along, away = system.ground.speed, system.arrays.Tx[0], system.arrays.Ty[0]
+    speed, along, away = system.ground.speed, system.arrays.rows[0, 0], system.arrays.rows[0, 1]
     return [np.concatenate([1e-5 * rng.standard_normal() * along - depth * away,
                             (speed + slip) * along + 0.02 * rng.standard_normal() * away,
                             0.3 * system.memory_scales * rng.uniform(-1.0, 1.0, system.memory)])
@@ -147,7 +147,8 @@ def test_in_space(friction, ground):
 def test_ground_that_accelerates():
     ground = Ground(motion=HarmonicSpeed(0.05, 300.0), profile=Sine(2e-5, 2.5e-3))
     system = oscillator(friction=SMOOTH, normal=RoughSurface(1e6, 1e-5, 40.0), ground=ground)
-    states = [state + speed * np.append([0.0, 0.0], system.arrays.Tx[0]) for speed in (0.02, -0.03)
+    states = [state + speed * np.append([0.0, 0.0], system.arrays.rows[0, 0])
+              for speed in (0.02, -0.03)
               for state in states_of(oscillator(friction=SMOOTH, ground=Ground(speed=0.0)),
                                      (0.0, 0.01), (4e-6, 4e-5))]
     assert tried(system, states, 2e-6) >= 6

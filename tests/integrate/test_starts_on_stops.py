@@ -84,7 +84,7 @@ def two_nodes(seed, damping):
         damping=damping * dashpot @ dashpot.T)
     system = fc.ContactSystem(basis, normal=LinearContact(1e6, 0.0),
                               friction=ConstantFriction(0.3))
-    q, normal = rng.standard_normal(4), system.arrays.Ty
+    q, normal = rng.standard_normal(4), system.arrays.rows[:, 1]
     q -= np.linalg.pinv(normal) @ (normal @ q)
     return system, 1e-3 * np.append(q, np.zeros(4))
 

@@ -39,7 +39,7 @@ def test_depth_passed_twice(damping, switch):
     """
     system = mass_in_y(normal=RoughSurface(STIFFNESS, HEIGHT, damping * STIFFNESS))
     run = driver.start(system, np.zeros(2), np.array([0.0, 1.0]), rtol=1e-9, series="never")
-    c, row = collocation_for(1, 1, 1e-9), float(run.problem.system.Ty[0, 0])
+    c, row = collocation_for(1, 1, 1e-9), float(run.problem.system.rows[0, 1, 0])
     gap = float(run.problem.system.gap[0])
     c.places[0, 0], c.places[2, 0] = -(0.5 * HEIGHT + gap) / row, -2.0 * HEIGHT / row
     c.rates[1, 0] = -8.0 * HEIGHT / row

@@ -29,11 +29,10 @@ def contact_directions(field: VectorField, values: Array, harmonics: int) -> Arr
     if not isinstance(field, ContactField):
         return None
     arrays = field.arrays(values)
-    rows = np.concatenate([arrays.Tx, arrays.Ty, arrays.T2])
-    m, L = rows.shape[1], 2 * harmonics + 1
+    m, L = arrays.rows.shape[2], 2 * harmonics + 1
     if L * m < _LEAST:
         return None
-    _, sizes, found = np.linalg.svd(rows, full_matrices=False)
+    _, sizes, found = np.linalg.svd(arrays.rows.reshape(-1, m), full_matrices=False)
     rank = int(np.count_nonzero(sizes > _DEPENDENT * sizes.max(initial=0.0)))
     return np.ascontiguousarray(found[:rank].T) if L * rank + 2 <= _MOST_LEFT * L * m else None
 

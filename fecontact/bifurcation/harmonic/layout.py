@@ -73,7 +73,7 @@ def element_rows(field: VectorField, layout: Layout) -> Array:
         return rows
     system = field.system()
     arrays, s = system.arrays, layout.memory // layout.nodes
-    tangents = [arrays.Tx, arrays.T2] if len(arrays.T2) else [arrays.Tx]
+    tangents = arrays.rows[:, ::2].swapaxes(0, 1)
     for nodes, share, law in system.law_groups("friction"):
         if law.memory and law.sliders(share) is not None:
             for node in range(layout.nodes)[nodes]:

@@ -162,7 +162,7 @@ def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Ma
     begin without deflection; after two of them, Newton's method finds the start that repeats.
     Returns 1 if every node has come to that, 0 if one has not.
     """
-    N, n = len(t), len(s.Tx)
+    N, n = len(t), len(s.rows)
     states = s.memory.max()
     length, width = force_room(states, in_space(s))
     force, rates = np.empty(length), np.empty((states, width))

@@ -110,8 +110,8 @@ def _set_forced(t, Y, moved, problem, vary, out):
         F_below, R_below = _law_forces(j, own, other, below)
         deeper, faster, slip = (one.penetration - other.penetration, one.rate - other.rate,
                                 one.slip - other.slip)
-        F += -F_below - p[0, 1] * deeper - p[0, 3] * faster
-        R += -R_below - p[1, 1] * deeper - p[1, 3] * faster + p[1, 2] * slip
+        F += -F_below - p[1, 1] * deeper - p[1, 3] * faster
+        R += -R_below + p[0, 1] * deeper + p[0, 3] * faster - p[0, 2] * slip
         w[2, at], w[2, n + at] = -R / vary.width, F / vary.width
     for i in range(m):
         rate[i] = 0.0
@@ -269,12 +269,13 @@ def _cross(t, near, problem, c, vary):
             for column in range(count):
                 x, ahead = v.after[column], 0.0
                 for k in range(m):
-                    ahead -= s.Ty[j, k] * x[k]
+                    ahead -= s.rows[j, 1, k] * x[k]
                 if column == count - 1 and vary.width != 0.0:
                     ahead += (_contact(j, c.after, moved, vary.above).penetration
                               - _contact(j, c.after, moved, vary.below).penetration) / vary.width
+                ahead /= rate
                 for k in range(m):
-                    x[m + k] += (s.Ty[j, k] * jump - s.Tx[j, k] * slip_jump) * ahead / rate
+                    x[m + k] += (s.rows[j, 1, k] * jump - s.rows[j, 0, k] * slip_jump) * ahead
 
 
 @kernel(by_address=True)

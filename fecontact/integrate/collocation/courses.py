@@ -135,7 +135,7 @@ def step_error(step, problem, progress, room, c):
             if room.nodes[2, n + j] != 0.0:
                 slip = 0.0
                 for k in range(m):
-                    slip += s.Tx[j, k] * c.small_right[k]
+                    slip += s.rows[j, 0, k] * c.small_right[k]
                 distance = abs(room.nodes[1, j] - s.sliding[j] * room.given[dynamics.SPEED])
                 part = abs(slip) * g / (control.slip_part * (control.slip_scale[j] + distance))
                 if part > error:
@@ -149,7 +149,7 @@ def step_error(step, problem, progress, room, c):
 def powers_at(t, y, problem, room, out):
     """Fill ``out`` (P,) with the powers of the system and of its nodes."""
     s = problem.system
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     given_powers(t, y, s, out)
     matrix_powers((0, m, 0, m), y, s, out)
     moved = ground_motion(t, s)
@@ -232,8 +232,8 @@ def _normal_force(x, j, s, c):
     """Normal force of node j at x = 2 s - 1."""
     u, v = -s.gap[j], 0.0
     for k in range(c.accelerations.shape[1]):
-        u -= s.Ty[j, k] * value_at(c.places, k, x)
-        v -= s.Ty[j, k] * value_at(c.rates, k, x)
+        u -= s.rows[j, 1, k] * value_at(c.places, k, x)
+        v -= s.rows[j, 1, k] * value_at(c.rates, k, x)
     return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
 
 
@@ -314,7 +314,7 @@ def first_switch(after, problem, c):
         for power in range(PLACE_TERMS):
             line[power] = 0.0
             for k in range(m):
-                term = s.Ty[j, k] * c.places[power, k]
+                term = s.rows[j, 1, k] * c.places[power, k]
                 line[power] -= term
                 size += abs(term)
         line[0] -= s.gap[j]
@@ -350,7 +350,7 @@ def first_switch(after, problem, c):
             line[power] = 0.0
         for power in range(SPEED_TERMS):
             for k in range(m):
-                term = s.Tx[j, k] * c.rates[power, k]
+                term = s.rows[j, 0, k] * c.rates[power, k]
                 line[power] += term
                 size += abs(term)
         for power in range(RATE_TERMS):

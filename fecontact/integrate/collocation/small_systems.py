@@ -21,7 +21,7 @@ from fecontact.integrate.rodas5p.variational import Variation
 
 def advance_for(problem: Problem) -> Any:
     """The loop for a system of one of the sizes."""
-    nodes, modes = problem.system.Tx.shape
+    nodes, _, modes = problem.system.rows.shape
     return _advance(modes, nodes)
 
 
@@ -32,7 +32,7 @@ def _advance(modes: int, nodes: int) -> Any:
 
 def propagate_for(problem: Problem) -> int:
     """Address of what carries derivatives over a step, for a system of one of the sizes."""
-    nodes, modes = problem.system.Tx.shape
+    nodes, _, modes = problem.system.rows.shape
     return _propagate(modes, nodes)
 
 

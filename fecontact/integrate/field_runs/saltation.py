@@ -136,9 +136,7 @@ def _passage(
     middle = y + ahead * ((level - u) / (ahead @ ahead))
     # Forces of the other nodes stay as they are.
     alone = np.arange(system.basis.contact_nodes) == node
-    given, only = system.arrays, alone[:, None]
-    arrays = given._replace(Tx=only * given.Tx, Ty=only * given.Ty,
-                            T2=only * given.T2 if len(given.T2) else given.T2)
+    arrays = system.arrays._replace(rows=alone[:, None, None] * system.arrays.rows)
 
     def rates(state: Array) -> Array:
         out = np.empty(len(y))

@@ -83,12 +83,12 @@ def modal_error(difference, control, progress, w):
 @helper
 def slip_error(error, speed, s, control, w):
     """The larger of the error and that of the slip velocities at the end of the step."""
-    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    n, m = s.rows.shape[0], s.rows.shape[2]
     difference = w.stages[STAGES - 1]
     for j in range(n):
         slip = spread(0.0)
         for i in range(m):
-            slip += read(s.Tx[j, i]) * read(difference[m + i])
+            slip += read(s.rows[j, 0, i]) * read(difference[m + i])
         distance = magnitude(read(w.speeds[j]) - read(s.sliding[j]) * speed)
         part = magnitude(slip) / (_SLIP_PART * (read(control.slip_scale[j]) + distance))
         touching = magnitude(read(w.forces[j, FORCE])) > 0.0
@@ -108,14 +108,14 @@ def _crossing(u, v, a, within):
 @routine
 def next_kink(s, control, progress, within):
     """Time until forces of a node change their character, or ``within`` if later."""
-    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    n, m = s.rows.shape[0], s.rows.shape[2]
     speed = read(progress.ground)
     first = within
     for j in range(n):
         x, y = spread(0.0), spread(0.0)
         for i in range(m):
-            x += read(s.Tx[j, i]) * read(progress.rate[m + i])
-            y += read(s.Ty[j, i]) * read(progress.rate[m + i])
+            x += read(s.rows[j, 0, i]) * read(progress.rate[m + i])
+            y += read(s.rows[j, 1, i]) * read(progress.rate[m + i])
         u, v, a = -read(progress.places[n + j]) - read(s.gap[j]), -read(progress.speeds[n + j]), -y
         first = _crossing(u, v, a, first)
         first = _crossing(u - read(control.depth[j]), v, a, first)
@@ -160,12 +160,12 @@ def _range(first, last, k1, k2, k3):
 @routine
 def restless(h, s, control, progress, w):
     """Lanes, one bit each, in which a contact may have changed unnoticed within the step."""
-    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    n, m = s.rows.shape[0], s.rows.shape[2]
     speed = read(progress.ground)
     some = mask_of(0)
     for j in range(n):
         spread_ = magnitude(read(s.sliding[j])) * read(control.numbers[QUICKEST]) * h
-        k1, k2, k3 = _course(s.Ty[j], 0, w.dense)
+        k1, k2, k3 = _course(s.rows[j, 1], 0, w.dense)
         first, last = read(progress.places[n + j]), read(w.places[n + j])
         low, high, monotone = _range(first, last, k1, k2, k3)
         nearer = smaller(first, last)
@@ -177,7 +177,7 @@ def restless(h, s, control, progress, w):
             mixed = (bottom < 0.0) & (high + shift > 0.0)
             some = some | ((mixed | (bottom < felt)) & ~monotone)
             touching = touching | (bottom < 0.0) | mask_of(-1 if level > 0 else 0)
-        k1, k2, k3 = _course(s.Tx[j], m, w.dense)
+        k1, k2, k3 = _course(s.rows[j, 0], m, w.dense)
         passing = read(s.sliding[j]) * speed
         first, last = read(progress.speeds[j]) - passing, read(w.speeds[j]) - passing
         low, high, monotone = _range(first, last, k1, k2, k3)

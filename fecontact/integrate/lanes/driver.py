@@ -36,7 +36,7 @@ from fecontact.system.contact_system import ContactSystem
 _STEPS, _DEALT = 20_000, 32
 
 # Fields of `SystemArrays` that are parameters of lanes, in the order of `LaneSystem`.
-_FIELDS = arrays.LaneSystem._fields[:16]
+_FIELDS = arrays.LaneSystem._fields[:15]
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ class Kind:
     @property
     def modes(self) -> int:
         """Number of modes."""
-        return self.shapes[_FIELDS.index("Tx")][1]
+        return self.shapes[_FIELDS.index("rows")][2]
 
     @property
     def nodes(self) -> int:
         """Number of contact nodes."""
-        return self.shapes[_FIELDS.index("Tx")][0]
+        return self.shapes[_FIELDS.index("rows")][0]
 
 
 def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
@@ -67,8 +67,8 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     lanes of all its laws and signals.
     """
     s = system.arrays
-    n, m = s.Tx.shape
-    if ((m, n) not in USUAL or len(s.T2) or s.memory.any() or s.second_motion
+    n, _, m = s.rows.shape
+    if ((m, n) not in USUAL or s.rows.shape[1] > 2 or s.memory.any() or s.second_motion
             or s.friction_scale or system.ground.wavy or system.breakpoints(begin, end)):
         return None
     acts = (s.drive_stiffness != 0.0) | (s.drive_damping != 0.0)

@@ -49,11 +49,11 @@ def set_given(t, s, load):
 @helper
 def project(s, y, places, speeds):
     """Fill displacements and velocities (2 n, 8) of the contact nodes: all x, all y."""
-    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    n, m = s.rows.shape[0], s.rows.shape[2]
     for j in range(n):
         x, height, x_rate, height_rate = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
         for i in range(m):
-            along, away, place, speed = (read(s.Tx[j, i]), read(s.Ty[j, i]), read(y[i]),
+            along, away, place, speed = (read(s.rows[j, 0, i]), read(s.rows[j, 1, i]), read(y[i]),
                                          read(y[m + i]))
             x += along * place
             height += away * place
@@ -81,15 +81,16 @@ def _accelerate(y, s, load, rate):
 @helper
 def _push(j, F, R, s, rate):
     """Add the forces of node j."""
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     for i in range(m):
-        write(rate[m + i], read(rate[m + i]) + (read(s.Ty[j, i]) * F - read(s.Tx[j, i]) * R))
+        write(rate[m + i], read(rate[m + i]) + (read(s.rows[j, 1, i]) * F
+                                                - read(s.rows[j, 0, i]) * R))
 
 
 @helper
 def set_rate(y, speed, s, load, places, speeds, forces, rate):
     """Fill ``rate`` (2 m, 8) with y', and normal forces; ``speed`` is that of the ground."""
-    n = s.Tx.shape[0]
+    n = s.rows.shape[0]
     project(s, y, places, speeds)
     _accelerate(y, s, load, rate)
     for j in range(n):
@@ -104,7 +105,7 @@ def set_rate(y, speed, s, load, places, speeds, forces, rate):
 @routine
 def set_rate_and_forces(y, speed, s, load, places, speeds, forces, rate):
     """As :func:`set_rate`, and fill ``forces`` (n, 5, 8) with what derivatives are made of."""
-    n = s.Tx.shape[0]
+    n = s.rows.shape[0]
     project(s, y, places, speeds)
     _accelerate(y, s, load, rate)
     for j in range(n):
@@ -139,22 +140,22 @@ def switches(forces, before):
 @helper
 def set_derivatives(s, forces, by_place, by_speed):
     """Fill Jq and Jv (m, m, 8), the derivatives of the accelerations."""
-    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    n, m = s.rows.shape[0], s.rows.shape[2]
     for i in range(m):
         for k in range(m):
             write(by_place[i, k], -read(s.stiffness[i, k]))
             write(by_speed[i, k], -read(s.damping[i, k]))
         for j in range(n):
-            along = read(s.Tx[j, i])
-            leaning = along * read(forces[j, BY_FORCE]) - read(s.Ty[j, i])
+            along = read(s.rows[j, 0, i])
+            leaning = along * read(forces[j, BY_FORCE]) - read(s.rows[j, 1, i])
             place = leaning * read(forces[j, BY_PLACE])
             rate = leaning * read(forces[j, BY_RATE])
             slip = along * read(forces[j, BY_SLIP])
             for k in range(m):
-                away = read(s.Ty[j, k])
+                away = read(s.rows[j, 1, k])
                 write(by_place[i, k], read(by_place[i, k]) + place * away)
                 write(by_speed[i, k], read(by_speed[i, k]) + (rate * away
-                                                              - slip * read(s.Tx[j, k])))
+                                                              - slip * read(s.rows[j, 0, k])))
 
 
 @helper
@@ -163,7 +164,7 @@ def set_time_rate(t, later, speed, s, forces, out):
 
     ``later`` is a little after t, for differences of rates.
     """
-    n, m = s.Tx.shape[0], s.Tx.shape[1]
+    n, m = s.rows.shape[0], s.rows.shape[2]
     per_time = chosen(later > t, 1.0 / (later - t), 0.0)
     for i in range(m):
         write(out[i], spread(0.0))
@@ -183,4 +184,4 @@ def set_time_rate(t, later, speed, s, forces, out):
     acceleration = (ground_speed(later, s) - speed) * per_time
     for j in range(n):
         push = read(s.sliding[j]) * acceleration * read(forces[j, BY_SLIP])
-        add_load(push, s.Tx[j], out)
+        add_load(push, s.rows[j, 0], out)

@@ -184,7 +184,7 @@ def _unfelt_part(lane, t, h, target, b, problem, progress, room):
     again, smallest = mine.numbers[AGAIN, lane], mine.numbers[SMALLEST, lane]
     if again >= _MOST_AGAIN:
         return 1.0
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     for j in range(n):
         s.gap[j], s.sliding[j] = b.system.gap[j, lane], b.system.sliding[j, lane]
         control.slip_scale[j] = b.control.slip_scale[j, lane]
@@ -195,8 +195,8 @@ def _unfelt_part(lane, t, h, target, b, problem, progress, room):
         for k in range(s.friction_parameters.shape[1]):
             s.friction_parameters[j, k] = b.system.friction_parameters[j, k, lane]
         for i in range(m):
-            problem.blocks.shapes[i, j] = b.system.Tx[j, i, lane]
-            problem.blocks.shapes[i, n + j] = b.system.Ty[j, i, lane]
+            problem.blocks.shapes[i, j] = b.system.rows[j, 0, i, lane]
+            problem.blocks.shapes[i, n + j] = b.system.rows[j, 1, i, lane]
     for k in range(len(s.ground_motion_parameters)):
         s.ground_motion_parameters[k] = b.system.ground_motion_parameters[k, lane]
     for i in range(m):

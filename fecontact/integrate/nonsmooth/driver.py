@@ -282,11 +282,13 @@ def nonsmooth_problem(
     arrays = system.arrays._replace(friction_parameters=np.vstack(
         [np.pad(table, ((0, 0), (0, width - table.shape[1]))) for table in tables]))
     if system.basis.dimension == 3:
-        cluster, rows = np.arange(n), arrays.Tx
+        cluster, rows = np.arange(n), np.ascontiguousarray(arrays.rows[:, 0])
     else:
-        cluster, rows = _clusters(arrays.Tx, arrays.sliding)
+        cluster, rows = _clusters(arrays.rows[:, 0], arrays.sliding)
         # Nodes slip exactly as their cluster does.
-        arrays = arrays._replace(Tx=rows[cluster])
+        whole = arrays.rows.copy()
+        whole[:, 0] = rows[cluster]
+        arrays = arrays._replace(rows=whole)
     sliding = np.zeros(len(rows))
     sliding[cluster] = arrays.sliding
     ground = system.ground
@@ -310,7 +312,7 @@ def nonsmooth_problem(
         rough = _rough_nodes(groups, problem.static)
         rubbing &= np.array([rough[cluster == c].any() for c in range(len(rows))])
         if plane:
-            _require_independence(arrays.Ty, rows[rubbing])
+            _require_independence(arrays.rows[:, 1], rows[rubbing])
     return problem, rubbing
 
 
@@ -397,7 +399,7 @@ def _require_independence(Ty: Array, rows: Array) -> None:
 
 
 def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
-    if len(problem.system.T2):
+    if problem.system.rows.shape[1] > 2:
         if problem.poisson:
             raise InputError("SetValued: impact_law = 'poisson' is for plane bodies, but this "
                              "system has contact in space; use impact_law = 'newton'.")

@@ -163,13 +163,13 @@ def set_limits(p, w):
 @helper
 def sinking_row(j, i, w, s):
     """Change of the height of node j over the ground by mode i."""
-    return s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]
+    return s.rows[j, 1, i] - w.nodes[j, SLOPE] * s.rows[j, 0, i]
 
 
 @helper
 def lifting_row(j, i, w, s):
     """Modal force i of a unit contact force of node j."""
-    return sinking_row(j, i, w, s) if s.leans else s.Ty[j, i]
+    return sinking_row(j, i, w, s) if s.leans else s.rows[j, 1, i]
 
 
 @helper
@@ -177,15 +177,15 @@ def place_size(j, Y, p):
     """Size of the terms of the penetration of node j [m], of whose rounding it has 1e-16."""
     s = p.system
     size = abs(s.gap[j]) + max(abs(p.relief[0]), abs(p.relief[1]))
-    for i in range(s.Ty.shape[1]):
-        size += abs(s.Ty[j, i] * Y[i])
+    for i in range(s.rows.shape[2]):
+        size += abs(s.rows[j, 1, i] * Y[i])
     return size
 
 
 @helper
 def force_size(i, Y, pushes, s):
     """Size of the terms of the force on mode i without contact; ``pushes`` are prescribed."""
-    m = s.Ty.shape[1]
+    m = s.rows.shape[2]
     size = abs(pushes[i])
     for k in range(m):
         size += abs(s.stiffness[i, k] * Y[k]) + abs(s.damping[i, k] * Y[m + k])
@@ -226,7 +226,7 @@ def pushing_row(a, i, p, w):
     s = p.system
     n = len(p.cluster)
     if a < n:
-        return lifting_row(a, i, w, s) - s.Tx[a, i] * w.friction[a]
+        return lifting_row(a, i, w, s) - s.rows[a, 0, i] * w.friction[a]
     return -p.rows[a - n, i]
 
 
@@ -238,7 +238,7 @@ def hold_contacts(t, p, status, closed, w, acceleration):
     proportional to their normal forces.
     """
     s = p.system
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     count = 0
     for j in range(n):
         c = p.cluster[j]
@@ -346,7 +346,7 @@ def add_contact_forces(t, Y, moved, p, status, closed, w, acceleration):
     Limits of stick are left out.
     """
     s = p.system
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     observe_forces(moved, Y, p, w.nodes)
     w.total[:] = 0.0
     w.pressing[:] = 0.0
@@ -366,14 +366,14 @@ def add_contact_forces(t, Y, moved, p, status, closed, w, acceleration):
         force = w.nodes[j, FORCE]
         for i in range(m):
             acceleration[i] += (lifting_row(j, i, w, s) * force
-                                - s.Tx[j, i] * w.friction[j])
+                                - s.rows[j, 0, i] * w.friction[j])
     hold_clusters(t, p, status, w, acceleration)
 
 
 def _derivative(t, Y, p, status, closed, w, out):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
     s = p.system
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     for i in range(m):
         out[i] = Y[m + i]
     acceleration = out[m : 2 * m]

@@ -167,7 +167,7 @@ def _through(values, b):
 def _set_slip(k, sign, step, p, Y, room):
     """Put ``sign`` times the slip velocity of cluster k, raised by its rounding, into the bound."""
     s, b, values = p.system, room.bound, room.values
-    size = _along(p.rows[k], s.Tx.shape[1], Y, room, b)
+    size = _along(p.rows[k], s.rows.shape[2], Y, room, b)
     factor = p.sliding[k]
     speed = factor * ground_motion(step.t, s).speed
     if p.steady != 0:
@@ -190,7 +190,7 @@ def _add_ground(j, step, p, Y, room):
         for i in range(len(b)):
             b[i] += p.relief[0] if s.on_ground[j] else 0.0
         return 1.0
-    _along(s.Tx[j], 0, Y, room, x)
+    _along(s.rows[j, 0], 0, Y, room, x)
     low, high = np.inf, -np.inf
     for i in range(len(x)):
         travel = ground_motion(step.t + _PLACES[i] * step.h, s).travel
@@ -255,7 +255,7 @@ def _search_stops(step, p, progress, room):
             room.place[clusters + j] = first_landing(j, step, p, progress, room)
             first = min(first, room.place[clusters + j])
             continue
-        size = _along(s.Ty[j], 0, Y, room, b)
+        size = _along(s.rows[j, 1], 0, Y, room, b)
         size += s.gap[j] + max(abs(p.relief[0]), abs(p.relief[1]))
         for i in range(len(b)):
             b[i] = -b[i] - s.gap[j]
@@ -291,7 +291,7 @@ def least_depth(j, p, limits):
     """Depth of node j [m] below which errors of the places are not measured relative to these."""
     depth = 0.0
     for i in range(p.rows.shape[1]):
-        depth = max(depth, abs(p.system.Ty[j, i]) * limits.floor[i])
+        depth = max(depth, abs(p.system.rows[j, 1, i]) * limits.floor[i])
     return depth
 
 
@@ -301,7 +301,7 @@ def _search_nodes(first, forces, step, p, limits, progress, room):
     s, b, Y, place = p.system, room.bound, progress.state, room.place
     shorter = 1.0
     for j in range(len(s.gap)):
-        _along(s.Ty[j], 0, Y, room, b)
+        _along(s.rows[j, 1], 0, Y, room, b)
         for i in range(len(b)):
             b[i] = -b[i] - s.gap[j]
         low = pressed(smallest(b) + p.relief[0], j, s)

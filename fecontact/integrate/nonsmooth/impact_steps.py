@@ -127,7 +127,7 @@ def _observe_nodes(t, Y, closed, quick, p, room):
     For the places in ``room.middle`` and the velocities of Y; whether a node is struck.
     """
     s, middle, sides = p.system, room.middle, room.sides
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     moved = ground_motion(t, s)
     struck = False
     for j in range(n):
@@ -161,7 +161,7 @@ def _observe_nodes(t, Y, closed, quick, p, room):
 def _add_powers(t, h, Y, out, p, room):
     """Put the work of a step into ``out``; returns what the impulses took."""
     s, rates, middle = p.system, room.rates, room.middle
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     for i in range(2 * m):
         middle[i] = 0.5 * (Y[i] + out[i])
     rates[:] = 0.0
@@ -195,7 +195,7 @@ def _go(t, h, latest, Y, closed, which, quick, p, room, out):
     found.
     """
     s, middle, change = p.system, room.middle, room.change
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     at = min(t + 0.5 * h, latest)
     for i in range(m):
         middle[i] = Y[i] + 0.5 * h * Y[m + i]
@@ -255,8 +255,8 @@ def _too_deep(t, Y, closed, limits, p, room):
         depth = contact_of(j, Y, moved, s).penetration
         if depth > 0.0:
             allowed = 0.0
-            for i in range(s.Ty.shape[1]):
-                allowed += abs(s.Ty[j, i]) * limits.rtol * (limits.floor[i] + room.largest[i])
+            for i in range(s.rows.shape[2]):
+                allowed += abs(s.rows[j, 1, i]) * limits.rtol * (limits.floor[i] + room.largest[i])
             worst = max(worst, depth / allowed)
     return worst
 
@@ -286,11 +286,11 @@ def _write(upto, t, h, Y, out, which, progress, output, room):
 def _fastest(p, room):
     """Largest velocity of a node so far."""
     s = p.system
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     fastest = 0.0
     for j in range(n):
         for i in range(m):
-            row = max(abs(s.Tx[j, i]), abs(s.Ty[j, i]), abs(s.T2[j, i]))
+            row = max(abs(s.rows[j, 0, i]), abs(s.rows[j, 1, i]), abs(s.rows[j, 2, i]))
             fastest = max(fastest, row * room.largest[m + i])
     return fastest
 
@@ -302,7 +302,7 @@ def run_impact_steps(
 ) -> int:
     """Go on for at most ``most`` steps, up to the last of the output times; how it ended."""
     Y, counts, clock, closed = progress.state, progress.counts, progress.clock, progress.closed
-    m = p.system.Tx.shape[1]
+    m = p.system.rows.shape[2]
     t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
     tiny = 1e-14 * max(abs(output.times[0]), abs(end), limits.longest)
     if counts[STARTED] == 0:

@@ -145,12 +145,12 @@ class Workspace(NamedTuple):
 
 def tangents(problem: NonsmoothProblem) -> int:
     """How many tangents a node has."""
-    return 2 if len(problem.system.T2) else 1
+    return 2 if problem.system.rows.shape[1] > 2 else 1
 
 
 def node_columns(problem: NonsmoothProblem) -> int:
     """How many columns `Workspace.nodes` has."""
-    return SPACE_NODE_COLUMNS if len(problem.system.T2) else NODE_COLUMNS
+    return SPACE_NODE_COLUMNS if problem.system.rows.shape[1] > 2 else NODE_COLUMNS
 
 
 def workspace_for(problem: NonsmoothProblem) -> Workspace:

@@ -140,7 +140,7 @@ def _place(t, p, progress, room, w, out):
 @routine
 def settle(t, p, status, closed, w, out, Y):
     """Change q' so that closed stops do not sink and sticking clusters do not slip."""
-    n, m = p.system.Tx.shape
+    n, _, m = p.system.rows.shape
     if not closed.any():
         return
     derivative(t, Y, p, status, closed, w, out)
@@ -159,7 +159,7 @@ def settle(t, p, status, closed, w, out, Y):
 @routine
 def _set_matrix(p, w, matrix):
     """Fill matrix (n + k, n + k) with the change of [-u', -s] by unit impulses."""
-    n, m = p.system.Tx.shape
+    n, _, m = p.system.rows.shape
     w.friction[:] = 0.0
     for a in range(len(matrix)):
         for b in range(len(matrix)):
@@ -220,7 +220,7 @@ def _strike(t, touching, p, progress, w):
     Its losses go to the works of normal damping and friction; that of friction never falls.
     """
     s, Y = p.system, progress.state
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     k = len(p.rows)
     conditions, case = _conditions(touching, np.abs(Y[m : 2 * m]), p, w), new_case(n, k)
     _omit_fixed(progress.status, conditions)
@@ -335,7 +335,7 @@ def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
 def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w, out):
     """Decide which touching stops stay closed and which clusters stick; see `change_contacts`."""
     s, Y, status, closed = p.system, progress.state, progress.status, progress.closed
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     k = len(p.rows)
     # Without contact; the status is kept for what depends on it.
     kept = closed == HELD

@@ -141,8 +141,8 @@ def _slips_back(j, step, p, w, tolerance, room):
         for i in range(4):
             speed[i] += THIRDS[i, k] * side
     rise, fall = 0.0, 0.0
-    for i in range(s.Tx.shape[1]):
-        row = e1 * s.Tx[j, i] + e2 * s.T2[j, i]
+    for i in range(s.rows.shape[2]):
+        row = e1 * s.rows[j, 0, i] + e2 * s.rows[j, 2, i]
         rise += row * room.before[i]
         fall += row * room.accelerations[STAGES - 1, i]
     b[0], b[3] = first + speed[0], last + speed[3]
@@ -163,9 +163,9 @@ def _grip(j, g, hold, s):
     Athwart a fast belt velocities are small, and nodes have to come to rest in shorter steps.
     """
     along, across = 0.0, 0.0
-    for i in range(s.Tx.shape[1]):
-        along += s.Tx[j, i] * s.Tx[j, i]
-        across += s.T2[j, i] * s.T2[j, i]
+    for i in range(s.rows.shape[2]):
+        along += s.rows[j, 0, i] * s.rows[j, 0, i]
+        across += s.rows[j, 2, i] * s.rows[j, 2, i]
     if hold.grip[j] == 0.0:
         return 0.0
     softest = max(along, across) * g / STIFFEST
@@ -175,13 +175,13 @@ def _grip(j, g, hold, s):
 def _linearise(stage, moved, p, hold, turning, room, force):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
-    As in the plane: adds ``Ty F - Tx T - T2 T_across`` to ``room.balance``, fills ``force`` (2 n,)
-    with R, and ``active`` and ``gradients`` (3, n, m) of the room. Returns the number of nodes
+    As in the plane: adds modal forces to ``room.balance``, fills ``force`` (2 n,) with R, and
+    ``active`` and ``gradients`` of the room. Returns the number of nodes
     under force and the largest velocity that there must not be: of a sticking node, or of slip
     athwart its friction; infinite when a node has changed between stick and slip.
     """
     s, g, side = p.system, stage.g, hold.side
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     count, creep = 0, 0.0
     for j in range(n):
         force[j], force[n + j] = 0.0, 0.0
@@ -254,13 +254,13 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             R1y += s1 * F_y
             R2y += s2 * F_y
         for i in range(m):
-            tx, ty, t2 = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
+            tx, ty, t2 = s.rows[j, 0, i], s.rows[j, 1, i], s.rows[j, 2, i]
             room.balance[i] += ty * F - tx * T1 - t2 * T2
-            room.active[0, count, i], room.active[1, count, i] = tx, ty
-            room.active[2, count, i] = t2
-            room.gradients[0, count, i] = R11 * tx + R1y * ty + R12 * t2
-            room.gradients[1, count, i] = -F_1 * tx - F_y * ty - F_2 * t2
-            room.gradients[2, count, i] = R21 * tx + R2y * ty + R22 * t2
+            room.active[count, 0, i], room.active[count, 1, i] = tx, ty
+            room.active[count, 2, i] = t2
+            room.gradients[count, 0, i] = R11 * tx + R1y * ty + R12 * t2
+            room.gradients[count, 1, i] = -F_1 * tx - F_y * ty - F_2 * t2
+            room.gradients[count, 2, i] = R21 * tx + R2y * ty + R22 * t2
         count += 1
     return float(count), creep
 

@@ -104,7 +104,7 @@ class ImpactRoom(NamedTuple):
 
 def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
     """Room for a problem."""
-    n, m = problem.system.Tx.shape
+    n, _, m = problem.system.rows.shape
     flags = np.zeros((3, n), dtype=np.int64)
     given, before, after, impulses, rest = np.zeros((5, 3 * n))
     slopes, sides = np.zeros((2, 2 * n))
@@ -132,18 +132,18 @@ def set_matrix(h, p, room):
 def set_rows(j, contact, p, room):
     """Fill the rows of node j: how modes change its height over the ground and its place."""
     s, rows = p.system, room.rows
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     for i in range(m):
-        rows[j, i] = (s.Ty[j, i] - contact.slope * s.Tx[j, i]
-                      - contact.slope_across * s.T2[j, i])
-        rows[n + j, i], rows[2 * n + j, i] = s.Tx[j, i], s.T2[j, i]
+        rows[j, i] = (s.rows[j, 1, i] - contact.slope * s.rows[j, 0, i]
+                      - contact.slope_across * s.rows[j, 2, i])
+        rows[n + j, i], rows[2 * n + j, i] = s.rows[j, 0, i], s.rows[j, 2, i]
 
 
 @routine
 def set_pushes(p, room):
     """Fill ``pushes`` and ``coupling`` of the touching nodes, with the factorised matrix."""
     s, rows, pushes, touching = p.system, room.rows, room.pushes, room.touching
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     for b in range(3 * n):
         j = b % n
         if not touching[j]:
@@ -152,7 +152,7 @@ def set_pushes(p, room):
             if b >= n:
                 pushes[b, i] = -rows[b, i]
             else:
-                pushes[b, i] = rows[b, i] if s.leans else s.Ty[j, i]
+                pushes[b, i] = rows[b, i] if s.leans else s.rows[j, 1, i]
         solve(room.matrix, room.pivots, pushes[b])
         for a in range(3 * n):
             if touching[a % n]:
@@ -225,12 +225,12 @@ def find_impulses(restitution, n, room):
 def put_on_ground(t, Y, closed, p, room):
     """Move closed nodes, and nodes in the ground, to where they just touch it."""
     s, middle, x = p.system, room.middle, room.impulses
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     moved = ground_motion(t, s)
     margin = 0.0
     for i in range(m):
         for j in range(n):
-            margin = max(margin, _MARGIN * abs(s.Ty[j, i]) * room.largest[i])
+            margin = max(margin, _MARGIN * abs(s.rows[j, 1, i]) * room.largest[i])
     middle[:] = Y[: 2 * m]
     room.matrix[:] = 0.0
     for i in range(m):

@@ -74,8 +74,8 @@ class Hold(NamedTuple):
 class NewtonRoom(NamedTuple):
     """Room for Newton's method.
 
-    Rows ``active`` (2, n, m), Tx and Ty, of the nodes under force, and their ``gradients``
-    (2, n, m), dR/dV and -dF/dV; in space (3, n, m), with T2 and friction across at the end;
+    Rows ``active`` (n, d, m) of the nodes under force, and their ``gradients`` (n, d, m), minus
+    the derivatives of the forces along the axes to V;
     ``partial`` (3, 4) of one node; ``linear`` (m, m) is 1 + g C + g^2 K, ``matrix`` the whole
     matrix; ``balance`` and ``residual`` (m,).
     """
@@ -100,7 +100,7 @@ def newton_room_for(nodes: int, modes: int, tangents: int = 1) -> NewtonRoom:
     """Room for so many nodes and modes."""
     linear, whole = np.zeros((2, modes, modes))
     balance, residual = np.zeros((2, modes))
-    gradients, active = np.zeros((2, 1 + tangents, nodes, modes))
+    gradients, active = np.zeros((2, nodes, 1 + tangents, modes))
     return NewtonRoom(gradients, active, np.zeros((3, 4)), linear, whole, balance, residual)
 
 
@@ -108,14 +108,14 @@ def newton_room_for(nodes: int, modes: int, tangents: int = 1) -> NewtonRoom:
 def _linearise(stage, moved, p, hold, turning, room, force):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
-    Adds ``Ty F - Tx T`` to ``room.balance``, fills ``force`` (n,) with R, and ``active`` and
+    Adds modal contact forces to ``room.balance``, fills ``force`` (n,) with R, and ``active`` and
     ``gradients`` of the room. KEPT nodes stay on their side; HESITANT ones that would turn their
     slip around are first tried as sticking, or the iteration would jump across stick for ever.
     Returns the number of nodes under force and the largest creep velocity of a sticking node,
     infinite when a node has changed between stick and slip.
     """
     s, g, side, partial = p.system, stage.g, hold.side, room.partial
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     count, creep = 0, 0.0
     for j in range(n):
         force[j] = 0.0
@@ -124,7 +124,7 @@ def _linearise(stage, moved, p, hold, turning, room, force):
         if F == 0.0:
             continue
         slip = contact.slip
-        along, away = g * partial[0, 0] + partial[0, 2], g * partial[0, 1] + partial[0, 3]
+        along, away = g * partial[1, 0] + partial[1, 2], g * partial[1, 1] + partial[1, 3]
         limit = stick_limit(j, pressing, p)
         trial = hold.multiplier[j] + hold.grip[j] * slip
         turned = trial if abs(trial) > limit else 0.0
@@ -152,11 +152,11 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             R_along += contact.slope * along + g * F * contact.curvature
             R_away += contact.slope * away
         for i in range(m):
-            tx, ty = s.Tx[j, i], s.Ty[j, i]
+            tx, ty = s.rows[j, 0, i], s.rows[j, 1, i]
             room.balance[i] += ty * F - tx * T
-            room.active[0, count, i], room.active[1, count, i] = tx, ty
-            room.gradients[0, count, i] = R_along * tx + R_away * ty
-            room.gradients[1, count, i] = -along * tx - away * ty
+            room.active[count, 0, i], room.active[count, 1, i] = tx, ty
+            room.gradients[count, 0, i] = R_along * tx + R_away * ty
+            room.gradients[count, 1, i] = -along * tx - away * ty
         count += 1
     return count, creep
 
@@ -215,12 +215,9 @@ def solve_stage(stage, p, hold, limits, finest, room, force):
         turning = HESITANT if iteration < _HASTY else FREE
         whole[:] = room.linear
         if count:
-            Tx, Ty = room.active[0, :count].T, room.active[1, :count].T
-            whole += stage.g * (np.dot(Tx, room.gradients[0, :count])
-                                + np.dot(Ty, room.gradients[1, :count]))
-            if in_space(p.system):
-                T2 = room.active[2, :count].T
-                whole += stage.g * np.dot(T2, room.gradients[2, :count])
+            size = count * room.active.shape[1]
+            whole += stage.g * np.dot(room.active[:count].reshape((size, m)).T,
+                                      room.gradients[:count].reshape((size, m)))
         for i in range(m):
             if not math.isfinite(room.residual[i]):
                 return False

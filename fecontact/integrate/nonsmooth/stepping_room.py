@@ -91,7 +91,7 @@ SLIPS_BACK = Callable[[int, Step, NonsmoothProblem, Workspace, float, Room], flo
 
 def room_for(problem: NonsmoothProblem, space: InSpace = IN_PLANE) -> Room:
     """Room for a problem."""
-    n, m = problem.system.Tx.shape
+    n, _, m = problem.system.rows.shape
     size, k = m + POWER_COUNT + n, tangents(problem)
     start, known = np.zeros((2, m))
     before, after = np.zeros((2, size))

@@ -103,9 +103,9 @@ def _slips_back(j, h, p, w, tolerance, room):
         return 1.0
     sign = 1.0 if first > 0.0 else -1.0
     rise, fall = 0.0, 0.0
-    for i in range(s.Tx.shape[1]):
-        rise += s.Tx[j, i] * room.before[i]
-        fall += s.Tx[j, i] * room.accelerations[STAGES - 1, i]
+    for i in range(s.rows.shape[2]):
+        rise += s.rows[j, 0, i] * room.before[i]
+        fall += s.rows[j, 0, i] * room.accelerations[STAGES - 1, i]
     b[0], b[3] = first + factor * speed[0], last + factor * speed[3]
     b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
     for i in range(4):
@@ -124,8 +124,8 @@ def _touches(j, h, p, w, limits, room):
     b[0], b[3] = room.old[j, PENETRATION], w.nodes[j, PENETRATION]
     b[1], b[2] = b[0] + h * room.old[j, RATE] / 3.0, b[3] - h * w.nodes[j, RATE] / 3.0
     depth = 0.0
-    for i in range(s.Ty.shape[1]):
-        depth = max(depth, abs(s.Ty[j, i]) * limits.floor[i])
+    for i in range(s.rows.shape[2]):
+        depth = max(depth, abs(s.rows[j, 1, i]) * limits.floor[i])
     above = UNFELT * max(pressed(b[0], j, s), pressed(b[3], j, s))
     above += pressed(limits.rtol * depth, j, s)
     if max(pressed(b.min(), j, s), pressed(b.max(), j, s)) > above:
@@ -175,7 +175,7 @@ def _slip_changes(w, room):
 @helper
 def _write_row(row, t, h, p, progress, output, w, room):
     """State at an output time within a step of length h, by cubics through both ends."""
-    m = p.system.Tx.shape[1]
+    m = p.system.rows.shape[2]
     Y, new, before, after = progress.state, room.new, room.before, room.after
     states, time = output.states, output.times[row]
     x = (time - t) / h
@@ -200,18 +200,18 @@ def _write_row(row, t, h, p, progress, output, w, room):
 def _set_inertia(p, limits, room):
     """Fill ``room.inertia``; returns the largest floor of the slip velocities."""
     s = p.system
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     slowest = 0.0
     for j in range(n):
         room.inertia[j], part = 0.0, 0.0
         for i in range(m):
-            room.inertia[j] += s.Tx[j, i] * s.Tx[j, i]
-            part = max(part, abs(s.Tx[j, i]) * limits.floor[m + i])
+            room.inertia[j] += s.rows[j, 0, i] * s.rows[j, 0, i]
+            part = max(part, abs(s.rows[j, 0, i]) * limits.floor[m + i])
         if in_space(s):
             across = 0.0
             for i in range(m):
-                across += s.T2[j, i] * s.T2[j, i]
-                part = max(part, abs(s.T2[j, i]) * limits.floor[m + i])
+                across += s.rows[j, 2, i] * s.rows[j, 2, i]
+                part = max(part, abs(s.rows[j, 2, i]) * limits.floor[m + i])
             room.inertia[j] = max(room.inertia[j], across)
         slowest = max(slowest, part)
     return slowest
@@ -222,7 +222,7 @@ def _prepare(step, quick, p, progress, w, room):
     """Set the linear matrix of a step, and what holds the sticking nodes."""
     s, hold, inertia, linear = p.system, room.hold, room.inertia, room.newton.linear
     g = GAMMA * step.h
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     for i in range(m):
         for k in range(m):
             linear[i, k] = g * s.damping[i, k] + g * g * s.stiffness[i, k]
@@ -239,7 +239,7 @@ def _prepare(step, quick, p, progress, w, room):
 @helper
 def _solve_stages(step, finest, p, limits, progress, room):
     """Solve the stages of a step; returns how many succeeded."""
-    m = p.system.Tx.shape[1]
+    m = p.system.rows.shape[2]
     Y, h, g = progress.state, step.h, GAMMA * step.h
     start, known, states, accelerations = (room.start, room.known, room.states,
                                            room.accelerations)
@@ -268,7 +268,7 @@ def _error(step, p, limits, Y, room):
     """Error of the state in units of what is allowed, filtered by the matrix of the last stage."""
     s, start, known, floor = p.system, room.start, room.known, limits.floor
     states, accelerations = room.states, room.accelerations
-    m, h, g = s.Tx.shape[1], step.h, GAMMA * step.h
+    m, h, g = s.rows.shape[2], step.h, GAMMA * step.h
     for i in range(m):
         start[i] = h * (ERROR_1 * states[0, m + i] + ERROR_2 * states[1, m + i]
                         + GAMMA * states[2, m + i])
@@ -330,7 +330,7 @@ def _accept(step, reached, p, progress, output, w, room):
 @helper
 def pass_break(step, t, p, progress, output):
     """Add the work that the drive puts in where its motions jump, at the time t."""
-    first = 2 * p.system.Tx.shape[1]
+    first = 2 * p.system.rows.shape[2]
     work = drive_jump(step.latest, t, progress.state, p.system)
     progress.state[first + DRIVE] += work
     last = progress.counts[OUTPUTS] - 1
@@ -348,7 +348,7 @@ def run_steps(
     The rows of ``output`` are filled as ``progress.counts`` says.
     """
     Y, counts, clock, largest = progress.state, progress.counts, progress.clock, progress.largest
-    n, m = p.system.Tx.shape
+    n, _, m = p.system.rows.shape
     slowest = _set_inertia(p, limits, room)
     room.hold.side[:] = 0.0
     room.sides[:] = 0.0

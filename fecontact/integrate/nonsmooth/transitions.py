@@ -86,14 +86,14 @@ def press(t, p, touched, w, Y):
     Nodes that are open by more, as those of a step that ends before its touch-down, are left.
     """
     s = p.system
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     for j in range(len(touched)):
         u, rate = w.nodes[j, PENETRATION], w.nodes[j, RATE]
         if not touched[j] or pressed(u, j, s) > 0.0:
             continue
         size, stretch = place_size(j, Y, p), 0.0
         for i in range(m):
-            row = s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]
+            row = s.rows[j, 1, i] - w.nodes[j, SLOPE] * s.rows[j, 0, i]
             stretch += row * row
         depth = ROUNDING * size + abs(rate) * _TIME_ROUNDING * (abs(t) + _TICKS * p.tick)
         for _ in range(_PRESSES):
@@ -101,7 +101,7 @@ def press(t, p, touched, w, Y):
                 -depth if pressed(u - depth, j, s) > 0.0 else 0.0)
             if way != 0.0 and stretch > 0.0:
                 for i in range(m):
-                    row = s.Ty[j, i] - w.nodes[j, SLOPE] * s.Tx[j, i]
+                    row = s.rows[j, 1, i] - w.nodes[j, SLOPE] * s.rows[j, 0, i]
                     Y[i] -= row / stretch * way
                 break
             depth *= 4.0

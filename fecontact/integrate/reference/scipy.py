@@ -22,10 +22,8 @@ from fecontact.system.elastic_sliders import (
 )
 from fecontact.system.kernels import right_hand_side
 from fecontact.system.loads import work_of_loads
+from fecontact.system.model_limits import MOST_PERIODS
 from fecontact.system.powers import NODE_POWERS, POWERS, powers
-
-# Most periods of what is given in time, and steps of max_step, in a run, which then takes hours.
-MOST_PERIODS = 1e9
 
 
 def integrate(

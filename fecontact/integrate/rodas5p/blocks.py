@@ -29,8 +29,8 @@ class Blocks(NamedTuple):
     nodes, used : (n,), (1,) integer arrays
         Numbers of the nodes in ascending order, in the first ``used[0]`` places.
     shapes : (m, 2 n) array
-        Their rows Tx, then from column n on Ty, side by side, so that sums over nodes vectorise;
-        (m, 3 n) in space, T2 last.
+        Their rows along the first axis, then from column n on those along the normal, side by
+        side, so that sums over nodes vectorise; (m, 3 n) in space.
     parts : (p, 4) integer array
         First and last mode, first and last node of each block of the rows.
     tiles : (t, 4) integer array
@@ -78,19 +78,16 @@ def block_at(table, k):
 
 def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
     """The blocks of a system, by its bodies and interfaces and by what is zero."""
-    n, m = arrays.Tx.shape
+    n, _, m = arrays.rows.shape
     modes = _ranges([part.modes[1] for part in basis.parts], m)
     nodes = _ranges([count for _, count in basis.groups], n)
-    moved = np.array([[bool(arrays.Tx[slice(*j), slice(*i)].any()
-                            or arrays.Ty[slice(*j), slice(*i)].any()
-                            or arrays.T2[slice(*j), slice(*i)].any()) for i in modes]
-                      for j in nodes])
+    moved = np.array([[arrays.rows[slice(*j), :, slice(*i)].any() for i in modes] for j in nodes])
     own = np.array([[any(one[slice(*i), slice(*k)].any()
                          for one in (arrays.stiffness, arrays.damping, arrays.modal_damping))
                      for k in modes] for i in modes])
     own |= np.eye(len(modes), dtype=bool)
     coupled = own | own.T | (moved.T.astype(int) @ moved.astype(int) > 0)
-    shapes = np.vstack([arrays.Tx, arrays.Ty, arrays.T2.reshape(-1, m)]).T.copy()
+    shapes = arrays.rows.swapaxes(0, 1).reshape(-1, m).T.copy()
     if coupled.all():
         return one_block(shapes, n)
     return _blocks(shapes, modes, nodes, moved, own, coupled)

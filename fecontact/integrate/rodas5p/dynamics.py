@@ -29,10 +29,10 @@ FRICTION_ENTRIES = Size("entries of friction")
 class Gradients(NamedTuple):
     """Derivatives of the node forces, as :func:`fecontact.system.kernels.node_gradients` gives.
 
-    partial : (n, 3, 4), derivatives of F, T and the pressing force to x, y, x', y'
-    force : (n, 3 + s), rates : (n, s, 3 + s), of friction with memory
-
-    In space (n, 4, 6), (n, 2 (4 + s)) and (n, s, 4 + s), of friction in two directions.
+    partial : (n, d + 1, 2 d), derivatives of the forces on a node along its axes and of the
+    pressing force, to displacements and velocities along the axes
+    force : (n, 3 + s), rates : (n, s, 3 + s), of friction with memory; in space (n, 2 (4 + s)) and
+    (n, s, 4 + s), of friction in two directions
     """
 
     partial: Annotated[Array, NODES, AXES + 1, 2 * AXES]
@@ -132,6 +132,15 @@ def project_block_once(ends, shapes, q, places):
         for j in range(left, right):
             places[j] += shapes[i, j] * q[i]
         i += 1
+
+
+@helper
+def change_of(row, j, n, w):
+    """Change of what has the derivatives ``row`` (2 d,) by the motion of node j in w (3, d n)."""
+    d, total = len(row) // 2, 0.0
+    for axis in range(d):
+        total += row[axis] * w[0, axis * n + j] + row[d + axis] * w[1, axis * n + j]
+    return total
 
 
 @helper
@@ -306,7 +315,7 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     speed with x'. ``acceleration`` (2,) is that of the ground's motions, ``rate_of_loads`` (m,) the
     rate of the modal loads.
     """
-    m, n = len(rate_of_loads), len(s.gap)
+    m, n, d = len(rate_of_loads), len(s.gap), s.rows.shape[1]
     states, forces = g.rates.shape[1], w[2]
     for i in range(m):
         out[i] = 0.0
@@ -315,29 +324,27 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     if nodes.in_space(s):
         for i in range(m):
             out[m + i] += given[PULL_RATE + 2] * s.drive_shapes[2, i]
-
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
-        v = nodes.moved_along(j, given[SPEED], given[SECOND_SPEED], s)
-        a = nodes.moved_along(j, acceleration[0], acceleration[1], s)
-        p = g.partial[j]
-        forces[at] = v * p[1, 0] + a * p[1, 2]
-        forces[n + at] = -v * p[0, 0] - a * p[0, 2]
-        pressing = -v * p[2, 0] - a * p[2, 2]
-        a2 = 0.0
-        if nodes.in_space(s):
-            v2 = nodes.moved_across(j, given[SPEED], given[SECOND_SPEED], s)
-            a2 = nodes.moved_across(j, acceleration[0], acceleration[1], s)
-            forces[at] += v2 * p[1, 4] + a2 * p[1, 5]
-            forces[n + at] -= v2 * p[0, 4] + a2 * p[0, 5]
-            forces[2 * n + at] = v * p[3, 0] + a * p[3, 2] + v2 * p[3, 4] + a2 * p[3, 5]
-            pressing -= v2 * p[2, 4] + a2 * p[2, 5]
+        pressing = 0.0
+        for row in range(d + 1):
+            rate = 0.0
+            for axis in range(0, d, 2):
+                rate -= (nodes.ground_moved(axis, j, given[SPEED], given[SECOND_SPEED], s)
+                         * g.partial[j, row, axis]
+                         + nodes.ground_moved(axis, j, acceleration[0], acceleration[1], s)
+                         * g.partial[j, row, d + axis])
+            if row < d:
+                forces[row * n + at] = rate
+            else:
+                pressing = rate
         for k in range(states):
             rate = 0.0
             if k < s.memory[j]:
-                rate = -a * g.rates[j, k, 1] + g.rates[j, k, 2] * pressing
-                if nodes.in_space(s):
-                    rate -= a2 * g.rates[j, k, 3 + states]
+                rate = g.rates[j, k, 2] * pressing
+                for tangent in range(d - 1):
+                    rate -= (nodes.ground_moved(2 * tangent, j, acceleration[0], acceleration[1], s)
+                             * g.rates[j, k, nodes.slip_entry(tangent, states)])
             out[2 * m + j * states + k] = rate
     push(blocks, forces, out[m : 2 * m])
 
@@ -351,7 +358,7 @@ def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
     normal forces that fall to zero. Stepping there saves the steps that would fail because
     forces change within them; it is an estimate, and nothing depends on its accuracy.
     """
-    m, n = len(blocks.position), len(s.gap)
+    m, n, d = len(blocks.position), len(s.gap), s.rows.shape[1]
     project(blocks, y, w[0], w[1])
     project_one(blocks, rate[m : 2 * m], w[2])
     first = within
@@ -361,7 +368,7 @@ def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
         first = _crossing(u - depth[j], v, a, first)
         force = normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
         if force > 0.0:
-            fall = g.partial[j, 0, 1] * -v + g.partial[j, 0, 3] * -a
+            fall = g.partial[j, 1, 1] * -v + g.partial[j, 1, d + 1] * -a
             if fall < 0.0 and -force / fall < first:
                 first = -force / fall
             slip = w[1, j] - nodes.moved_along(j, moved.speed, moved.second_speed, s)

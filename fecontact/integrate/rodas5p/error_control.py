@@ -306,9 +306,9 @@ def _above_creep(part, j, step, problem, progress, room):
         across = -moved_across(j, moved.speed, moved.second_speed, s)
     for i in range(m):
         v = tableau.one_interpolated(part, m + i, progress.state, room.after, room.dense)
-        slip += s.Tx[j, i] * v
+        slip += s.rows[j, 0, i] * v
         if in_space(s):
-            across += s.T2[j, i] * v
+            across += s.rows[j, 2, i] * v
     return (math.hypot(slip, across) if in_space(s) else abs(slip)) - problem.control.stick_speed[j]
 
 

@@ -14,26 +14,16 @@ from fecontact.core.compiled import helper, routine
 from fecontact.integrate.rodas5p import tableau
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
+    change_by,
     ground_motion,
+    ground_moved,
     in_space,
     memory_of,
-    moved_across,
-    moved_along,
     node_motion,
 )
 
 # Part of the penetration scale within which a penetration is at a level.
 _NEAR = 1e-6
-
-
-@helper
-def _change(row, motion, s):
-    """Change of a quantity of a node by its motion, with the derivatives ``row`` to it."""
-    change = (row[0] * motion.along + row[1] * motion.height + row[2] * motion.along_rate
-              + row[3] * motion.height_rate)
-    if in_space(s):
-        change += row[4] * motion.across + row[5] * motion.across_rate
-    return change
 
 
 @helper
@@ -58,13 +48,12 @@ def _touch(j, step, acceleration, problem, progress, room, vary, row):
     before = node_forces(j, node_motion(j, progress.state, s), step.moved, z, s, force, rates)[2]
     own, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
     for k in range(len(row)):
-        row[k] = room.gradients_after.partial[j, 0, k]
-    rate = _change(row, node_motion(j, room.rate_after, s), s)
-    rate -= (row[0] * moved_along(j, moved.speed, moved.second_speed, s)
-             + row[2] * moved_along(j, acceleration[0], acceleration[1], s))
-    if in_space(s):
-        rate -= (row[4] * moved_across(j, moved.speed, moved.second_speed, s)
-                 + row[5] * moved_across(j, acceleration[0], acceleration[1], s))
+        row[k] = room.gradients_after.partial[j, 1, k]
+    rate = change_by(row, j, room.rate_after, s)
+    d = s.rows.shape[1]
+    for axis in range(0, d, 2):
+        rate -= (row[axis] * ground_moved(axis, j, moved.speed, moved.second_speed, s)
+                 + row[d + axis] * ground_moved(axis, j, acceleration[0], acceleration[1], s))
     # A force that jumps is cut off at a penetration.
     by_depth = abs(own) > 2.0 * abs(rate) * step.h or _passes_level(
         j, before.penetration, contact.penetration, problem.control)
@@ -73,7 +62,7 @@ def _touch(j, step, acceleration, problem, progress, room, vary, row):
             row[k] = 0.0
         row[0], row[1], rate = contact.slope, -1.0, contact.rate
         if in_space(s):
-            row[4] = contact.slope_across
+            row[2] = contact.slope_across
     if vary.width == 0.0:
         return rate, 0.0
     F, _, above = node_forces(j, node_motion(j, y, s), ground_motion(now, vary.above), z,
@@ -99,14 +88,14 @@ def switch_memory(step, acceleration, problem, progress, room, vary):
         if s.memory[j] == 0 or problem.control.slider_counts[j] > 0 or not (
                 opened or progress.signs[j] == 0):
             continue
-        first, row = 2 * m + j * states, v.inside.partial[j, 0]
+        first, row = 2 * m + j * states, v.inside.partial[j, 1]
         rate, varied = 1.0, 0.0
         if not opened:
             rate, varied = _touch(j, step, acceleration, problem, progress, room, vary, row)
         for c in range(columns):
             earlier = 0.0
             if not opened:
-                earlier = _change(row, node_motion(j, v.after[c], s), s)
+                earlier = change_by(row, j, v.after[c], s)
                 if c == columns - 1:
                     earlier += varied
                 earlier /= rate

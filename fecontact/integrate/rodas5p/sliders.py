@@ -30,7 +30,14 @@ from fecontact.system.elastic_sliders import (
     return_to_limits,
 )
 from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import force_room, ground_motion, in_space, memory_of, node_motion
+from fecontact.system.nodes import (
+    change_by,
+    force_room,
+    ground_motion,
+    in_space,
+    memory_of,
+    node_motion,
+)
 
 _ATTEND = Callable[[
     int, state.Step, state.Problem, state.Progress, state.Room, Vary, float, Vector,
@@ -242,21 +249,10 @@ def _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, 
     p = s.friction_parameters[j]
     slope = p[1 + count + i] / p[1 + i]
     for c in range(len(v.columns)):
-        x, height, x_rate, height_rate, across, across_rate = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(m):
-            x += s.Tx[j, k] * v.columns[c, k]
-            height += s.Ty[j, k] * v.columns[c, k]
-            x_rate += s.Tx[j, k] * v.columns[c, m + k]
-            height_rate += s.Ty[j, k] * v.columns[c, m + k]
-            if tangents == 2:
-                across += s.T2[j, k] * v.columns[c, k]
-                across_rate += s.T2[j, k] * v.columns[c, m + k]
-        row = g.partial[j, 2]
-        change = slope * (row[0] * x + row[1] * height + row[2] * x_rate + row[3] * height_rate)
-        deeper = contact.slope * x - height
-        if tangents == 2:
-            change += slope * (row[4] * across + row[5] * across_rate)
-            deeper += contact.slope_across * across
+        motion = node_motion(j, v.columns[c], s)
+        change = slope * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
+        deeper = (contact.slope * motion.along - motion.height
+                  + contact.slope_across * motion.across)
         if vary.width != 0.0 and c == len(v.columns) - 1:
             above, one = _pressing(j, y, ground_motion(t, vary.above), vary.above, force, rates)
             below, other = _pressing(j, y, ground_motion(t, vary.below), vary.below, force, rates)

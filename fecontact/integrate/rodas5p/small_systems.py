@@ -38,7 +38,7 @@ def advance_for(problem: state.Problem, vary: Vary) -> Any:
     """
     if len(vary.variation.columns) or not _small(problem):
         return step_loop.advance
-    n, m = problem.system.Tx.shape
+    n, _, m = problem.system.rows.shape
     return _advance(m, n)
 
 
@@ -48,7 +48,7 @@ def propagate_for(problem: state.Problem) -> int:
     For the same systems as the step loops, with any number of columns; other systems without
     internal variables go in parts of steps.
     """
-    n, m = problem.system.Tx.shape
+    n, _, m = problem.system.rows.shape
     return _propagate((m, n) if _small(problem) else None, in_parts(problem))
 
 
@@ -63,8 +63,8 @@ def _small(problem: state.Problem) -> bool:
 
 def not_small(system: SystemArrays) -> str | None:
     """Why there is no step loop of its size for a system, even of one block; or None."""
-    n, m = system.Tx.shape
-    if len(system.T2):
+    n, _, m = system.rows.shape
+    if system.rows.shape[1] > 2:
         return "bodies in space are not among them"
     if (m, n) not in SIZES:
         return f"{m} modes and {n} nodes are not among them"

@@ -23,8 +23,8 @@ from fecontact.core.dense_lu import factorise_within, solve_within
 from fecontact.core.records import Matrix, allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.integrate.rodas5p.dynamics import project
-from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, in_space
+from fecontact.integrate.rodas5p.dynamics import change_of, project
+from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, friction_entry, slip_entry
 
 
 class Reduced(NamedTuple):
@@ -83,17 +83,13 @@ def eliminate_memory(G, s, g, w):
                     inverse[i, k] = 0.0
                     for c in range(states):
                         inverse[i, c] -= factor * inverse[k, c]
-        for k in range(states):
-            total = 0.0
-            for other in range(s.memory[j]):
-                total += g.force[j, 3 + other] * inverse[other, k]
-            w.weights[j, k] = total
-        if in_space(s):
+        for tangent in range(w.weights.shape[1] // max(states, 1)):
+            first = friction_entry(tangent, states) + 3
             for k in range(states):
                 total = 0.0
                 for other in range(s.memory[j]):
-                    total += g.force[j, 7 + states + other] * inverse[other, k]
-                w.weights[j, states + k] = total
+                    total += g.force[j, first + other] * inverse[other, k]
+                w.weights[j, tangent * states + k] = total
 
 
 # Columns that are multiplied at a time: what the rows hold there stays in the caches.
@@ -205,62 +201,53 @@ def set_answers(blocks, g, w, answers):
     ``g`` are the Gradients, ``w`` holds the weights and room for coefficients.
     """
     shapes = blocks.shapes
-    m, n = len(shapes), len(g.partial)
-    states = w.inverse.shape[1]
+    m, n, d = len(shapes), len(g.partial), g.partial.shape[2] // 2
     c = w.coefficients
-    space = len(c) > 4
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
-        p = g.partial[j]
-        pressing, slip = 0.0, 0.0
-        for k in range(states):
-            slip += w.weights[j, k] * g.rates[j, k, 1]
-            pressing += w.weights[j, k] * g.rates[j, k, 2]
-        for k in range(4):
-            c[k, at] = -p[1, k] - pressing * p[2, k]
-            c[k, n + at] = p[0, k]
-        c[2, at] -= slip
-        if space:
-            _set_coefficients_across(at, j, g, w, pressing)
+        for axis in range(d):
+            for k in range(2 * d):
+                c[k, axis * n + at] = g.partial[j, axis, k]
+        _add_memory(at, j, g, w)
     for part in range(len(blocks.parts)):
         top, bottom, left, right = block_at(blocks.parts, part)
         for k in range(top, bottom):
             along, away, across = shapes[k, :n], shapes[k, n:], shapes[k, n:]
-            if space:
+            if d > 2:
                 across = shapes[k, 2 * n :]
             for first in range(0, shapes.shape[1], n):
                 by_place, by_speed = answers[k, first:], answers[m + k, first:]
                 # Named outside the loop, or it is not vectorised.
-                c0, c1, c2, c3 = c[0, first:], c[1, first:], c[2, first:], c[3, first:]
+                c0, c1, c2, c3 = c[0, first:], c[1, first:], c[d, first:], c[d + 1, first:]
                 for j in range(left, right):
                     by_place[j] = c0[j] * along[j] + c1[j] * away[j]
                     by_speed[j] = c2[j] * along[j] + c3[j] * away[j]
-                if space:
-                    c4, c5 = c[4, first:], c[5, first:]
+                if d > 2:
+                    c4, c5 = c[2, first:], c[5, first:]
                     for j in range(left, right):
                         by_place[j] += c4[j] * across[j]
                         by_speed[j] += c5[j] * across[j]
 
 
 @helper
-def _set_coefficients_across(at, j, g, w, pressing):
-    """What motion across of node j, at a place, does to its forces, and all motion to that."""
-    n, states = len(g.partial), w.inverse.shape[1]
-    p, c = g.partial[j], w.coefficients
-    slip, second_pressing, second_along, second_across = 0.0, 0.0, 0.0, 0.0
-    for k in range(states):
-        slip += w.weights[j, k] * g.rates[j, k, 3 + states]
-        second_pressing += w.weights[j, states + k] * g.rates[j, k, 2]
-        second_along += w.weights[j, states + k] * g.rates[j, k, 1]
-        second_across += w.weights[j, states + k] * g.rates[j, k, 3 + states]
-    for k in range(4, 6):
-        c[k, at] = -p[1, k] - pressing * p[2, k]
-        c[k, n + at] = p[0, k]
-    c[5, at] -= slip
-    for k in range(6):
-        c[k, 2 * n + at] = -p[3, k] - second_pressing * p[2, k]
-    c[2, 2 * n + at] -= second_along
-    c[5, 2 * n + at] -= second_across
+def _add_memory(at, j, g, w):
+    """Add to the coefficients of node j, at a place, what its internal variables do meanwhile."""
+    n, d, states = len(g.partial), g.partial.shape[2] // 2, w.inverse.shape[1]
+    if states == 0:
+        return
+    c = w.coefficients
+    for tangent in range(d - 1):
+        place, weights = 2 * tangent * n + at, w.weights[j, tangent * states :]
+        pressing = 0.0
+        for k in range(states):
+            pressing += weights[k] * g.rates[j, k, 2]
+        for k in range(2 * d):
+            c[k, place] -= pressing * g.partial[j, d, k]
+        for other in range(d - 1):
+            slip = 0.0
+            for k in range(states):
+                slip += weights[k] * g.rates[j, k, slip_entry(other, states)]
+            c[d + 2 * other, place] -= slip
 
 
 @routine
@@ -330,7 +317,7 @@ def set_solver(G, blocks, w, out):
 def solve_stage(G, s, blocks, g, w, r, motion, out):
     """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, d n) is room to work in."""
     shapes = blocks.shapes
-    m, n = len(shapes), len(g.partial)
+    m, n, d = len(shapes), len(g.partial), g.partial.shape[2] // 2
     states = w.inverse.shape[1]
     x = w.room
     if m <= _FEW and states == 0:
@@ -345,23 +332,17 @@ def solve_stage(G, s, blocks, g, w, r, motion, out):
         out[m + i] = r[m + i]
     if states > 0:
         for j in range(n):
-            total = 0.0
-            for k in range(states):
-                total += w.weights[j, k] * r[2 * m + j * states + k]
-            motion[2, j] = -total
-            if in_space(s):
+            for tangent in range(d - 1):
                 total = 0.0
                 for k in range(states):
-                    total += w.weights[j, states + k] * r[2 * m + j * states + k]
-                motion[2, 2 * n + j] = -total
+                    total += w.weights[j, tangent * states + k] * r[2 * m + j * states + k]
+                motion[2, 2 * tangent * n + j] = -total
         for part in range(len(blocks.parts)):
             top, bottom, left, right = block_at(blocks.parts, part)
             for i in range(top, bottom):
                 total = 0.0
-                for j in range(left, right):
-                    total += shapes[i, j] * motion[2, j]
-                if in_space(s):
-                    rows, forces = shapes[i, 2 * n :], motion[2, 2 * n :]
+                for tangent in range(d - 1):
+                    rows, forces = shapes[i, 2 * tangent * n :], motion[2, 2 * tangent * n :]
                     for j in range(left, right):
                         total += rows[j] * forces[j]
                 out[m + i] += total
@@ -384,20 +365,14 @@ def solve_stage(G, s, blocks, g, w, r, motion, out):
         return
     project(blocks, out, motion[0], motion[1])
     for j in range(n):
-        p = g.partial[j, 2]
-        pressing = (p[0] * motion[0, j] + p[1] * motion[0, n + j] + p[2] * motion[1, j]
-                    + p[3] * motion[1, n + j])
-        across = 0.0
-        if in_space(s):
-            across = motion[1, 2 * n + j]
-            pressing += p[4] * motion[0, 2 * n + j] + p[5] * across
+        pressing = change_of(g.partial[j, d], j, n, motion)
         first = 2 * m + j * states
         for k in range(states):
             total = 0.0
             for other in range(states):
-                known = (r[first + other] + g.rates[j, other, 1] * motion[1, j]
-                         + g.rates[j, other, 2] * pressing)
-                if in_space(s):
-                    known += g.rates[j, other, 3 + states] * across
+                known = r[first + other] + g.rates[j, other, 2] * pressing
+                for tangent in range(d - 1):
+                    known += (g.rates[j, other, slip_entry(tangent, states)]
+                              * motion[1, 2 * tangent * n + j])
                 total += w.inverse[j, k, other] * known
             out[first + k] = total

@@ -17,10 +17,11 @@ from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.system.kernels import node_gradients
 from fecontact.system.nodes import (
     NodeMotion,
+    friction_entry,
+    ground_moved,
     in_space,
-    moved_across,
-    moved_along,
     node_contact,
+    slip_entry,
 )
 from fecontact.system.space_nodes import contact_in_space, laws_of
 
@@ -60,23 +61,20 @@ def set_paths(step, acceleration, s, blocks, stages, v):
     ``Gradients.partial``, and its internal variables. ``acceleration`` is that of the ground.
     """
     paths, w = v.paths, v.nodes
-    m, n = len(v.none), len(s.gap)
-    states, motions = v.inside.rates.shape[1], v.inside.partial.shape[2]
+    m, n, d = len(v.none), len(s.gap), s.rows.shape[1]
+    states = v.inside.rates.shape[1]
     first, second = step.moved.speed, step.moved.second_speed
     for i in range(tableau.STAGES):
         dynamics.project(blocks, stages[i], w[0], w[1])
         part = tableau.TIME[i] * step.h
         for j in range(n):
-            paths[i, 0, j] = w[0, j] - part * moved_along(j, first, second, s)
-            paths[i, 1, j] = w[0, n + j]
-            paths[i, 2, j] = w[1, j] - part * moved_along(j, acceleration[0], acceleration[1], s)
-            paths[i, 3, j] = w[1, n + j]
-            if in_space(s):
-                paths[i, 4, j] = w[0, 2 * n + j] - part * moved_across(j, first, second, s)
-                paths[i, 5, j] = w[1, 2 * n + j] - part * moved_across(
-                    j, acceleration[0], acceleration[1], s)
+            for axis in range(d):
+                paths[i, axis, j] = w[0, axis * n + j] - part * ground_moved(
+                    axis, j, first, second, s)
+                paths[i, d + axis, j] = w[1, axis * n + j] - part * ground_moved(
+                    axis, j, acceleration[0], acceleration[1], s)
             for k in range(states):
-                paths[i, motions + k, j] = stages[i, 2 * m + j * states + k]
+                paths[i, 2 * d + k, j] = stages[i, 2 * m + j * states + k]
 
 
 @helper
@@ -91,7 +89,7 @@ def _reach(direction, j, control, v):
         reach = max(reach, abs(v.paths[i, direction, j]))
     if direction == 1:
         reach = min(reach, control.depth[j])
-    elif direction in (2, 5) and direction < motions:
+    elif motions // 2 <= direction < motions and direction != motions // 2 + 1:
         reach = min(reach, control.slip_scale[j])
     elif direction >= motions:
         states = v.paths.shape[1] - motions
@@ -106,27 +104,23 @@ def _onward(direction, j, motion, acceleration, step, s, v, between, rate):
     Its sign says on which side of a kink the step goes on. ``between`` (2, d n) holds velocities
     and accelerations of the nodes, ``rate`` (size,) is y'.
     """
-    n, motions = len(s.gap), v.inside.partial.shape[2]
+    n, d = len(s.gap), s.rows.shape[1]
+    if direction >= 2 * d:
+        states = v.paths.shape[1] - 2 * d
+        return rate[2 * len(v.none) + j * states + direction - 2 * d]
+    if direction >= d:
+        axis = direction - d
+        return between[1, axis * n + j] - ground_moved(axis, j, acceleration[0], acceleration[1], s)
     if in_space(s):
         contact = contact_in_space(motion, step.moved, laws_of(j, s), s.sides[j],
                                    s.profile_parameters)
     else:
         contact = node_contact(j, motion, step.moved, s)
-    if direction >= motions:
-        states = v.paths.shape[1] - motions
-        return rate[2 * len(v.none) + j * states + direction - motions]
-    if direction == 0:
-        return contact.slope * contact.rate if contact.slope != 0.0 else contact.slip
     if direction == 1:
         return -contact.rate
-    if direction == 2:
-        return between[1, j] - moved_along(j, acceleration[0], acceleration[1], s)
-    if direction == 3:
-        return between[1, n + j]
-    if direction == 4:
-        return (contact.slope_across * contact.rate if contact.slope_across != 0.0
-                else contact.slip_across)
-    return between[1, 2 * n + j] - moved_across(j, acceleration[0], acceleration[1], s)
+    slope, slip = ((contact.slope, contact.slip) if direction == 0 else
+                   (contact.slope_across, contact.slip_across))
+    return slope * contact.rate if slope != 0.0 else slip
 
 
 @routine
@@ -136,13 +130,13 @@ def _gradients_aside(direction, e, j, motion, moved, z, s, v, out):
     ``z`` (size,) holds internal variables where the state does.
     """
     states, motions = out.rates.shape[1], out.partial.shape[2]
-    first = 2 * len(v.none) + j * states
+    first, d = 2 * len(v.none) + j * states, motions // 2
     aside = NodeMotion(motion.along + (e if direction == 0 else 0.0),
                        motion.height + (e if direction == 1 else 0.0),
-                       motion.along_rate + (e if direction == 2 else 0.0),
-                       motion.height_rate + (e if direction == 3 else 0.0),
-                       motion.across + (e if direction == 4 and motions > 4 else 0.0),
-                       motion.across_rate + (e if direction == 5 and motions > 4 else 0.0))
+                       motion.along_rate + (e if direction == d else 0.0),
+                       motion.height_rate + (e if direction == d + 1 else 0.0),
+                       motion.across + (e if direction == 2 and d > 2 else 0.0),
+                       motion.across_rate + (e if direction == 5 and d > 2 else 0.0))
     changed, before = first + direction - motions, 0.0
     if direction >= motions:
         before = z[changed]
@@ -211,7 +205,7 @@ def set_bends(step, acceleration, problem, progress, room, v):
         motion = dynamics.motion_of(j, w, s)
         for direction in range(v.paths.shape[1]):
             reach = _reach(direction, j, control, v)
-            if reach == 0.0 or (even and (direction == 0 or (direction == 4 and motions > 4))):
+            if reach == 0.0 or (even and (direction == 0 or (direction == 2 and motions > 4))):
                 for i in range(tableau.STAGES):
                     v.paths[i, direction, j] = 0.0
                 continue
@@ -350,35 +344,26 @@ def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
 def push(g, s, blocks, x, w, rate):
     """Add to w[2] (d n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
     n, states, _ = g.rates.shape
-    m = len(blocks.position)
+    m, d = len(blocks.position), s.rows.shape[1]
     dynamics.project(blocks, x, w[0], w[1])
     for j in range(n):
-        a, b, c, d = w[0, j], w[0, n + j], w[1, j], w[1, n + j]
-        p = g.partial[j]
+        for axis in range(d):
+            w[2, axis * n + j] += dynamics.change_of(g.partial[j, axis], j, n, w)
         first = 2 * m + j * states
-        tangential = p[1, 0] * a + p[1, 1] * b + p[1, 2] * c + p[1, 3] * d
-        pressing = p[2, 0] * a + p[2, 1] * b + p[2, 2] * c + p[2, 3] * d
-        normal = p[0, 0] * a + p[0, 1] * b + p[0, 2] * c + p[0, 3] * d
-        f = 0.0
-        if in_space(s):
-            e, f = w[0, 2 * n + j], w[1, 2 * n + j]
-            tangential += p[1, 4] * e + p[1, 5] * f
-            pressing += p[2, 4] * e + p[2, 5] * f
-            normal += p[0, 4] * e + p[0, 5] * f
-            w[2, 2 * n + j] -= (p[3, 0] * a + p[3, 1] * b + p[3, 2] * c + p[3, 3] * d
-                                + p[3, 4] * e + p[3, 5] * f)
+        for tangent in range(d - 1):
+            entry = friction_entry(tangent, states) + 3
             for k in range(s.memory[j]):
-                w[2, 2 * n + j] -= g.force[j, 7 + states + k] * x[first + k]
+                w[2, 2 * tangent * n + j] -= g.force[j, entry + k] * x[first + k]
+        if s.memory[j] == 0:
+            continue
+        pressing = dynamics.change_of(g.partial[j, d], j, n, w)
         for k in range(s.memory[j]):
-            tangential += g.force[j, 3 + k] * x[first + k]
-            total = g.rates[j, k, 1] * c + g.rates[j, k, 2] * pressing
-            if in_space(s):
-                total += g.rates[j, k, 3 + states] * f
+            total = g.rates[j, k, 2] * pressing
+            for tangent in range(d - 1):
+                total += g.rates[j, k, slip_entry(tangent, states)] * w[1, 2 * tangent * n + j]
             for other in range(s.memory[j]):
                 total += g.rates[j, k, 3 + other] * x[first + other]
             rate[first + k] += total
-        w[2, j] -= tangential
-        w[2, n + j] += normal
 
 
 @helper

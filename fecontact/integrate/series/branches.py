@@ -175,7 +175,7 @@ def sines_of(signal: Signal) -> tuple[float, list[tuple[float, float, float]]] |
 def _first_states(system: ContactSystem, pieces: Array, state: Array) -> Integers:
     """States (n, 3) of the nodes at the start."""
     m, n = system.basis.modes, system.basis.contact_nodes
-    rows = system.arrays.Ty
+    rows = system.arrays.rows[:, 1]
     states = np.zeros((n, 3), dtype=np.int64)
     for j in range(n):
         u, v = -float(rows[j] @ state[:m]) - system.arrays.gap[j], -float(rows[j] @ state[m:])
@@ -215,7 +215,7 @@ def obstacle(
         return "the stiffness is not symmetric"
     if not all(isinstance(one, ContactEvents) for one in events):
         return "events other than ContactEvents are not located in them"
-    if events and (arrays.Tx.any() or any(motion.largest_speed(begin, end) for motion
+    if events and (arrays.rows[:, 0].any() or any(motion.largest_speed(begin, end) for motion
                                           in system.prescribed_motion.motions)):
         return "ContactEvents are located in them only where contact nodes do not slide"
     return None
@@ -237,7 +237,7 @@ def worthwhile(system: ContactSystem, pieces: Array) -> bool:
         stiffness, damping = system.arrays.stiffness, system.arrays.damping
         if closed:
             piece = np.abs(pieces)
-            rows = system.arrays.Ty
+            rows = system.arrays.rows[:, 1]
             stiffness = stiffness + rows.T @ (piece[:, :, 3].max(axis=1)[:, None] * rows)
             damping = damping + rows.T @ (piece[:, :, 5].max(axis=1)[:, None] * rows)
         rates = _rates(m, stiffness.tobytes(), damping.tobytes())

@@ -76,7 +76,7 @@ def _add_penetration(j, k, s, series):
     """Fill coefficient k of the penetration of node j and of its powers."""
     total = -s.gap[j] if k == 0 else 0.0
     for i in range(len(series.q)):
-        total -= s.Ty[j, i] * series.q[i, k]
+        total -= s.rows[j, 1, i] * series.q[i, k]
     series.u[j, k] = total
     if series.states[j, ACTS] and _curved(series.pieces[j, series.states[j, PLACE]]):
         series.square[j, k] = _product(series.u[j], series.u[j], k)
@@ -123,7 +123,7 @@ def expand(y, h, s, series):
             # The newest coefficients come last, lest all else wait for them.
             total, damped = series.forcing[i, k], 0.0
             for j in range(n):
-                total += s.Ty[j, i] * series.F[j, k]
+                total += s.rows[j, 1, i] * series.F[j, k]
             for other in range(m):
                 total -= s.stiffness[i, other] * q[other, k]
                 damped += s.damping[i, other] * q[other, k + 1]

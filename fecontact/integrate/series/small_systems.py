@@ -21,7 +21,7 @@ SIZES = ((1, 1), (2, 1), (3, 1), (2, 2))
 
 def advance_for(problem: Problem) -> Any:
     """The loop for a system of this size, or for all."""
-    nodes, modes = problem.system.Tx.shape
+    nodes, _, modes = problem.system.rows.shape
     if (modes, nodes) in SIZES and problem.system.second_motion == 0:
         return _advance(modes, nodes)
     return advance

@@ -23,7 +23,7 @@ class Balance:
         self.arrays = arrays
         self.load = arrays.constant_load
         self._time = time
-        n, m = arrays.Tx.shape
+        n, _, m = arrays.rows.shape
         states = int(arrays.memory.max())
         size = 2 * m + n * states
         self._rate, self._matrix = np.empty(size), np.empty((size, size))
@@ -37,20 +37,16 @@ class Balance:
         self.face_force = values + self.face_stiffness * (
             undisplaced[:, kernels.PENETRATION] - far)
         # Of preloaded springs, which cancel within their law.
-        self._initial = np.abs(arrays.Ty).T @ np.where(
+        self._initial = np.abs(arrays.rows[:, 1]).T @ np.where(
             arrays.on_ground, 0.0, np.abs(undisplaced[:, kernels.NORMAL_FORCE]))
-        tangential = (arrays.Tx**2).T @ self.face_stiffness
-        if len(arrays.T2):
-            tangential = tangential + (arrays.T2**2).T @ self.face_stiffness
-        normal = (arrays.Ty**2).T @ self.face_stiffness
-        diagonal = np.abs(np.diag(arrays.stiffness))
-        self.scale = diagonal + tangential + normal
+        self.scale = np.abs(np.diag(arrays.stiffness)) + np.einsum(
+            "jai,jai,j->i", arrays.rows, arrays.rows, self.face_stiffness)
         self.scale[self.scale == 0.0] = 1.0
 
     def _penetration(self, scale: float) -> float:
         """Uniform penetration under which the face carries the load, at most 1e6 scales."""
         # Work of the load in a unit mean rise of the contact nodes.
-        rise = self.arrays.Ty.sum(axis=0) / max(len(self.arrays.Ty), 1)
+        rise = self.arrays.rows[:, 1].sum(axis=0) / max(len(self.arrays.rows), 1)
         wanted = abs(float(self.load @ rise)) / max(float(rise @ rise), 1e-300)
         depth = scale
         while depth < 1e6 * scale and self.normal(np.full(len(self.arrays.gap), depth))[0].sum() < (
@@ -91,8 +87,9 @@ class Balance:
     def guess(self, load: float) -> Array:
         """Equilibrium of a face in full contact that could also pull."""
         arrays = self.arrays
-        stiffness = arrays.stiffness + (arrays.Ty.T * self.face_stiffness) @ arrays.Ty
-        force = load * self.load + arrays.Ty.T @ self.face_force
+        normal = arrays.rows[:, 1]
+        stiffness = arrays.stiffness + (normal.T * self.face_stiffness) @ normal
+        force = load * self.load + normal.T @ self.face_force
         return self._solve(stiffness, force, 1e-10)
 
     def solve(self, q: Array, load: float) -> Array | None:
@@ -208,8 +205,8 @@ class Balance:
 
     def _limited(self, step: Array, longest: float, exactly: bool = False) -> Array:
         """A step in which no contact node moves farther than ``longest``."""
-        moved = max(float(np.abs(self.arrays.Tx @ step).max(initial=0.0)),
-                    float(np.abs(self.arrays.Ty @ step).max(initial=0.0)), 1e-300)
+        moved = max(float(np.abs(self.arrays.rows[:, 0] @ step).max(initial=0.0)),
+                    float(np.abs(self.arrays.rows[:, 1] @ step).max(initial=0.0)), 1e-300)
         return step * (longest / moved if exactly else min(1.0, longest / moved))
 
     def _energy(self, q: Array, stored: Callable[[Array], Array]) -> float:
@@ -225,7 +222,8 @@ class Balance:
         state = np.empty((len(arrays.gap), kernels.state_columns(arrays)))
         kernels.contact_state(self._time, self._state, arrays, state)
         slope = self.normal(state[:, kernels.PENETRATION].copy())[1]
-        return np.asarray(arrays.stiffness + (arrays.Ty.T * slope) @ arrays.Ty)
+        normal = arrays.rows[:, 1]
+        return np.asarray(arrays.stiffness + (normal.T * slope) @ normal)
 
     def loose(self, q: Array) -> Array | None:
         """Direction (m,) of an unbalanced force at q without any stiffness, or None."""

@@ -111,8 +111,7 @@ def equilibrium(
     if not friction:
         arrays = at_rest(arrays, *(one.travel(time) for one in system.prescribed_motion.motions))
     # On level ground, and with its normal vertical, contact forces do not lean.
-    slides = bool(arrays.leans and ground.wavy and (arrays.Tx.any() or arrays.T2.any())
-                  and not standing)
+    slides = bool(arrays.leans and ground.wavy and arrays.rows[:, ::2].any() and not standing)
     problem = Balance(with_sides(arrays._replace(leans=0)), time, system.penetration_scale)
     solution = problem.equilibrium()
     if system.basis.springs:

@@ -78,11 +78,11 @@ def _node(j, q, moved, s):
     """Displacements of node j along its first tangent and its second one, and where it is."""
     x, height, across = 0.0, 0.0, 0.0
     for i in range(len(q)):
-        x += s.Tx[j, i] * q[i]
-        height += s.Ty[j, i] * q[i]
+        x += s.rows[j, 0, i] * q[i]
+        height += s.rows[j, 1, i] * q[i]
     if in_space(s):
         for i in range(len(q)):
-            across += s.T2[j, i] * q[i]
+            across += s.rows[j, 2, i] * q[i]
         motion = NodeMotion(x, height, 0.0, 0.0, across, 0.0)
         return x, across, contact_in_space(motion, moved, laws_of(j, s), s.sides[j],
                                            s.profile_parameters)
@@ -93,23 +93,23 @@ def _node(j, q, moved, s):
 def _press(j, contact, s, out):
     """F of node j and the force that friction sees under it.
 
-    Fills out[0] and out[2] with their derivatives to displacements along, away and across.
+    Fills out[1] and out[3] with their derivatives to displacements along the axes.
     """
     F, F_u, _ = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])
-    out[0, 0], out[0, 1], out[0, 2] = F_u * contact.slope, -F_u, F_u * contact.slope_across
+    out[1, 0], out[1, 1], out[1, 2] = F_u * contact.slope, -F_u, F_u * contact.slope_across
     sign = 1.0 if F >= 0.0 else -1.0
     pressing = abs(F)
     for k in range(3):
-        out[2, k] = sign * out[0, k]
+        out[3, k] = sign * out[1, k]
     if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
         a, b = 1.0, 0.0
         if in_space(s):
             a, b = s.sides[j, WAVES_X], s.sides[j, WAVES_Y]
         scale, slope = scale_under(contact, a, b, s.friction_scale, s.friction_scale_parameters)
         for k in range(3):
-            out[2, k] *= scale
-        out[2, 0] += a * slope * pressing
-        out[2, 2] += b * slope * pressing
+            out[3, k] *= scale
+        out[3, 0] += a * slope * pressing
+        out[3, 2] += b * slope * pressing
         pressing *= scale
     return F, pressing
 
@@ -118,43 +118,43 @@ def _press(j, contact, s, out):
 def _rub(j, g, g_across, pressing, sliders, pose, room, out):
     """Sums of the forces of the sliders of node j along its tangents.
 
-    Fills out[1] and out[3] with their derivatives to displacements along, away and across.
+    Fills out[0] and out[2] with their derivatives to displacements along the axes.
     """
     elements = sliders.stiffness.shape[1]
     tangents = pose.force.shape[1] // elements
     along, across = 0.0, 0.0
     for k in range(3):
-        out[1, k], out[3, k] = 0.0, 0.0
+        out[0, k], out[2, k] = 0.0, 0.0
     for e in range(elements):
         stiffness, limit, first = sliders.stiffness[j, e], sliders.limit[j, e], tangents * e
         R = room.multiplier[j, first] + stiffness * (g - pose.left[j, first])
         if tangents == 1:
             if abs(R) <= limit * pressing:
-                out[1, 0] += stiffness
+                out[0, 0] += stiffness
             else:
                 sign = 1.0 if R > 0.0 else -1.0
                 R = sign * limit * pressing
-                out[1, 0] += sign * limit * out[2, 0]
-                out[1, 1] += sign * limit * out[2, 1]
+                out[0, 0] += sign * limit * out[3, 0]
+                out[0, 1] += sign * limit * out[3, 1]
             pose.force[j, first] = R
             along += R
             continue
         R2 = room.multiplier[j, first + 1] + stiffness * (g_across - pose.left[j, first + 1])
         size = math.hypot(R, R2)
         if size <= limit * pressing:
-            out[1, 0] += stiffness
-            out[3, 2] += stiffness
+            out[0, 0] += stiffness
+            out[2, 2] += stiffness
         else:
             a, b = R / size, R2 / size
             turn = limit * pressing * stiffness / size
             R, R2 = limit * pressing * a, limit * pressing * b
             for k in range(3):
-                out[1, k] += limit * a * out[2, k]
-                out[3, k] += limit * b * out[2, k]
-            out[1, 0] += turn * b * b
-            out[1, 2] -= turn * a * b
-            out[3, 0] -= turn * a * b
-            out[3, 2] += turn * a * a
+                out[0, k] += limit * a * out[3, k]
+                out[2, k] += limit * b * out[3, k]
+            out[0, 0] += turn * b * b
+            out[0, 2] -= turn * a * b
+            out[2, 0] -= turn * a * b
+            out[2, 2] += turn * a * a
         pose.force[j, first], pose.force[j, first + 1] = R, R2
         along += R
         across += R2
@@ -165,12 +165,12 @@ def _rub(j, g, g_across, pressing, sliders, pose, room, out):
 def _lean(F, contact, out):
     """Add the derivatives of what leans with the ground to those of the forces of a node."""
     for k in range(3):
-        out[1, k] += contact.slope * out[0, k]
-        out[3, k] += contact.slope_across * out[0, k]
-    out[1, 0] += F * contact.curvature
-    out[1, 2] += F * contact.twist
-    out[3, 0] += F * contact.twist
-    out[3, 2] += F * contact.curvature_across
+        out[0, k] += contact.slope * out[1, k]
+        out[2, k] += contact.slope_across * out[1, k]
+    out[0, 0] += F * contact.curvature
+    out[0, 2] += F * contact.twist
+    out[2, 0] += F * contact.twist
+    out[2, 2] += F * contact.curvature_across
 
 
 @helper
@@ -203,7 +203,7 @@ def evaluate(
 
     The matrix is minus the derivative of the out-of-balance force.
     """
-    n, m = s.Tx.shape
+    n, d, m = s.rows.shape
     q, node, residual, out = pose.q, pose.node, room.residual, room.partial
     terms = 0.0
     for i in range(m):
@@ -232,12 +232,15 @@ def evaluate(
         for e in range(sliders.stiffness.shape[1]):
             springs += sliders.stiffness[j, e]
         rounding = _SPRINGS * (springs * (abs(x) + abs(gone)) + _stretched(j, 0, sliders, pose))
-        _push(s.Ty[j], F, s.Tx[j], T, rounding, room)
+        _push(s.rows[j, 1], F, s.rows[j, 0], T, rounding, room)
         if derive:
-            for i in range(m):
-                tx, ty = s.Tx[j, i], s.Ty[j, i]
-                room.along[j, i] = out[1, 0] * tx + out[1, 1] * ty
-                room.away[j, i] = out[0, 0] * tx + out[0, 1] * ty
+            for axis in range(d):
+                answer, sign = room.answers[j, axis], -1.0 if axis == 1 else 1.0
+                for i in range(m):
+                    answer[i] = 0.0
+                for other in range(d):
+                    for i in range(m):
+                        answer[i] += sign * out[axis, other] * s.rows[j, other, i]
         if in_space(s):
             T = leaning(F, R2, contact.slope_across, s)
             second = PER_TANGENT
@@ -245,21 +248,12 @@ def evaluate(
             node[j, LEANING + second] = F * contact.slope_across
             rounding = _SPRINGS * (springs * (abs(across) + abs(gone_across))
                                    + _stretched(j, 1, sliders, pose))
-            _push(s.T2[j], 0.0, s.T2[j], T, rounding, room)
-            if derive:
-                for i in range(m):
-                    tx, ty, t2 = s.Tx[j, i], s.Ty[j, i], s.T2[j, i]
-                    room.along[j, i] += out[1, 2] * t2
-                    room.away[j, i] += out[0, 2] * t2
-                    room.across[j, i] = out[3, 0] * tx + out[3, 1] * ty + out[3, 2] * t2
+            _push(s.rows[j, 2], 0.0, s.rows[j, 2], T, rounding, room)
     for i in range(m):
         terms += room.before[i] ** 2 / room.scale[i]
     if derive:
         room.matrix[:] = s.stiffness
-        room.matrix[:] += np.dot(s.Tx.T, room.along)
-        room.matrix[:] -= np.dot(s.Ty.T, room.away)
-        if in_space(s):
-            room.matrix[:] += np.dot(s.T2.T, room.across)
+        room.matrix[:] += np.dot(s.rows.reshape((n * d, m)).T, room.answers.reshape((n * d, m)))
     return np.sqrt(terms)
 
 

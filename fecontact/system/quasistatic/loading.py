@@ -146,7 +146,7 @@ def _marched(
     arrays: SystemArrays, given: Array, pose: Pose, sliders: Sliders, scale: Array, rtol: float
 ) -> tuple[int, Kept]:
     """Number of rows reached, and results."""
-    n, m = arrays.Tx.shape
+    n, _, m = arrays.rows.shape
     e, tangents = sliders.limit.shape[1], _tangents(pose, sliders)
     kept = kept_for(len(given), m, n, e, tangents)
     reached = march(arrays, sliders, np.ascontiguousarray(given), rtol, pose,

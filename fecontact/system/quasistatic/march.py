@@ -218,7 +218,7 @@ def _measure(
             leaning = _leant(j, 1, old, new)
         lifted = 0.0
         for i in range(len(old.q)):
-            lifted += s.Ty[j, i] * (new.q[i] - old.q[i])
+            lifted += s.rows[j, 1, i] * (new.q[i] - old.q[i])
         before, after = old.node[j, PENETRATION], new.node[j, PENETRATION]
         gap += _pressed_energy(j, before, after, s) - lean - leaning + F * lifted
         pressed += abs(F * (after - before)) + abs(lean) + abs(leaning)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.records import IntegerVector, Matrix, Vector
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 
 # Columns of `Pose.node`; in space the last three follow for the second tangent.
@@ -40,7 +40,9 @@ class Pose(NamedTuple):
 class Room(NamedTuple):
     """Room for Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
 
-    ``acting`` (m,) sums the magnitudes of the forces on each mode.
+    ``acting`` (m,) sums the magnitudes of the forces on each mode; ``answers`` (n, d, m) are minus
+    the forces on the nodes along their axes by the modes, ``partial`` (4, 3) the derivatives of T,
+    F, T across and the pressing force of a node to its displacements.
     """
 
     scale: Vector
@@ -50,9 +52,7 @@ class Room(NamedTuple):
     step: Vector
     before: Vector
     multiplier: Matrix
-    along: Matrix
-    away: Matrix
-    across: Matrix
+    answers: Block
     matrix: Matrix
     partial: Matrix
     pivots: IntegerVector
@@ -73,6 +73,6 @@ def room_for(m: int, n: int, sliders: int, tangents: int, scale: Array) -> Room:
     """Room for a body of m modes and n contact nodes."""
     start, acting, residual, step, before = np.zeros((5, m))
     return Room(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step, before,
-                np.zeros((n, sliders * tangents)), np.zeros((n, m)), np.zeros((n, m)),
-                np.zeros((n if tangents == 2 else 0, m)), np.zeros((m, m)), np.zeros((4, 3)),
+                np.zeros((n, sliders * tangents)), np.zeros((n, 1 + tangents, m)), np.zeros((m, m)),
+                np.zeros((4, 3)),
                 np.zeros(m, np.int64))

@@ -108,9 +108,7 @@ def _everywhere(slope: Array, share: Array) -> Array:
 def _penalty(system: ContactSystem, slope: Array) -> Array:
     """Penalty (n,) for rigid sticking, well above the stiffness of contact and body."""
     body = np.zeros_like(slope)
-    for rows in (system.arrays.Tx, system.arrays.T2):
-        if not len(rows):
-            continue
+    for rows in system.arrays.rows[:, ::2].swapaxes(0, 1):
         size = (rows**2).sum(axis=1)
         # Nodes on supports do not move at all.
         moves = size > 1e-24 * size.max(initial=0.0)

@@ -147,7 +147,8 @@ class CompiledBalance:
 
     def _plain(self, near: AffineArrays) -> bool:
         """Whether contact forces are those of plane bodies on ground of constant speed."""
-        return not len(near.arrays.T2) and self.contact_field.system().prescribed_motion.constant
+        return (near.arrays.rows.shape[1] == 2
+                and self.contact_field.system().prescribed_motion.constant)
 
     @cached_property
     def kinked(self) -> bool:

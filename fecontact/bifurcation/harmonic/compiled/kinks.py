@@ -101,7 +101,7 @@ def is_near(u, v, b, h):
 def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
     """Add the change of a normal force to the rates f (d,) and their Jacobian A (d, d)."""
     dF, dF_u, dF_v, by_width = change
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
                                          s.normal_parameters[j])
     new = F + dF
@@ -125,23 +125,23 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
     slope = contact.slope if s.leans else 0.0
     dT = dR + slope * dF
     for i in range(m):
-        f[m + i] += s.Ty[j, i] * dF - s.Tx[j, i] * dT
+        f[m + i] += s.rows[j, 1, i] * dF - s.rows[j, 0, i] * dT
     if not derivatives:
         return
     for i in range(m):
-        widths[i, n] += (s.Ty[j, i] - s.Tx[j, i] * (by_change + slope)) * by_width
+        widths[i, n] += (s.rows[j, 1, i] - s.rows[j, 0, i] * (by_change + slope)) * by_width
     # Derivatives to x, y, x', y' of the node.
     u_x, v_x = contact.slope, contact.curvature * contact.slip
     for k in range(m):
-        tx, ty = s.Tx[j, k], s.Ty[j, k]
+        tx, ty = s.rows[j, 0, k], s.rows[j, 1, k]
         u_q, v_q, v_w = u_x * tx - ty, v_x * tx, contact.slope * tx - ty
         F_q, F_w = dF_u * u_q + dF_v * v_q, dF_v * v_w
         T_q = (by_F * (F_u * u_q + F_v * v_q) + (by_change + slope) * F_q
                + (contact.curvature * tx * dF if s.leans else 0.0))
         T_w = by_F * F_v * v_w + (by_change + slope) * F_w + dR_v * tx
         for i in range(m):
-            A[m + i, k] += s.Ty[j, i] * F_q - s.Tx[j, i] * T_q
-            A[m + i, m + k] += s.Ty[j, i] * F_w - s.Tx[j, i] * T_w
+            A[m + i, k] += s.rows[j, 1, i] * F_q - s.rows[j, 0, i] * T_q
+            A[m + i, m + k] += s.rows[j, 1, i] * F_w - s.rows[j, 0, i] * T_w
 
 
 @kernel
@@ -162,7 +162,7 @@ def add_kinks(
         return
     for n in range(len(t)):
         moved = ground_motion(t[n], s)
-        for j in range(len(s.Tx)):
+        for j in range(len(s.rows)):
             contact = node_contact(j, node_motion(j, x[n], s), moved, s)
             u, v = contact.penetration, contact.rate
             dF, dF_u, dF_v, by_width, far, found = 0.0, 0.0, 0.0, 0.0, 0.0, False
@@ -210,7 +210,7 @@ def _onsets(field: ContactField, values: Array) -> Array:
     """Onsets (k, n) of all nodes that are kinks, filled up with infinity."""
     system = field.system(values)
     s, n = system.arrays, system.basis.contact_nodes
-    if len(s.T2):
+    if s.rows.shape[1] > 2:
         return np.zeros((0, n))
     columns: list[list[float]] = [[] for _ in range(n)]
     for nodes, _, law in system.law_groups("normal"):

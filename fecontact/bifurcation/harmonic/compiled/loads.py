@@ -30,7 +30,7 @@ def forces_at_rest(
     loads and contact at rest for the last place, relative to the largest force; and the largest
     change of the mean of the loads, relative to the largest load.
     """
-    n, m = s.Tx.shape
+    n, _, m = s.rows.shape
     P, N, states = len(places), len(tau), s.memory.max()
     length, width = force_room(states, in_space(s))
     force, rates = np.empty(length), np.empty((states, width))
@@ -52,7 +52,7 @@ def forces_at_rest(
                                             memory_of(j, still, s), s, force, rates)
                 T = leaning(F, R, contact.slope, s)
                 for i in range(m):
-                    rest[c, i] += s.Ty[j, i] * F - s.Tx[j, i] * T
+                    rest[c, i] += s.rows[j, 1, i] * F - s.rows[j, 0, i] * T
         for i in range(m):
             for j in range(m):
                 matrices[place, 0, i, j] = s.stiffness[i, j]

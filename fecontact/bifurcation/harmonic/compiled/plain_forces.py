@@ -60,7 +60,7 @@ def _node_motion(j, e):
     for n in range(N):
         node[2, n] = slip
     for i in range(m):
-        tx, ty = s.Tx[j, i], s.Ty[j, i]
+        tx, ty = s.rows[j, 0, i], s.rows[j, 1, i]
         for n in range(N):
             node[0, n] += ty * motion[i, n]
             node[1, n] += ty * motion[m + i, n]
@@ -110,14 +110,14 @@ def plain_forces(derivatives, h, e):
         for p in range(2 * m * m):
             for n in range(N):
                 rows[p, n] = 0.0
-    for j in range(len(s.Tx)):
+    for j in range(len(s.rows)):
         _node_motion(j, e)
         level = -s.gap[j]
         if s.on_ground[j]:
             level += ground_at(s.profile)(s.abscissa[j], s.profile_parameters)[0]
         rubs = False
         for i in range(m):
-            rubs = rubs or s.Tx[j, i] != 0.0
+            rubs = rubs or s.rows[j, 0, i] != 0.0
         # Derivatives of the normal force to height and rate, of friction to slip and normal force.
         for n in range(N):
             F, F_u, F_v = normal_at(s.normal[j])(level - node[0, n], -node[1, n],
@@ -137,7 +137,7 @@ def plain_forces(derivatives, h, e):
                 node[0, n], node[6, n] = side * R, side * R_v
                 node[7, n] = side * (R_F if F >= 0.0 else -R_F)
         for i in range(m):
-            tx, ty = s.Tx[j, i], s.Ty[j, i]
+            tx, ty = s.rows[j, 0, i], s.rows[j, 1, i]
             for n in range(N):
                 pushes[i, n] += ty * node[3, n]
             if rubs:
@@ -149,7 +149,7 @@ def plain_forces(derivatives, h, e):
                 for n in range(N):
                     room.widths[i, n] += (ty - tx * (node[7, n] if rubs else 0.0)) * node[8, n]
             for k in range(m):
-                by, sx = s.Ty[j, k], tx * s.Tx[j, k]
+                by, sx = s.rows[j, 1, k], tx * s.rows[j, 0, k]
                 q, v = rows[i * m + k], rows[(m + i) * m + k]
                 for n in range(N):
                     q[n] += ty * by * node[4, n]

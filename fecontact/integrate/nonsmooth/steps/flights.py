@@ -49,10 +49,10 @@ def begin_flight(j, noise, p, w, room):
 def _acceleration_size(j, p, progress, room):
     """Size of the terms of the acceleration of the height of stop j."""
     s, Y = p.system, progress.state
-    m, total = s.Ty.shape[1], 0.0
+    m, total = s.rows.shape[2], 0.0
     for i in range(m):
         size = force_size(i, Y, room.pushes, s) + abs(room.slopes[0, m + i])
-        total += abs(s.Ty[j, i]) * size
+        total += abs(s.rows[j, 1, i]) * size
     return total
 
 
@@ -62,7 +62,7 @@ def _rise(j, step, p, progress, room):
 
     Those of its rate are put into ``room.along``. Returns the rounding of the height at the end.
     """
-    row, pull, c, h = p.system.Ty[j], room.pull, room.nested, step.h
+    row, pull, c, h = p.system.rows[j, 1], room.pull, room.nested, step.h
     rate, heights, m = room.along, room.heights, p.rows.shape[1]
     for k in range(SLOPES):
         pull[k] = 0.0
@@ -124,7 +124,7 @@ def advance(part, step, p, progress, room):
         _rise(j, step, p, progress, room)
         size = place_size(j, Y, p)
         for i in range(p.rows.shape[1]):
-            size += abs(s.Ty[j, i] * room.parts[0, i])
+            size += abs(s.rows[j, 1, i] * room.parts[0, i])
         room.flights[j, HEIGHT] = max(value(room.heights, part, room.halves[0]), 0.0)
         room.flights[j, CLIMB] = value(room.along, part, room.halves[0])
         if room.flights[j, HEIGHT] > _CLEAR * size + _ABOVE * room.flights[j, SUNK]:

@@ -60,7 +60,7 @@ def _moved(given):
 def set_rates(t, Y, p, progress, w, room, out):
     """Fill out (2 m,) with q' and q'' at Y, and w with what acts, but for limits of stick."""
     s = p.system
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     set_prescribed(t, s, room)
     acceleration = out[m : 2 * m]
     for i in range(m):
@@ -92,7 +92,7 @@ def share(p, status, w):
 @helper
 def _drive_powers(given, Y, s, out):
     """Powers of the drive, added to out."""
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     for axis in range(len(s.drive)):
         stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
         if stiffness == 0.0 and damping == 0.0:
@@ -110,7 +110,7 @@ def _drive_powers(given, Y, s, out):
 def set_powers(Y, p, progress, w, room, out):
     """Fill out (p + n,) with the powers at Y, where :func:`set_rates` has been last."""
     s = p.system
-    m = s.Tx.shape[1]
+    m = s.rows.shape[2]
     share(p, progress.status, w)
     for k in range(POWER_COUNT):
         out[k] = 0.0

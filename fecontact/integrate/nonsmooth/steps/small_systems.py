@@ -27,7 +27,7 @@ def run_for(problem: kinds.NonsmoothProblem) -> Any:
 
     Those of small systems are for nodes of which each has a slip velocity of its own.
     """
-    nodes, modes = problem.system.Tx.shape
+    nodes, _, modes = problem.system.rows.shape
     if ((modes, nodes) in SIZES and len(problem.rows) == nodes
             and problem.system.second_motion == 0):
         return _run(modes, nodes)
