@@ -1,17 +1,23 @@
 """Compiled decisions of set-valued friction: which clusters stick and which slip.
 
 A cluster without slip velocity sticks if a friction force within its limit holds it. Those of all
-such clusters are the solution of a quadratic program, found by projected Gauss-Seidel sweeps:
+such clusters are the solution of a quadratic program:
 
     -L_c <= R_c <= L_c,    a_c = 0 where |R_c| < L_c,    sign(R_c) a_c >= 0 where |R_c| = L_c
+
+Projected Gauss-Seidel sweeps find which forces are at their limits, and a linear system the others.
+Clusters of nearly dependent rows, as of a beam of few modes, would need too many sweeps.
 
 A touch-down is decided by its event. The state there has a penetration of zero up to rounding, of
 either sign; :func:`press` moves it to the side on which the normal law acts.
 """
 
+import math
+
 import numpy as np
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import helper, routine
+from fecontact.core.dense_lu import factorise, solve
 from fecontact.integrate.nonsmooth.equations import (
     derivative,
     place_size,
@@ -21,9 +27,12 @@ from fecontact.integrate.nonsmooth.equations import (
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, pressed
 from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, PENETRATION, RATE, SLOPE, STICK
 
-SWEEPS = 20000
+# Sweeps at most, and between two solutions for the forces below their limits.
+SWEEPS, _TOGETHER = 20000, 20
 # Rounding of a time relative to it or to the longest step, in which a problem has so many ticks.
 _TIME_ROUNDING, _TICKS = 1e-14, 1e4
+# Accelerations that are none, in parts of the largest.
+_ACCELERATION = 1e-10
 # How often the distance by which a node is moved into contact is enlarged fourfold.
 _PRESSES = 4
 
@@ -63,7 +72,7 @@ def _least_friction(p, candidate, relative, w):
             for i in range(m):
                 total += p.rows[c, i] * p.rows[d, i]
             w.matrix[c, d] = total
-    for _ in range(SWEEPS):
+    for sweep in range(1, SWEEPS + 1):
         moved, scale = 0.0, 0.0
         for c in range(clusters):
             if not candidate[c]:
@@ -77,6 +86,53 @@ def _least_friction(p, candidate, relative, w):
             moved, scale = max(moved, abs(change)), max(scale, abs(force))
         if moved <= 1e-15 * scale:
             break
+        if sweep % _TOGETHER == 0 and _balance(candidate, relative, w):
+            break
+
+
+@routine
+def _balance(candidate, relative, w):
+    """Change the forces that are below their limits so that their clusters do not accelerate.
+
+    Or as far towards that as the first comes to its limit. Whether these forces are the solution.
+    """
+    clusters = len(candidate)
+    free, count = np.empty(clusters, np.int64), 0
+    for c in range(clusters):
+        if candidate[c] and abs(w.right[c]) < w.limit[c]:
+            free[count] = c
+            count += 1
+    matrix, change, pivots = np.empty((count, count)), np.empty(count), np.empty(count, np.int64)
+    for a in range(count):
+        change[a] = relative[free[a]]
+        for b in range(count):
+            matrix[a, b] = w.matrix[free[a], free[b]]
+    factorise(matrix, count, pivots)
+    solve(matrix, pivots, change)
+    part, first = 1.0, -1
+    for a in range(count):
+        c = free[a]
+        way = w.limit[c] - w.right[c] if change[a] > 0.0 else w.limit[c] + w.right[c]
+        if not abs(change[a]) < math.inf:
+            return False
+        if part * abs(change[a]) > way:
+            part, first = way / abs(change[a]), c
+    for a in range(count):
+        c = free[a]
+        w.right[c] += part * change[a]
+        for d in range(clusters):
+            relative[d] -= w.matrix[d, c] * part * change[a]
+    if first >= 0:
+        w.right[first] = w.limit[first] if w.right[first] > 0.0 else -w.limit[first]
+        return False
+    largest = 0.0
+    for d in range(clusters):
+        largest = max(largest, abs(relative[d]))
+    for c in range(clusters):
+        if candidate[c] and abs(w.right[c]) >= w.limit[c] and (
+                w.right[c] * relative[c] < -_ACCELERATION * w.limit[c] * largest):
+            return False
+    return True
 
 
 @helper
@@ -138,8 +194,8 @@ def decide_clusters(t, p, progress, room, near, w, out):
             candidate[c] = held[c] = True
         else:
             status[c] = 1 if w.slip[c] > 0.0 else -1
-    relative = np.empty(clusters)
-    for _ in range(clusters + 1):
+    relative, begins = np.empty(clusters), released.copy()
+    for _ in range(2 * clusters + 1):
         for c in range(clusters):
             if candidate[c]:
                 status[c] = OPEN
@@ -154,11 +210,18 @@ def decide_clusters(t, p, progress, room, near, w, out):
         _least_friction(p, candidate, relative, w)
         changed = False
         for c in range(clusters):
+            if begins[c] and fresh[c] and status[c] * relative[c] < -_ACCELERATION * largest:
+                # Others that change at this moment turn it around, or hold it.
+                begins[c] = fresh[c] = False
+                candidate[c] = changed = True
+        if changed:
+            continue
+        for c in range(clusters):
             if not candidate[c]:
                 continue
             force = w.right[c]
             sign = 1.0 if force > 0.0 else -1.0
-            if abs(force) >= w.limit[c] and sign * relative[c] > 1e-10 * largest:
+            if abs(force) >= w.limit[c] and sign * relative[c] > _ACCELERATION * largest:
                 status[c] = int(sign)
                 candidate[c] = False
                 fresh[c] = changed = True
