@@ -84,7 +84,9 @@ def test_a_mesh_that_is_too_coarse_claims_nothing_wrong(slow_doubling, intervals
     assert branch.special or branch.status is BranchStatus.STALLED
     for point in branch.special:
         assert point.kind in ("unresolved", "period doubling")
-        assert abs(point.parameter - 0.04009165) <= 1.2 * point.parameter_error + 1e-8
+        # What was met on this mesh alone may have no place on finer ones, hence no error.
+        assert abs(point.parameter - 0.04009165) <= 1.2 * point.parameter_error + 1e-8 or (
+            point.kind == "unresolved" and np.isnan(point.parameter_error))
         assert point.kind == "unresolved" or point.criticality in ("undecided", "subcritical")
 
 

@@ -1,5 +1,6 @@
 """Compiled code on disk that is cut short, empty or garbage: compiled again, never a crash."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -47,8 +48,10 @@ for folder in sys.argv[1:]:
 
 def hits(*folders):
     """What a new process says that imports the module of each folder: whether it was on disk."""
+    # Stored code lies beside its source.
+    given = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     done = subprocess.run([sys.executable, "-c", IMPORTS, *map(str, folders)], check=False,
-                          capture_output=True, text=True)
+                          capture_output=True, text=True, env=given)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     said = [line.split() for line in done.stdout.splitlines()]

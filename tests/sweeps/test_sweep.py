@@ -11,7 +11,6 @@ from sweep_study import Serial, files_below, is_alive, write_study
 
 from fecontact import AnalysisError, InputError, Study, read_case, sweep
 from fecontact.core.files.atomic_write import _MARK
-from fecontact.integrate.rodas5p import driver
 from fecontact.io import read_table
 from fecontact.study import Span
 from fecontact.sweeps.batch import UnwritableError, changed
@@ -398,13 +397,6 @@ def test_bad_input_is_one_sentence(study, tmp_path, axes, options, message):
                               "folder": tmp_path / "f", **options})
     assert "\n" not in str(caught.value)
     assert not list((tmp_path).glob("f/shards/*"))
-
-
-def test_runs_have_one_thread_each(study, monkeypatch):
-    seen = []
-    monkeypatch.setattr(driver, "workers_for", lambda nodes, workers: seen.append(workers) or 1)
-    sweep(study, {"ground.speed": [1e-3, 2e-3]}, Serial())
-    assert seen == [1, 1]
 
 
 def test_long_names_of_a_study_are_no_files(study, tmp_path):
