@@ -194,8 +194,8 @@ def decide_clusters(t, p, progress, room, near, w, out):
             candidate[c] = held[c] = True
         else:
             status[c] = 1 if w.slip[c] > 0.0 else -1
-    relative, begins = np.empty(clusters), released.copy()
-    for _ in range(2 * clusters + 1):
+    relative = np.empty(clusters)
+    for _ in range(clusters + 1):
         for c in range(clusters):
             if candidate[c]:
                 status[c] = OPEN
@@ -209,13 +209,6 @@ def decide_clusters(t, p, progress, room, near, w, out):
             largest = max(largest, abs(relative[c]))
         _least_friction(p, candidate, relative, w)
         changed = False
-        for c in range(clusters):
-            if begins[c] and fresh[c] and status[c] * relative[c] < -_ACCELERATION * largest:
-                # Others that change at this moment turn it around, or hold it.
-                begins[c] = fresh[c] = False
-                candidate[c] = changed = True
-        if changed:
-            continue
         for c in range(clusters):
             if not candidate[c]:
                 continue
