@@ -20,6 +20,10 @@ from fecontact import (
 from fecontact.analysis import complex_modes
 from fecontact.analysis.run_facts import run_facts
 from fecontact.bifurcation import (
+    Collocation,
+    ContinuationOptions,
+    HarmonicBalance,
+    Shooting,
     contact_field,
     equilibrium_branch,
     frequency_response,
@@ -88,6 +92,22 @@ def test_response_is_the_resonance_of_one_mode(dimension):
     assert response.amplitude() == pytest.approx(exact, rel=1e-6)
     assert all(point.values["stable"] for point in response.branches[0].points)
     assert not response.branches[0].special
+
+
+@pytest.mark.parametrize("method", [Collocation(), Shooting(segments=1)])
+def test_steps_grow_with_a_resonance_by_any_method(method):
+    """From 0.012 to 4.7 at the peak: scales that stay would make it a way of some hundred steps."""
+    given = system(damping=0.01, drive=Drive(stiffness_x=1.0, amplitude_x=0.1,
+                                             angular_frequency=1.0))
+    far = ContinuationOptions(step=0.03, largest_step=0.3, points=400)
+    balanced, found = (frequency_response(given, (0.5, 5.0), method=how, options=far)
+                       for how in (HarmonicBalance(), method))
+    w = found.branches[0].parameter
+    assert w[-1] == 5.0
+    exact = 0.1 / np.abs(STIFFNESS[0] + 1.0 - MASS * w**2 + 0.01j * w)
+    assert found.amplitude() == pytest.approx(exact, rel=1e-5)
+    assert found.amplitude().max() == pytest.approx(0.1 / 0.01 / np.sqrt(4.5), rel=0.01)
+    assert len(w) < 2 * len(balanced.branches[0])
 
 
 def test_modes_are_those_of_the_matrices():

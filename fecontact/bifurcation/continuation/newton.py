@@ -154,21 +154,20 @@ def _iterated(
         u = u + change
         if kept is None and size <= tolerance * scale:
             return u, problem.linearise(u) if exact else linearisation, count
-        early = kept is not None and problem.polishes and not (exact or problem.kinked)
-        if early and size * _LIKELY <= tolerance * scale:
+        early = problem.polishes and not (exact or problem.kinked)
+        # With a matrix that is kept the error falls by about the same factor each time.
+        falls = size / before if count > 1 else _SERVES
+        # Behind a kink the next step may be no shorter.
+        known_next = size <= tolerance * scale or not problem.kinked
+        if kept is not None and (
+                (early and size * _LIKELY <= tolerance * scale)
+                or (known_next and size * falls <= max(0.1 * tolerance, 1e-13) * scale)):
             # A step with its own matrix tells whether the last one has led near enough.
             u, kept, before = _polished(problem, u, guess, row, exact)
             if before <= tolerance * scale:
                 return u, kept, max(1, count - 2 - more)
             count_kept = 0
             continue
-        # With a matrix that is kept the error falls by about the same factor each time.
-        falls = size / before if count > 1 else _SERVES
-        # Behind a kink the next step may be no shorter.
-        known_next = size <= tolerance * scale or not problem.kinked
-        if (kept is not None and known_next
-                and size * falls <= max(0.1 * tolerance, 1e-13) * scale):
-            return *_polished(problem, u, guess, row, exact)[:2], max(1, count - 2 - more)
         if problem.keeps_matrix:
             keeps = kept is None or falls <= _SERVES
             kept = (kept or linearisation) if keeps else None

@@ -11,6 +11,8 @@ from fecontact.core.checks import as_count, as_floats, as_texts, require_flags, 
 from fecontact.core.errors import InputError, choices, nearest, require_positive, shown
 from fecontact.core.types import Array, ArrayLike
 
+_GROWTH = 1e4  # largest factor by which scales grow with the orbits of a branch
+_NEARLY = 1.5  # factor to the size of an orbit up to which scales are kept
 _SAME_DIRECTION = 0.9  # cosine between directions that count as the same
 
 
@@ -397,12 +399,24 @@ def titled(
 def sizes_of(given: ArrayLike | None, found: Array) -> tuple[Array, Array | None]:
     """Scales (d,) of the states, and their upper limits where they grow with the orbit."""
     if given is None:
-        return found, 100.0 * found
+        return found, _GROWTH * found
     sizes = as_floats(given, "scales")
     if sizes.shape != found.shape or not (sizes > 0.0).all():
         raise InputError(f"scales = {given!r} must hold {len(found)} numbers above zero, one for "
                          f"each state.")
     return sizes, None
+
+
+def enlarged(scales: Array, sizes: Array, limits: Array) -> Array:
+    """Scales of states, period and parameter, enlarged to the sizes (d,) of the states of an orbit.
+
+    They grow up to ``limits`` (d,); scales that are nearly large enough are returned as they are.
+    """
+    d = len(sizes)
+    larger = np.clip(sizes, scales[:d], limits)
+    if (larger <= _NEARLY * scales[:d]).all():
+        return scales
+    return np.concatenate([larger, scales[d:]])
 
 
 def width_of(given: float | None, options: ContinuationOptions, value: float) -> float:

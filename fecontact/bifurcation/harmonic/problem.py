@@ -14,6 +14,7 @@ from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
     Problem,
+    enlarged,
 )
 from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.harmonic import estimates
@@ -232,11 +233,9 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """Scales of states, period and parameter, enlarged with the orbit."""
         if self.limits is None:
             return self.scales
-        layout, found = self.layout, self.scales.copy()
-        X = self.coefficients(u)[1:]
-        found[layout.columns] = np.sqrt(np.einsum("ki,ki->i", X, X))
-        found = np.clip(found, self.scales, np.append(self.limits, self.scales[-2:]))
-        return found if (found > 1.5 * self.scales).any() else self.scales
+        sizes, X = self.scales[:-2].copy(), self.coefficients(u)[1:]
+        sizes[self.layout.columns] = np.sqrt(np.einsum("ki,ki->i", X, X))
+        return enlarged(self.scales, sizes, self.limits)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""

@@ -222,7 +222,8 @@ def _from_hopf(
         return _first_that_goes(
             starts.at_hopf(field, point, 50, 4, options, scales, width),
             lambda found: shooting_branches.born(found[0], method.segments, method.rtol,
-                                                 method.derivative_rtol, method.solver, options))
+                                                 method.derivative_rtol, method.solver, options,
+                                                 found[1]))
     require_smooth_friction(field)
     return _first_that_goes(
         starts.at_hopf(field, point, method.intervals, method.degree, options, scales, width),
@@ -248,7 +249,7 @@ def _from_motion(
     if isinstance(method, Shooting):
         return shooting_branches.from_motion(
             field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
-            method.solver, options, widths, direction, both)
+            method.solver, options, widths, limits, direction, both)
     require_smooth_friction(field)
     problem, u = starts.corrected_samples(
         lambda intervals: starts.from_samples(

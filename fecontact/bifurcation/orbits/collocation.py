@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation import predictor
 from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.floquet import FloquetTests
@@ -310,13 +310,9 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
-        d = self.field.dimension
         if self.limits is None:
             return self.scales
-        larger = np.clip(np.ptp(self.nodes(u), axis=0) / 2.0, self.scales[:d], self.limits)
-        if (larger <= 1.5 * self.scales[:d]).all():
-            return self.scales
-        return np.concatenate([larger, self.scales[d:]])
+        return enlarged(self.scales, np.ptp(self.nodes(u), axis=0) / 2.0, self.limits)
 
     def on_mesh(
         self, mesh: Array, u: Array, tangent: Array

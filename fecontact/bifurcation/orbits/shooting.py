@@ -1,5 +1,6 @@
 """Periodic orbits of contact systems by multiple shooting with the compiled integrator."""
 
+import dataclasses
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -9,7 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
@@ -75,6 +77,11 @@ class ShootingProblem(FloquetTests, Problem):
         Tolerance of the location of special points, relative to the step: that of the runs.
     before, bend
         The previous orbit with its tangent, and the derivative of the tangent along the branch.
+    limits : (d,) array, optional
+        Upper limits up to which the scales of the states grow with the orbit; None keeps the
+        scales.
+    noted : list of (u, sizes)
+        Half the ranges (d,) of the states along the orbit whose values were stored last.
     """
 
     field: ContactField
@@ -90,8 +97,11 @@ class ShootingProblem(FloquetTests, Problem):
     precision: float = 1e-7
     before: tuple[Array, Array] | None = None
     bend: Array | None = None
+    limits: Array | None = None
+    noted: list[tuple[Array, Array]] = dataclasses.field(default_factory=list)
 
     keeps_matrix: ClassVar[bool] = True
+    polishes: ClassVar[bool] = True
     event_precision: ClassVar[float] = 1e-9
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
@@ -159,19 +169,30 @@ class ShootingProblem(FloquetTests, Problem):
         guess = u + step * tangent
         if self.bend is None:
             return guess
-        aside = 0.5 * step * step * self.bend
-        size = float(np.sqrt(self.weights() @ aside**2))
-        return guess if size > _MOST_BENT * step else guess + aside
+        weights = self.weights()
+        assert self.before is not None
+        # The length of the last tangent changes with the scales.
+        length = step / weighted_norm(weights, self.before[1])
+        aside = 0.5 * length * length * self.bend
+        return guess if weighted_norm(weights, aside) > _MOST_BENT * step else guess + aside
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[ShootingProblem, Array, Array]":
         """The problem for the next step, with the phase condition at u."""
         bend = None
         if self.before is not None:
-            start, direction = self.before
-            length = float(self.weights() * direction @ (u - start))
+            start, direction = self.before[0], self.before[1] / weighted_norm(
+                self.weights(), self.before[1])
+            length = weighted_product(self.weights(), direction, u - start)
             bend = (tangent - direction) / length if length > 0.0 else None
         return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
-                       before=(u, tangent), bend=bend), u, tangent
+                       scales=self._grown(u), before=(u, tangent), bend=bend), u, tangent
+
+    def _grown(self, u: Array) -> Array:
+        """Scales of states, period and parameter, enlarged with the orbit."""
+        found = next((sizes for known, sizes in self.noted if known is u), None)
+        if self.limits is None or found is None:
+            return self.scales
+        return enlarged(self.scales, found, self.limits)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""
@@ -180,10 +201,12 @@ class ShootingProblem(FloquetTests, Problem):
             linearisation.require_certain()
         stability = linearisation.floquet
         states = linearisation.paths.reshape(-1, self.field.dimension)
+        low, high = states.min(axis=0), states.max(axis=0)
+        self.noted[:] = [(u, (high - low) / 2.0)]
         return {"period": self.period(u), "multipliers": stability.multipliers,
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh,
-                "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
+                "minimum": low, "maximum": high}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, and of orbits that shrink to an equilibrium."""

@@ -43,6 +43,8 @@ def _attributes(problem: ShootingProblem) -> dict[str, Any]:
              "segments": len(problem.mesh) - 1, "periods": problem.periods, "rtol": problem.rtol}
     if problem.derivative_rtol is not None:
         found["derivative_rtol"] = problem.derivative_rtol
+    if problem.limits is not None:
+        found["limits"] = problem.limits
     if (solver := solver_text(problem.solver)) is not None:
         found["solver"] = solver
     return found
@@ -54,11 +56,15 @@ def _name(problem: ShootingProblem) -> str:
 
 def born(
     start: Start, segments: int, rtol: float, derivative_rtol: float | None, solver: Solver,
-    options: ContinuationOptions
+    options: ContinuationOptions, limits: Array | None,
 ) -> Branch:
-    """Branch from a start at a Hopf point, for orbits that reach stick on steep friction."""
+    """Branch from a start at a Hopf point, for orbits that reach stick on steep friction.
+
+    ``limits`` (d,) are those of the growth of the scales, here and below.
+    """
     found, u, leaving = start
     problem, first = shooting_from(found, u, segments, rtol, derivative_rtol, solver)
+    problem = replace(problem, limits=limits)
     shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
     tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
     return continue_branch(problem, first, options, name=_name(problem),
@@ -69,12 +75,13 @@ def born(
 def from_motion(
     field: VectorField, values: Array, free: int, motion: PeriodicMotion, segments: int,
     rtol: float, derivative_rtol: float | None, solver: Solver, options: ContinuationOptions,
-    widths: Array, direction: float, both: bool,
+    widths: Array, limits: Array | None, direction: float, both: bool,
 ) -> Branch:
     """Branch through the orbit to which a motion of a contact system has settled.
 
     Orbits of unknown period start where the motion is fastest, if it covers at least two periods.
-    ``widths`` (d + 1,) are the scales of states and parameter.
+    ``widths`` (d + 1,) are the scales of states and parameter, ``limits`` (d,) those of their
+    growth.
 
     Raises
     ------
@@ -90,6 +97,7 @@ def from_motion(
     found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
                          motion.periods, widths)
     problem, u = shooting_from(*found, segments, rtol, derivative_rtol, solver)
+    problem = replace(problem, limits=limits)
     branch, why = _from_event_to_event(problem, u, options, direction=direction, both=both)
     if branch is not None:
         return branch
@@ -160,7 +168,7 @@ def _from_event_to_event(
                            problem.solver)
     except AnalysisError as error:
         return None, f"The runs of the orbit were differenced: {error}"
-    whole = {**_attributes(problem), "scales": found[0].scales, "segments": 1}
+    whole = {**_attributes(replace(problem, limits=None)), "scales": found[0].scales, "segments": 1}
     try:
         return followed(*found, options, name=_name(problem), attributes=whole, **how), ""
     except InputError as error:
@@ -196,7 +204,8 @@ def goes_on(
 ) -> Branch:
     """Continue a branch from one of its points, or backwards if ``sign`` is -1."""
     problem, u, tangent = restored_shooting(field, point)
-    problem = rescaled(problem, scales, width)
+    limits = None if scales is not None else point.branch.attributes.get("limits")
+    problem = replace(rescaled(problem, scales, width), limits=limits)
     if rtol is not None:
         problem = replace(problem, rtol=rtol)
     ahead = float(np.copysign(1.0, sign * tangent[-1]))
