@@ -61,8 +61,12 @@ def case_keys(
 
 def flat(study: Study) -> dict[str, Any]:
     """Resolved study by dotted names, without keys that do not affect the run."""
-    return flattened({section: table for section, table in study.tables().items()
-                      if section not in _NOT_OF_THE_RUN})
+    return flattened(of_the_run(study.tables()))
+
+
+def of_the_run(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables of a study without the sections that do not affect the run."""
+    return {name: table for name, table in tables.items() if name not in _NOT_OF_THE_RUN}
 
 
 def _converter(

@@ -123,7 +123,7 @@ class SweepTable(Summarised):
 
         ``changes`` are further assignments, such as those that the sweep was started with.
         """
-        own = [f"{name}={_text(value)}" for name, value in self.changes(case).items()]
+        own = [f"{name}={text_of(value)}" for name, value in self.changes(case).items()]
         return shlex.join(["fecontact", "run", str(study), *(
             word for one in (*changes, *own) for word in ("--set", one))])
 
@@ -207,7 +207,7 @@ class SweepTable(Summarised):
                                       "'fecontact[xarray]'.") from None
         from fecontact.sweeps.summaries import unit_of
 
-        labels = {name: list(values) if is_numeric(values) else [_text(one) for one in values]
+        labels = {name: list(values) if is_numeric(values) else [text_of(one) for one in values]
                   for name, values in self.parameters.items()}
         axes = {name: list(dict.fromkeys(values)) for name, values in labels.items()}
         shape = tuple(map(len, axes.values()))
@@ -227,13 +227,13 @@ class SweepTable(Summarised):
         ``NAME-strobed.csv``, one line per case.
         """
         columns = [*self.parameters.values(), *(column.tolist() for column in self.values.values())]
-        rows = ([k, key, *(_text(column[k]) for column in columns), _status(reason), reason or "",
+        rows = ([k, key, *(text_of(column[k]) for column in columns), _status(reason), reason or "",
                  self.warnings[k] if self.warnings else ""]
                 for k, (key, reason) in enumerate(zip(self.keys, self.reasons, strict=True)))
         head = [*_BEFORE, *self.parameters, *self.values, *_AFTER]
         write_whole(Path(path), csv_text([head, *rows]))
         if self.strobed is not None:
-            lines = "".join(f"{k},{','.join(map(_text, row))}\n"
+            lines = "".join(f"{k},{','.join(map(text_of, row))}\n"
                             for k, row in enumerate(self.strobed.tolist()))
             write_whole(_strobed_file(Path(path)), lines)
         return Path(path)
@@ -252,7 +252,8 @@ def is_numeric(values: Sequence[Any]) -> bool:
     return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
 
 
-def _text(value: Any) -> str:
+def text_of(value: Any) -> str:
+    """Text of a number or text of a study, in cells and on command lines; empty for nan."""
     if isinstance(value, float):
         return "" if math.isnan(value) else repr(value)
     return json.dumps(value)

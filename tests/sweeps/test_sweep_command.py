@@ -18,6 +18,7 @@ from fecontact.core.progress import clock
 from fecontact.io import read_table
 from fecontact.plot import plot_sobol, plot_sweep
 from fecontact.sweeps import Estimate, SobolIndices, SweepTable, executors, plots, sobol_indices
+from fecontact.sweeps.case_key import flat
 from fecontact.sweeps.sweep import note
 
 SWEEP = """
@@ -94,12 +95,40 @@ friction.static_coefficient = 0.9
     assert words[:3] == ["fecontact", "run", str(study)]
     found = read_study(Path(words[2]), words[4::2])
     assert (found.ground.speed, found.friction.static_coefficient) == (2e-3, 0.9)
+    assert found.simulation.t_end == 0.05
     first = cli("sweep", study, "--cases", "0")[1]
     assert re.match(r"case 0: amplitude_x = \d[\d.]* .?m, own.py:failing = 1\n  fecontact run",
                     first)
     code, _, err = cli("sweep", study, "--cases", "0,2")
     assert code == 1
     assert "numbers of cases from 0 to 1, like 3,17" in err
+
+
+def test_printed_commands_are_of_the_study_that_was_swept(cli, tmp_path):
+    """Assignments of the sweep, those in lists of tables too, whatever the file says since."""
+    study = write_study(tmp_path, """
+[sweep.axes]
+ground.speed = [1e-3, 2e-3]
+""")
+    text = study.read_text().replace("load = { normal = 14.0 }", """
+load = { normal = 14.0, forces = [{ point = "B", component = "x", signal = { law = "harmonic",
+amplitude = 1.0, angular_frequency = 50.0 } }] }""".replace(",\n", ", "))
+    study.write_text(text)
+    given = ["--set", "simulation.t_end=0.02", "--set", "load.forces.0.signal.amplitude=0.5",
+             "--set", "friction.law=constant", "--set", "friction.friction_coefficient=0.7"]
+    code, _, err = cli("sweep", study, *given)
+    assert (code, err) == (0, "")
+    swept = read_study(study, [*given[1::2], "ground.speed=0.002"])
+    study.write_text(text.replace("normal = 14.0,", "normal = 15.0,"))
+    code, out, err = cli("sweep", study, "--cases", "1")
+    assert (code, err) == (0, "")
+    words = shlex.split(out.partition("\n  fecontact run")[2])
+    assert flat(read_study(study, words[2::2])) == flat(swept)
+    another = '{ signal = { law = "constant", value = 1.0 } }'
+    study.write_text(text.replace(" } }] }", f" }} }}, {another}] }}"))
+    code, _, err = cli("sweep", study, "--cases", "1")
+    assert code == 0
+    assert "has changed since the sweep in keys that --set does not change back" in err
 
 
 def test_drawn_samples_show_statistics_and_sensitivities(cli, tmp_path):

@@ -11,8 +11,10 @@ from cyclopts import Parameter
 from fecontact.cli.console import echo, echo_written, note, show
 from fecontact.cli.options import Changes, StudyFile
 from fecontact.core.errors import InputError
+from fecontact.core.units import listed
 
 if TYPE_CHECKING:
+    from fecontact.study.study import Study
     from fecontact.study.sweep_section import SweepSettings
     from fecontact.sweeps.table import SweepTable
 
@@ -69,8 +71,9 @@ def sweep(
         from fecontact.sweeps.table import read_table
 
         stored = read_table(folder / "index.csv")
+        changes = _changes_of(folder / "sweep.toml", read_study(study), study)
         for case in _chosen(stored, cases):
-            echo(_told(stored, case) + f"\n  {command(stored, case)}")
+            echo(_told(stored, case) + f"\n  {stored.command(case, study, *changes)}")
         return 0
     with waiting("Compiling, once after an installation"):
         pass
@@ -104,6 +107,47 @@ def _chosen(table: "SweepTable", cases: str) -> list[int]:
         raise InputError(f"--cases {cases} must be 'failed', 'missing', or numbers of cases from 0 "
                          f"to {len(table) - 1}, like 3,17.")
     return [number for number in numbers if number is not None]
+
+
+def _changes_of(file: Path, study: "Study", path: Path) -> list[str]:
+    """Assignments that turn a study into the one that a sweep keeps in a file.
+
+    They are those that the sweep was started with, and keys of the study that were edited since.
+    """
+    from fecontact.core.dotted_parameters import flattened
+    from fecontact.core.tables import parsed
+    from fecontact.sweeps.case_key import of_the_run
+    from fecontact.sweeps.table import text_of
+
+    def leaves(tables: Mapping[str, Any]) -> dict[str, Any]:
+        return flattened(_numbered(of_the_run(tables)))
+
+    try:
+        wanted = leaves(parsed(file.read_text(encoding="utf-8"), str(file)))
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{file}, the study of the sweep, cannot be read; run the sweep again "
+                         f"with --overwrite.") from None
+    found = leaves(study.tables())
+    changes = {name: value for name, value in wanted.items() if found.get(name) != value}
+    try:
+        found = leaves(study.with_(**changes).tables())
+    except InputError:
+        found |= changes
+    if others := sorted(name for name in {*found, *wanted}
+                        if found.get(name) != wanted.get(name)):
+        note(f"note: {path} has changed since the sweep in keys that --set does not change back, "
+             f"{listed(others, 5)}; the commands run other cases. The study of the sweep is "
+             f"{file}.")
+    return [f"{name}={text_of(value)}" for name, value in changes.items()]
+
+
+def _numbered(value: Any) -> Any:
+    """Tables with lists of tables as tables over their numbers, as --set names them."""
+    if isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+        value = {f"{number}": one for number, one in enumerate(value)}
+    if isinstance(value, Mapping):
+        return {name: _numbered(one) for name, one in value.items()}
+    return value
 
 
 def _told(table: "SweepTable", case: int) -> str:
