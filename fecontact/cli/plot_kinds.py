@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -119,6 +120,10 @@ def require_kind_of_plot(kind: str | None, file: Path, choice: OrbitChoice) -> s
     whole = holds_branches(file) and choice == OrbitChoice()
     known = (f"{diagrams} of the whole file, and of an orbit: {of_runs}" if whole
              else of_runs)
+    meant = get_close_matches(str(file), (*KINDS, *DIAGRAMS), n=1)
+    if meant and kind not in KINDS and kind not in DIAGRAMS and not file.exists():
+        raise InputError(f"fecontact plot takes the file first, then the kind of plot: "
+                         f"`fecontact plot {kind or 'FILE'} {meant[0]}`, and {file} is no file.")
     if kind is None:
         raise InputError(f"Say what to plot: `fecontact plot {file} KIND`, with one of {known}.")
     if kind in DIAGRAMS and not holds_branches(file):

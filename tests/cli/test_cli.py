@@ -235,6 +235,8 @@ MISTAKES = [
     (["render", "bad.toml"], "bad.toml is not valid TOML"),
     (["render", "text.msh"], "text.msh is not an HDF5 file"),
     (["export", "none.vtkhdf"], "none.vtkhdf does not exist"),
+    (["plot", "histroy", "none.vtkhdf"], "`fecontact plot none.vtkhdf history`, and histroy is no"),
+    (["plot", "history"], "takes the file first, then the kind of plot: `fecontact plot FILE his"),
     (["plot", "none.vtkhdf"], "fecontact plot none.vtkhdf KIND`, with one of 'contact_map', "),
     (["plot", "none-branch.h5"], "KIND`, with one of 'branches', 'mode', 'response' of the whole"),
     (["plot", "none-branch.h5", "--at", "3"], "KIND`, with one of 'contact_map', "),

@@ -74,6 +74,13 @@ def test_poincare_section_takes_one_point_a_period(trajectory):
     assert figure.axes[0].get_title() == "B, 5 points"
 
 
+def test_poincare_section_of_a_short_run_is_refused_unless_it_is_an_orbit(trajectory):
+    with pytest.raises(InputError, match=r"has 3 points, 0\.0071 s apart, but needs 5"):
+        analysis.plot_poincare(trajectory, "B", "x", period=0.0071)
+    figure = analysis.plot_poincare(trajectory, "B", "x", period=0.01)  # of two periods
+    assert figure.axes[0].get_title() == "B, 3 points"
+
+
 def test_response_figure_names_its_curves(trajectory):
     body = trajectory.system.basis
     f = np.linspace(10.0, 3000.0, 50)

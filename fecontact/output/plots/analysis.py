@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.histories import Point, history, point_name
-from fecontact.analysis.periodicity import section_states, strobed_states
+from fecontact.analysis.periodicity import Strobe, section_states, strobed_states
 from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.sampling import evenly_sampled_history
 from fecontact.analysis.spectra import (
+    FEWEST_PERIODS,
     amplitude_spectrum,
     power_spectral_density,
     require_periods,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 
 _COLUMNS = 1000  # most points of a line
+_RETURNS = 1e-3  # of the motion, within which an orbit has returned
 _ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
 LOWEST_DECADES = 5.0  # range of a logarithmic axis below its highest value
 
@@ -208,8 +210,9 @@ def plot_poincare(
     Raises
     ------
     InputError
-        For a point or a component that does not exist, a motion without maxima, another suffix, or
-        a file that cannot be written.
+        For a point or a component that does not exist, a motion without maxima, fewer than five
+        points unless the last one is the first again, another suffix, or a file that cannot be
+        written.
     """
     require_kind("plot_poincare", Trajectory, trajectory=trajectory)
     row = direction_row(trajectory, component)
@@ -224,14 +227,15 @@ def plot_poincare(
         drawn.trajectory.displacement, drawn.trajectory.velocity))
     rows = trajectory._rows(point)[row]
     m = basis.modes
+    once = found.states[:, :m] @ rows, found.states[:, m : 2 * m] @ rows
+    _require_section(found, once, (np.ptp(x), np.ptp(v)))
     with new_figure(6.4, 5.2, path) as figure:
         add_note(figure, drawn)
         plane = figure.subplots()
         unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
         factor, rate_symbol = suitable_unit(float(np.abs(v).max()), "m/s")
         plane.plot(x / unit, v / factor, color="#b9c4cc", linewidth=0.6, label="motion")
-        once = found.states[:, :m] @ rows / unit, found.states[:, m : 2 * m] @ rows / factor
-        plane.plot(*once, "o", markersize=3.5, color=COLOURS[1],
+        plane.plot(once[0] / unit, once[1] / factor, "o", markersize=3.5, color=COLOURS[1],
                    label=f"once per {found.period:.4g} s" if found.maxima_of is None else
                    f"maxima of {component}, {found.period:.4g} s apart")
         plane.set_xlabel(f"displacement {component} [{symbol}]")
@@ -239,6 +243,21 @@ def plot_poincare(
         plane.legend(loc="best")
         plane.set_title(f"{point_name(point, basis)}, {count(len(found.time), 'point')}")
     return figure
+
+
+def _require_section(
+    found: Strobe, once: tuple[Array, Array], ranges: tuple[float, float]
+) -> None:
+    """Refuse a section of few points, unless they are those of a whole orbit.
+
+    ``once`` are the displacements and velocities of the points, ``ranges`` those of the motion.
+    """
+    points, fewest = len(found.time), int(FEWEST_PERIODS)
+    returns = points > 1 and all(abs(values[-1] - values[0]) <= _RETURNS * largest
+                                 for values, largest in zip(once, ranges, strict=True))
+    if points < fewest and not returns:
+        raise InputError(f"A Poincare section: the run has {count(points, 'point')}, "
+                         f"{found.period:.4g} s apart, but needs {fewest}; run it for longer.")
 
 
 def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
