@@ -1,6 +1,8 @@
 """Vector fields: derivatives against closed forms and against each other."""
 
 import math
+import pickle
+from copy import deepcopy
 from dataclasses import replace
 
 import numba
@@ -123,6 +125,34 @@ def test_kind_errors_of_functions():
 
 
 # Contact systems -----------------------------------------------------------------------------
+
+def forced(t, x, p, out):
+    out[0] = p[0] * np.cos(np.pi * t) - x[0]
+
+
+def two_seconds(parameters):
+    return 2.0
+
+
+@pytest.mark.parametrize("period", [2.0, two_seconds])
+def test_fields_of_importable_functions_are_pickled(period):
+    field = vector_field(forced, {"a": 1.0}, 1, period=period)
+    found = pickle.loads(pickle.dumps(field))
+    assert found.forcing_period(found.values) == 2.0
+    np.testing.assert_array_equal(found.rates(TIMES[:1], PLACES[:1, :1].copy(), found.values),
+                                  field.rates(TIMES[:1], PLACES[:1, :1].copy(), field.values))
+
+
+def test_fields_of_functions_within_functions_are_copied_but_not_pickled():
+    def inner(t, x, p, out):
+        out[0] = -x[0]
+
+    for field in (vector_field(inner, {}, 1), vector_field(forced, {"a": 1.0}, 1,
+                                                           period=lambda parameters: 2.0)):
+        assert deepcopy(field).rates(np.zeros(1), np.zeros((1, 1)), field.values) is not None
+        with pytest.raises(InputError, match=r"<locals>.* define it by def at the top level of a"):
+            pickle.dumps(field)
+
 
 def squared(system, a):
     return with_force(system, a * a)

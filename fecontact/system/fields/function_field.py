@@ -1,9 +1,11 @@
 """Vector fields from a user's function of one state."""
 
+import pickle
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from types import CodeType, MappingProxyType
 from typing import Any, Self
 
@@ -68,7 +70,12 @@ class FunctionField(VectorField):
         base = np.abs(self.values)
         self._sizes = np.where(base > 0.0, base, 1.0)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return copy(self)
+
     def __getstate__(self) -> dict[str, Any]:
+        for function in self.functions:
+            _require_importable(getattr(function, "python", function))
         # Without the compiled code, which belongs to this process.
         return {name: replace(value) if isinstance(value, CompiledLaw) else value
                 for name, value in super().__getstate__().items()}
@@ -311,7 +318,22 @@ def _period_of(period: Any) -> Callable[[Mapping[str, float]], float] | None:
     except InputError:
         raise InputError(f"period = {shown(period)} must be a number above zero [s], or a function "
                          f"that returns it from the parameters by name.") from None
-    return lambda parameters: float(period)
+    return partial(_constant, float(period))
+
+
+def _constant(period: float, parameters: Mapping[str, float]) -> float:
+    return period
+
+
+def _require_importable(function: Any) -> None:
+    """Raise InputError for a function that pickle cannot name to another process."""
+    try:
+        pickle.dumps(function)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        name = getattr(function, "__qualname__", shown(function))
+        raise InputError(f"The vector field cannot be pickled, for a file or for another process, "
+                         f"because its function {name} is a lambda or stands inside another "
+                         f"function; define it by def at the top level of a module.") from None
 
 
 def _wrong_at_samples(field: FunctionField) -> str | None:
