@@ -1,5 +1,6 @@
 """Reading of studies and runs and writing of results, shared by several commands."""
 
+import os
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -8,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fecontact.cli.console import echo, loading
-from fecontact.core.errors import FecontactError, InputError
+from fecontact.core.errors import FecontactError, InputError, shown
 from fecontact.core.units import listed
 
 if TYPE_CHECKING:
@@ -20,12 +21,19 @@ if TYPE_CHECKING:
     from fecontact.system.quasistatic.history import LoadHistory
 
 
+_LONGEST_NAME = 200  # bytes; endings such as -contact_map.png make it longer, up to 255
+
+
 def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
     """Read a study and override keys by assignments such as ``ground.speed=0.1``."""
     with loading():
         from fecontact.core.tables import parsed
         from fecontact.study.study import Study
     study = Study.read(file)
+    if (size := len(os.fsencode(study.name))) > _LONGEST_NAME:
+        raise InputError(f"The name of the study, {shown(study.name)}, has {size} bytes, and those "
+                         f"of its results would be longer still; rename the file to at most "
+                         f"{_LONGEST_NAME}.")
     values: dict[str, Any] = {}
     for change in changes or ():
         name, equals, text = (part.strip() for part in change.partition("="))

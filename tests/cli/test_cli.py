@@ -245,6 +245,9 @@ MISTAKES = [
     (["plot", "none.vtkhdf", "histroy"], "(did you mean 'history'?)"),
     (["plot", "none.vtkhdf", "response"], "is one of files NAME-branch.h5 and NAME-response.h5"),
     (["laws", "mine.txt:Own"], "a law of your own is FILE.py:CLASS"),
+    (["report", "tiny.toml", "-o", f"{'m' * 300}.html"], "name too long); choose a shorter name"),
+    (["run", "tiny.toml", "-o", "m" * 300], "cannot be written (file name too long); choose an"),
+    (["init", f"{'m' * 300}.toml"], "cannot be written (file name too long); choose a shorter"),
     (["init", "study.txt"], "study.txt must end in .toml"),
     (["init", "tiny.toml/x.toml"], "The folder tiny.toml cannot be written"),
     (["demo", "tiny.toml/x"], "The folder tiny.toml/x cannot be written"),
@@ -264,6 +267,13 @@ def test_mistakes_are_one_sentence_and_leave_nothing_behind(tokens, message, cli
     assert message in err
     assert err.count("\n") == 1
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+
+
+def test_names_of_studies_leave_space_for_those_of_results(cli, study):
+    long = study.rename(study.with_name(f"{'n' * 201}.toml"))
+    code, _, err = cli("run", long.name)
+    assert code == 1
+    assert "has 201 bytes, and those of its results would be longer still; rename the file" in err
 
 
 def test_settings_of_a_movie_out_of_range(cli, study):

@@ -633,9 +633,11 @@ def test_pictures_into_the_present_folder(place, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of a shell")
-def test_too_little_memory_for_the_libraries_is_said():
-    done = subprocess.run(["sh", "-c", f"ulimit -v 500000; {sys.executable} -m fecontact keys"],
+@pytest.mark.parametrize(("option", "limit"), [("-v", 900000), ("-s", 128)])
+def test_too_little_memory_for_the_libraries_is_said(option, limit):
+    done = subprocess.run(["sh", "-c", f"ulimit {option} {limit}; {sys.executable} -m fecontact "
+                           "keys"],
                           text=True, capture_output=True, check=False)
     assert done.returncode == 1
     assert_kind(done.stderr)
-    assert "ulimit -v" in done.stderr
+    assert f"ulimit {option}" in done.stderr

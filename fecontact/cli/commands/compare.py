@@ -35,6 +35,7 @@ def compare(
     files of branches, their diagrams over each other and the parameters that differ.
     """
     from fecontact.cli.orbit_files import holds_branches
+    from fecontact.core.files.atomic_write import require_possible
 
     if len(files) < 2:
         raise InputError(f"compare takes two files or more, not {len(files)}; name those of the "
@@ -45,6 +46,7 @@ def compare(
     page = output or _beside(files[0])
     if page.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{page} must end in .html; the picture is written beside it.")
+    require_possible(page)
     if kinds == {True}:
         _compare_branches(files, page.with_suffix(".png"), trust)
         return

@@ -34,8 +34,9 @@ def report(
     from fecontact.analysis.run_facts import notes
     from fecontact.cli.orbit_files import holds_branches, write_orbit_page
     from fecontact.cli.run_files import require_stored, stored_or_computed_run, write_report
-    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder, require_possible
 
+    require_possible(output)
     if holds_branches(file):
         require_stored(file, set_)
         target = output or file.with_suffix(".html")
@@ -140,8 +141,9 @@ def render(
 
     from fecontact.cli.orbit_files import OrbitChoice, stored_orbit_or_run
     from fecontact.cli.run_files import movie, wear_of
-    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder, require_possible
 
+    require_possible(output)
     changes: dict[str, Any] = {
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
         "view": view,
@@ -203,9 +205,10 @@ def plot(
     )
     from fecontact.cli.plot_kinds import PlotRequest, point_of, redraw, require_kind_of_plot
     from fecontact.cli.run_files import require_stored
-    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder, require_possible
     from fecontact.output.plots.figure import styled
 
+    require_possible(output)
     chosen = OrbitChoice(branch, at, at_hz, which)
     kind = require_kind_of_plot(kind, file, chosen)
     if kind in DIAGRAMS and holds_branches(file):
@@ -239,8 +242,9 @@ def export(
 ) -> None:
     """Export a run to another format."""
     from fecontact.cli.run_files import stored_run
-    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.core.files.atomic_write import output_folder, require_possible
 
+    require_possible(output)
     stored = stored_run(file, trust, set_)
     from fecontact.output.files.export import export_run
 

@@ -26,8 +26,9 @@ def init(
 ) -> None:
     """Write a commented study file to start from."""
     from fecontact.cli.templates import template
-    from fecontact.core.files.atomic_write import write_text
+    from fecontact.core.files.atomic_write import require_possible, write_text
 
+    require_possible(file)
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
     # Resolve the path: none/../study.toml exists as soon as the folder of the new file is made.

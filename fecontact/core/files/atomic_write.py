@@ -251,9 +251,18 @@ def unwritable(path: Path, error: OSError) -> str:
     remedy = ""
     if error.errno in _FULL:
         remedy = "; make room on the disk, or choose another folder"
+    elif error.errno == errno.ENAMETOOLONG:
+        remedy = "; choose a shorter name"
     elif isinstance(error, FileNotFoundError | NotADirectoryError | PermissionError):
         remedy = "; choose a folder that exists and is writable"
     return f"{path} cannot be written ({reason}){remedy}."
+
+
+def require_possible(path: Path | None) -> None:
+    """Raise InputError for the name of a file to write that the file system does not allow."""
+    if path is not None:
+        with _readable_errors(path), suppress(FileNotFoundError, NotADirectoryError):
+            os.lstat(path)
 
 
 @contextmanager
@@ -265,8 +274,9 @@ def output_folder(folder: Path) -> Iterator[Path]:
     InputError
         If it cannot be made or written.
     """
-    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    made: list[Path] = []
     try:
+        made += [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fecontact.core.errors import InputError
 
-_LEAST = 0.8e9  # [bytes]
+_LEAST, _LEAST_STACK = 1.0e9, 1 << 20  # [bytes]
 _UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
 
@@ -48,8 +48,13 @@ def require_memory(name: str, count: float, each: float, remedy: str = "") -> No
 def require_address_space() -> None:
     """Raise :class:`InputError` if this process may not take the memory that libraries need.
 
-    They end it by a signal, or fail to load, where the limit of ``ulimit -v`` is reached.
+    They end it by a signal, or fail to load, where the limit of ``ulimit -v`` or that of its stack,
+    ``ulimit -s``, is reached.
     """
+    if (stack := _limit("RLIMIT_STACK")) < _LEAST_STACK:
+        raise InputError(f"This process may have a stack of {shown_memory(stack)} only (ulimit "
+                         f"-s), but libraries need {_LEAST_STACK // 1024} kB; raise the limit: "
+                         f"ulimit -s {_LEAST_STACK // 1024}.")
     free = _own_limit()
     if free < _LEAST:
         raise InputError(f"This process may take {shown_memory(max(free, 0.0))} of memory only "
@@ -97,13 +102,21 @@ def _container(folder: Path) -> float:
 
 
 def _own_limit() -> float:
+    limit = _limit("RLIMIT_AS")
+    if limit == float("inf"):
+        return limit
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        return limit - pages * float(os.sysconf("SC_PAGE_SIZE"))
+    except (OSError, ValueError):
+        return float("inf")
+
+
+def _limit(name: str) -> float:
+    """A limit of this process [bytes]; infinite where there is none."""
     try:
         import resource
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit == resource.RLIM_INFINITY:
-            return float("inf")
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-        return float(limit - pages * resource.getpagesize())
-    except (ImportError, OSError, ValueError):
+    except ImportError:
         return float("inf")
+    found = resource.getrlimit(getattr(resource, name))[0]
+    return float("inf") if found == resource.RLIM_INFINITY else float(found)
