@@ -107,6 +107,29 @@ def keep_sides(moved, y, s, counts, force, rates, sides):
 
 
 @helper
+def widen_scales(moved, y, s, counts, force, rates, scale):
+    """Make ``scale`` (size,), what errors count relative to, larger for elements that slide at y.
+
+    An error of the deflection z turns their force, c times the limit l, by l / |z| of it. A limit
+    far below its scale is on its way to or from zero: its force acts for as short a time.
+    """
+    for j in range(len(counts)):
+        if counts[j] == 0:
+            continue
+        first = len(y) + (j - len(counts)) * s.memory.max()
+        z = memory_of(j, y, s)
+        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
+        pressing = pressing_on(j, contact, F, s)
+        for i in range(counts[j]):
+            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            if size > limit:
+                begin, end = (2 * i, 2 * i + 2) if in_space(s) else (i, i + 1)
+                least = max(limit, _ROUNDING * size)
+                for k in range(first + begin, first + end):
+                    scale[k] *= size / least * max(1.0, scale[k] / least)
+
+
+@helper
 def return_to_limits(t, y, s, counts, force, rates):
     """Return all deflections of the state y at time t to their limits."""
     moved = ground_motion(t, s)

@@ -168,18 +168,23 @@ def test_elements_turn_on_the_edge_of_their_disc():
     assert abs(run.energies.imbalance) < 1e-5
 
 
-@pytest.mark.parametrize("normal", [LinearContact(20.0, 0.0), PowerContact(20.0, 2.0),
-                                    BilateralCubic(5.0, 1.0, 0.0)])
-def test_elements_turn_where_the_normal_force_vanishes(normal):
-    """Deflections in space are those of the disc that follows the motion, where F passes zero."""
+def bouncing(normal):
+    """A mass in space with two elements that three forces shake; its contact opens at times."""
     rows = np.eye(3)
     basis = fc.basis_from_matrices(np.eye(3), np.diag([1.0, 1.3, 4.0]), {
         "contact": rows[None], "C": rows}, damping=0.1 * np.eye(3), dimension=3)
     law = IwanFriction(20.0, 0.5, elements=2)
-    system = fc.ContactSystem(basis, normal=normal, friction=law, load=fc.Load(forces=(
+    return fc.ContactSystem(basis, normal=normal, friction=law, load=fc.Load(forces=(
         fc.PointLoad("C", "x", signal=Harmonic(2.0, 0.9)),
         fc.PointLoad("C", "y", signal=Harmonic(1.5, 1.3)),
         fc.PointLoad("C", "z", signal=Harmonic(3.0, 1.7)))))
+
+
+@pytest.mark.parametrize("normal", [LinearContact(20.0, 0.0), PowerContact(20.0, 2.0),
+                                    BilateralCubic(5.0, 1.0, 0.0)])
+def test_elements_turn_where_the_normal_force_vanishes(normal):
+    """Deflections in space are those of the disc that follows the motion, where F passes zero."""
+    system = bouncing(normal)
     rough, run = (fc.simulate(system, 20.0, outputs=80001, rtol=rtol) for rtol in (1e-6, 1e-9))
     F = np.abs(run.normal_force[:, 0])
     vanishes = (F == 0.0) | (np.diff(np.sign(run.normal_force[:, 0]), append=0.0) != 0.0)
@@ -269,6 +274,54 @@ def test_derivatives_where_a_contact_closes_and_sticks():
     assert np.abs(found.states[-1] - end(*state, 0.1)).max() < 1e-8
     assert (np.abs(found.monodromy[:, :4] - wanted[:, :4]).max(axis=1) < 1e-6 * size).all()
     assert (np.abs(found.parameter_derivative - wanted[:, 4]) < 1e-6 * size).all()
+
+
+def test_derivatives_where_the_normal_force_passes_zero():
+    """An element slides until the normal force is zero, and sticks from there on, as |F| rises."""
+    c, k, mu, T = 1e5, 1e4, 0.3, 3e-3
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows[None], "B": rows})
+    system = fc.ContactSystem(basis, normal=BilateralCubic(c, 0.0, 0.0),
+                              friction=JenkinsFriction(k, mu), ground=fc.Ground(speed=0.1))
+
+    def end(x, y, vx, vy, belt):
+        w, wz = np.sqrt(c), np.sqrt(k)
+        passes = np.arctan(-w * y / vy) / w
+        s = T - passes
+        # The friction is mu y'' until then.
+        slower = vx - mu * (vy / np.cos(w * passes) - vy)
+        there = x + (vx + mu * vy) * passes + mu * y
+        z = (slower - belt) * np.sin(wz * s) / wz
+        return (there + belt * s + z, vy / np.cos(w * passes) * np.sin(w * s) / w,
+                belt + (slower - belt) * np.cos(wz * s),
+                vy / np.cos(w * passes) * np.cos(w * s), z)
+
+    state = [0.0, -1e-4, 0.2, 0.1]
+    wanted = complex_steps(end, (*state, 0.1))
+    for outputs in ([0.0, T], [0.0, 0.97e-3, 1.1e-3, T]):
+        found = fc.sensitivity(system, T, initial=[*state, mu * c * 1e-4 / k], rtol=1e-11,
+                               parameter="ground.speed", outputs=outputs)
+        size = np.abs(wanted).max(axis=1)
+        assert np.abs(found.states[-1] - end(*state, 0.1)).max() < 1e-8
+        assert (np.abs(found.monodromy[:, :4] - wanted[:, :4]).max(axis=1) < 1e-6 * size).all()
+        assert (np.abs(found.parameter_derivative - wanted[:, 4]) < 1e-6 * size).all()
+
+
+def test_derivatives_where_sliding_elements_lift_off_in_space():
+    """Directions of slip turn ever faster as the normal force vanishes; forces do not."""
+    system = bouncing(LinearContact(20.0, 0.0))
+    start = fc.simulate(system, 2.0, outputs=2, rtol=1e-10).states[-1]
+    times = np.linspace(2.0, 8.0, 7)
+    found = fc.sensitivity(system, 8.0, initial=start, t_start=2.0, outputs=times, rtol=1e-8)
+    lifts = fc.simulate(system, 8.0, initial=start, t_start=2.0, outputs=6001).normal_force[:, 0]
+    assert np.count_nonzero(np.diff(lifts > 0.0)) > 3
+    assert not found.note
+    h = 1e-6
+    moves = h * np.eye(6, len(start))
+    ends = [[fc.simulate(system, 8.0, initial=start + sign * move, t_start=2.0, outputs=2,
+                         rtol=1e-12).states[-1] for move in moves] for sign in (1.0, -1.0)]
+    wanted = ((np.array(ends[0]) - np.array(ends[1])) / (2.0 * h)).T
+    assert np.abs(found.monodromy[:6, :6] - wanted[:6]).max() < 1e-4 * np.abs(wanted).max()
 
 
 def test_what_does_not_serve_the_elements_says_so():

@@ -4,8 +4,8 @@ The deflections of the elements follow the slip velocity all the time; see
 :mod:`fecontact.system.elastic_sliders`. Slip of an element ends where its excess over the limit is
 largest. A step with such a place inside is shortened to end there. The next step finds that the
 excess falls from its start: the deflection is returned to the limit, and the step is taken anew.
-A step ends just past the touch of a contact that closes, and the next one begins with the
-deflections since then, ``z = v (t - t_touch)``.
+A step ends just past the touch of a contact that closes, or whose normal force passes through zero,
+and the next one begins with the deflections since then, ``z = v (t - t_touch)``.
 Forces are continuous at both ends of slip, and the derivatives of a deflection that is returned to
 the limit become those of the limit.
 """
@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fecontact.core.addresses import function_at
-from fecontact.core.compiled import compile_law, routine
+from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.core.records import Vector
 from fecontact.integrate.rodas5p import dynamics, state, tableau
 from fecontact.integrate.rodas5p.step_length import LAST_STEP
@@ -34,6 +34,7 @@ from fecontact.system.nodes import (
     change_by,
     force_room,
     ground_motion,
+    ground_moved,
     in_space,
     memory_of,
     node_motion,
@@ -58,8 +59,9 @@ _FALL = 1e-12
 # Parts of a step within which a switch counts as lying on its end, without and with derivatives.
 _NEAR, _NEAR_VARIED = 1e-3, 1e-6
 _PRECISION, _TRIALS = 1e-7, 50
-# Steps do not end at a touch that is nearer to their start than this part of the time.
-_BRIEFEST = 1e-12
+# Switches count as at an end of a step if they are nearer to it than this part of the time, and at
+# most so much of the step.
+_BRIEFEST, _NEAREST = 1e-12, 0.1
 # Steps that end at a touch go past it by at most this many times what counts as the end.
 _PAST = 4.0
 # Least deflection of elements that slide since a touch, in parts of its scale: the shorter it is,
@@ -81,9 +83,9 @@ def _look(part, step, problem, progress, room, y):
 
 @routine
 def _pressing(j, y, moved, s, force, rates):
-    """Pressing force of node j, and its contact."""
+    """Normal force of node j, what friction sees of it, and the contact."""
     F, _, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
-    return pressing_on(j, contact, F, s), contact
+    return F, pressing_on(j, contact, F, s), contact
 
 
 @routine
@@ -91,52 +93,108 @@ def _excess(part, j, i, step, problem, progress, room, y, force, rates):
     """Excess of element i of node j at a part of the step."""
     s = problem.system
     moved = _look(part, step, problem, progress, room, y)
-    pressing, _ = _pressing(j, y, moved, s, force, rates)
+    _, pressing, _ = _pressing(j, y, moved, s, force, rates)
     count = problem.control.slider_counts[j]
     return deflection_of(memory_of(j, y, s), i, s) - limit_of(j, i, count, pressing, s)
 
 
+@helper
+def _begins(before, now):
+    """Whether a normal force ``now`` begins, or passes through zero, since it was ``before``."""
+    return now != 0.0 and not before * now > 0.0
+
+
 @routine
-def _touch(low, high, j, step, problem, progress, room, y, force, rates):
-    """Part of the step at which the open contact of node j closes."""
+def _touch(low, high, now, j, step, problem, progress, room, y, force, rates):
+    """Part of the step at which the normal force of node j begins, which is ``now`` at ``high``."""
     while high - low > _PRECISION:
         part = 0.5 * (low + high)
         moved = _look(part, step, problem, progress, room, y)
-        found, _ = _pressing(j, y, moved, problem.system, force, rates)
-        if found > 0.0:
-            high = part
-        else:
+        found, _, _ = _pressing(j, y, moved, problem.system, force, rates)
+        if _begins(found, now):
             low = part
+        else:
+            high = part
     return high
 
 
+@helper
+def _penetration_acceleration(j, contact, rate, acceleration, s):
+    """Second rate of the penetration of node j [m/s^2], of the rates of state and ground."""
+    motion = node_motion(j, rate, s)
+    along = motion.along_rate - ground_moved(0, j, acceleration[0], acceleration[1], s)
+    found = contact.slope * along + contact.curvature * contact.slip**2 - motion.height_rate
+    if in_space(s):
+        across = motion.across_rate - ground_moved(2, j, acceleration[0], acceleration[1], s)
+        found += (contact.slope_across * across + contact.curvature_across * contact.slip_across**2
+                  + 2.0 * contact.twist * contact.slip * contact.slip_across)
+    return found
+
+
 @routine
-def _since_touch(j, contact, earlier, s):
-    """Time since the contact of node j closed [s]; -1 if it is longer than ``earlier``."""
+def _since_touch(j, contact, deepening, earlier, s):
+    """Time since the normal force of node j began [s], and whether it came through zero.
+
+    The time is -1 if it is longer than ``earlier``; ``deepening`` is u''.
+    """
     u, v, p = contact.penetration, contact.rate, s.normal_parameters[j]
-    if normal_at(s.normal[j])(u - v * earlier, v, p)[0] != 0.0:
-        return -1.0
+    now = normal_at(s.normal[j])(u, v, p)[0]
+    before = normal_at(s.normal[j])(u - v * earlier, v - deepening * earlier, p)[0]
+    if not _begins(before, now):
+        return -1.0, False
     low, high = 0.0, earlier
     for _ in range(_TRIALS):
         middle = 0.5 * (low + high)
-        if normal_at(s.normal[j])(u - v * middle, v, p)[0] != 0.0:
-            low = middle
-        else:
+        found = normal_at(s.normal[j])(u - v * middle, v - deepening * middle, p)[0]
+        if _begins(found, now):
             high = middle
-    return low
+        else:
+            low = middle
+    return low, before != 0.0
 
 
 @routine
-def _begin_contact(j, since, t, problem, progress, vary, force, rates):
+def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rates):
+    """Let the derivatives of a deflection be those of z = v (t - t_b), of which t_b varies.
+
+    Contact begins at t_b: the penetration passes a level, or the normal force comes ``through``
+    zero with the rate F_u u' + F_v u''; ``deepening`` is u''. g are the derivatives of node forces.
+    """
+    s, v, p = problem.system, vary.variation, problem.system.normal_parameters[j]
+    tangents = 2 if in_space(s) else 1
+    first = 2 * len(problem.control.largest) + j * s.memory.max() + tangents * i
+    F, pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    _, by_depth, by_rate = normal_at(s.normal[j])(contact.penetration, contact.rate, p)
+    rate = by_depth * contact.rate + by_rate * deepening if through else contact.rate
+    for c in range(len(v.columns)):
+        motion = node_motion(j, v.columns[c], s)
+        change = (contact.slope * motion.along - motion.height
+                  + contact.slope_across * motion.across)
+        if through:
+            change = F / pressing * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
+        if vary.width != 0.0 and c == len(v.columns) - 1:
+            up, _, above = _pressing(j, y, ground_motion(t, vary.above), vary.above, force, rates)
+            down, _, below = _pressing(j, y, ground_motion(t, vary.below), vary.below, force, rates)
+            change += (up - down if through else above.penetration - below.penetration) / vary.width
+        v.columns[c, first] = contact.slip * change / rate
+        if tangents == 2:
+            v.columns[c, first + 1] = contact.slip_across * change / rate
+
+
+@routine
+def _begin_contact(
+    j, since, through, acceleration, t, problem, progress, vary, force, rates,
+):
     """Set the deflections of node j a time after its touch; True if any changes.
 
     They are ``z = v since``, of which the part beyond the limit is the distance of slip. It may be
-    longer by any amount.
+    longer by any amount. ``acceleration`` is that of the ground.
     """
     s, y, changed = problem.system, progress.state, False
     count = problem.control.slider_counts[j]
-    pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    _, pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
     speed = np.hypot(contact.slip, contact.slip_across) if in_space(s) else abs(contact.slip)
+    deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
     z, scales = memory_of(j, y, s), problem.control.memory_scale
     for i in range(count):
         limit = limit_of(j, i, count, pressing, s)
@@ -147,8 +205,8 @@ def _begin_contact(j, since, t, problem, progress, vary, force, rates):
         if z[first] == along and (not in_space(s) or z[first + 1] == across):
             continue
         if len(vary.variation.columns):
-            _columns(j, i, count, limit, max(deflection_of(z, i, s), 1e-300), t, y,
-                     progress.gradients, problem, progress, vary, force, rates, True)
+            _begin_columns(j, i, through, deepening, t, y, progress.gradients, problem, vary, force,
+                           rates)
         z[first], changed = along, True
         if in_space(s):
             z[first + 1] = across
@@ -165,22 +223,25 @@ def _set_rates(after_t, problem, progress, room):
 
 
 @routine
-def _after_touch(t, problem, progress, room, vary):
-    """Set the deflections of contacts that closed at the end of the last step."""
+def _after_touch(step, t, problem, progress, room, vary):
+    """Set the deflections of contacts that closed at the end of the last step, at the time t."""
     s, control, changed = problem.system, problem.control, False
     near = _NEAR_VARIED if len(vary.variation.columns) > 0 else _NEAR
-    earlier = _PAST * near * progress.numbers[LAST_STEP]
+    earlier = _PAST * max(near * progress.numbers[LAST_STEP], _BRIEFEST * abs(t))
     states = s.memory.max()
     length, width = force_room(states, in_space(s))
     force, rates = np.empty(length), np.empty((states, width))
     moved = ground_motion(t, s)
+    acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), moved, s)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
-        pressing, contact = _pressing(j, progress.state, moved, s, force, rates)
-        since = _since_touch(j, contact, earlier, s) if pressing > 0.0 else -1.0
+        _, _, contact = _pressing(j, progress.state, moved, s, force, rates)
+        deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
+        since, through = _since_touch(j, contact, deepening, earlier, s)
         if since >= 0.0:
-            changed |= _begin_contact(j, since, t, problem, progress, vary, force, rates)
+            changed |= _begin_contact(j, since, through, acceleration, t, problem, progress, vary,
+                                      force, rates)
     if changed:
         _set_rates(t, problem, progress, room)
 
@@ -232,38 +293,24 @@ def _largest(low, high, j, i, step, problem, progress, room, y, force, rates):
 
 
 @routine
-def _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, rates, reset):
+def _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates):
     """Make the derivatives of a deflection those of its limit.
 
-    ``y`` is the state before it returns, g the derivatives of the node forces there. Where the
-    element comes from an open contact (``reset``) its deflection is zero at the moment of the
-    touch, which varies.
+    ``y`` is the state before it returns, g the derivatives of the node forces there.
     """
     s, v = problem.system, vary.variation
-    m = len(problem.control.largest)
     tangents = 2 if in_space(s) else 1
-    states = s.memory.max()
-    first = 2 * m + j * states + tangents * i
-    z = memory_of(j, y, s)
-    _, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
-    p = s.friction_parameters[j]
+    first = 2 * len(problem.control.largest) + j * s.memory.max() + tangents * i
+    z, p = memory_of(j, y, s), s.friction_parameters[j]
     slope = p[1 + count + i] / p[1 + i]
     for c in range(len(v.columns)):
-        motion = node_motion(j, v.columns[c], s)
         change = slope * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
-        deeper = (contact.slope * motion.along - motion.height
-                  + contact.slope_across * motion.across)
         if vary.width != 0.0 and c == len(v.columns) - 1:
-            above, one = _pressing(j, y, ground_motion(t, vary.above), vary.above, force, rates)
-            below, other = _pressing(j, y, ground_motion(t, vary.below), vary.below, force, rates)
+            _, above, _ = _pressing(j, y, ground_motion(t, vary.above), vary.above, force, rates)
+            _, below, _ = _pressing(j, y, ground_motion(t, vary.below), vary.below, force, rates)
             change += (limit_of(j, i, count, above, vary.above)
                        - limit_of(j, i, count, below, vary.below)) / vary.width
-            deeper += (one.penetration - other.penetration) / vary.width
-        if reset:
-            v.columns[c, first] = contact.slip * deeper / contact.rate
-            if tangents == 2:
-                v.columns[c, first + 1] = contact.slip_across * deeper / contact.rate
-        elif tangents == 1:
+        if tangents == 1:
             v.columns[c, first] = change if z[i] > 0.0 else -change
         else:
             a, b = z[2 * i] / size, z[2 * i + 1] / size
@@ -274,15 +321,15 @@ def _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, 
 
 
 @routine
-def _return_one(j, i, within, t, y, g, problem, progress, vary, force, rates):
+def _return_one(j, i, within, t, y, g, problem, vary, force, rates):
     """Return element i of node j to its limit, or a little below it, if it is beyond it."""
     s, count = problem.system, problem.control.slider_counts[j]
-    pressing, _ = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    _, pressing, _ = _pressing(j, y, ground_motion(t, s), s, force, rates)
     limit, size = limit_of(j, i, count, pressing, s), deflection_of(memory_of(j, y, s), i, s)
     if size <= limit:
         return
     if len(vary.variation.columns):
-        _columns(j, i, count, limit, size, t, y, g, problem, progress, vary, force, rates, False)
+        _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates)
     part = 1.0 - SHORT if within else 1.0 + SHORT
     return_deflection(memory_of(j, y, s), i, size, limit * part, s)
 
@@ -296,11 +343,13 @@ def _switch(step, problem, progress, room, vary):
     force, rates = np.empty(length), np.empty((states, width))
     y = np.empty(len(progress.state))
     found, places = np.empty((3, n, states)), np.full((n, states), 2.0)
-    closed, starts = np.zeros((3, n)), np.full((n, states), -1.0)
+    pushing, starts = np.zeros((3, n)), np.full((n, states), -1.0)
     at_once = np.zeros((n, states), dtype=np.bool_)
     begins = varies or control.slider_counts.sum() <= _FEW
-    near = _NEAR_VARIED if varies else _NEAR
     first, t, again = 2.0, step.t, False
+    nearest = max(_NEAR_VARIED, min(_BRIEFEST * abs(t) / step.h, _NEAREST))
+    near = nearest if varies else max(_NEAR, nearest)
+    least, past = near, 0.0
     after_t = np.nextafter(t, np.inf)
     for look in range(_LOOKS + 2):
         if again:
@@ -315,25 +364,28 @@ def _switch(step, problem, progress, room, vary):
             count = control.slider_counts[j]
             if count == 0:
                 continue
-            pressing, _ = _pressing(j, y, moved, s, force, rates)
-            closed[look % 3, j] = pressing
+            F, pressing, _ = _pressing(j, y, moved, s, force, rates)
+            pushing[look % 3, j] = F
             z = memory_of(j, y, s)
             for i in range(count):
                 now[j, i] = deflection_of(z, i, s) - limit_of(j, i, count, pressing, s)
-            if look > 0 and pressing > 0.0 and closed[(look + 2) % 3, j] == 0.0:
+            if look > 0 and _begins(pushing[(look + 2) % 3, j], F):
                 begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
-                place = _touch(begun, part, j, step, problem, progress, room, y, force, rates)
-                if place * step.h > _BRIEFEST * abs(t):
-                    first = min(first, place)
+                place = _touch(begun, part, F, j, step, problem, progress, room, y, force, rates)
+                if place > nearest:
+                    first, least, past = min(first, place), nearest, nearest
                 else:
-                    again |= _begin_contact(j, 0.0, after_t, problem, progress, vary, force, rates)
+                    again |= _begin_contact(
+                        j, 0.0, pushing[(look + 2) % 3, j] != 0.0, dynamics.ground_acceleration(
+                            t, dynamics.soon(step), step.moved, s),
+                        after_t, problem, progress, vary, force, rates)
                 _look(part, step, problem, progress, room, y)
         if look == 0:
             starts[:, :] = now
             continue
         for j in range(n):
             # Elements of a contact that stays open have nothing to hold.
-            if closed[0, j] + closed[1, j] + closed[2, j] == 0.0:
+            if not np.any(pushing[:, j] != 0.0):
                 continue
             for i in range(control.slider_counts[j]):
                 low, middle, high = older[j, i], last[j, i], now[j, i]
@@ -363,15 +415,15 @@ def _switch(step, problem, progress, room, vary):
         if first <= part:
             break
     # Steps end a little past a switch, so that it lies well within what counts as the end.
-    if not again and first >= 1.0 - 3.0 * near:
+    if not again and first >= 1.0 - 3.0 * near - past:
         return 1.0
-    if not again and first > near:
-        return min(first + near * first, 1.0)
+    if not again and first > least:
+        return min(first + near * first + past, 1.0)
     for j in range(n):
         for i in range(control.slider_counts[j]):
             if places[j, i] <= near:
                 _return_one(j, i, True, after_t, progress.state, progress.gradients,
-                            problem, progress, vary, force, rates)
+                            problem, vary, force, rates)
                 again = True
             elif at_once[j, i]:
                 z = memory_of(j, progress.state, s)
@@ -396,14 +448,14 @@ def _at_end(step, problem, progress, room, vary):
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
-        before, _ = _pressing(j, y, earlier, s, force, rates)
-        after, _ = _pressing(j, room.after, now, s, force, rates)
+        _, before, _ = _pressing(j, y, earlier, s, force, rates)
+        _, after, _ = _pressing(j, room.after, now, s, force, rates)
         # Where the force jumps, slip ends at the begin of the next step.
         if before < 0.5 * after:
             continue
         for i in range(control.slider_counts[j]):
             _return_one(j, i, False, step.latest, room.after, room.gradients_after,
-                        problem, progress, vary, force, rates)
+                        problem, vary, force, rates)
     dynamics.set_rate_and_gradients(room.after, s, problem.blocks, room.given, room.load,
                                     room.nodes, room.gradients_after, room.rate_after)
 
@@ -420,7 +472,7 @@ def _attend(kind, step, problem, progress, room, vary, t, y):
         _at_end(step, problem, progress, room, vary)
         return 1.0
     if kind == BEGIN:
-        _after_touch(np.nextafter(t, np.inf), problem, progress, room, vary)
+        _after_touch(step, np.nextafter(t, np.inf), problem, progress, room, vary)
         return 1.0
     s = problem.system
     states = s.memory.max()

@@ -28,7 +28,7 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.memory_saltation import switch_memory
-from fecontact.system.elastic_sliders import keep_sides, set_sides
+from fecontact.system.elastic_sliders import keep_sides, set_sides, widen_scales
 from fecontact.system.nodes import (
     AXES,
     MEMORY,
@@ -332,6 +332,9 @@ def propagate(
             columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
     if size > 2 * m:
         switch_memory(step, acceleration, problem, progress, room, vary)
+    if sliders:
+        moved = ground_motion(min(step.target, step.latest), s)
+        widen_scales(moved, room.after, s, counts, force, rates, room.right)
     return _largest_error(room.right, v)
 
 
