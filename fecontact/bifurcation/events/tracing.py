@@ -179,7 +179,7 @@ def _first_state(motion: Motion, progress: Progress, room: Room, t: float) -> No
 def _require_decided(motion: Motion, progress: Progress, room: Room, t: float) -> None:
     fastest = float(motion.sizes[motion.modes :].max())
     progress.largest[SLIP_SIZE] = fastest
-    # Elsewhere it is the time of a flight, which where stops part may be below zero by rounding.
+    # Elsewhere it is the time of a flight.
     if decide(motion.problem, motion._workspace, progress, room, t, _NEAR * fastest,
               1e-12 * fastest) in (NO_ACCELERATION, NO_IMPULSES):
         raise AnalysisError("The contact state is not unique there.")

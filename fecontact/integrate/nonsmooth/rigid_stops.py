@@ -79,7 +79,7 @@ from fecontact.system.powers import (
     belt_normal_power,
 )
 
-# What is returned in place of a time of flight.
+# What is returned in place of a time of flight, which is never negative.
 NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 # Slip velocities below this part of the largest are none, energies gained rounding.
 _NEAR, _GAIN = 1e-9, 1e-10
@@ -366,7 +366,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
         closed[j] = CLOSED if resting[j] and (pressed or kept[j]) else 0
         room.fresh[k + j] = touching[j] and closed[j] == 0
         if room.fresh[k + j] and fall[j] > 0.0:
-            flight = min(flight, -2.0 * w.nodes[j, RATE] / fall[j])
+            flight = min(flight, max(0.0, -2.0 * w.nodes[j, RATE] / fall[j]))
     for c in range(k):
         if status[c] == FIXED:
             continue
