@@ -24,16 +24,21 @@ if TYPE_CHECKING:
 _LONGEST_NAME = 200  # bytes; endings such as -contact_map.png make it longer, up to 255
 
 
+def require_short(name: str) -> None:
+    """Refuse the name of a study that leaves no room for the endings of its results."""
+    if (size := len(os.fsencode(name))) > _LONGEST_NAME:
+        raise InputError(f"The name of the study, {shown(name)}, has {size} bytes, and those of "
+                         f"its results would be longer still; rename the file to at most "
+                         f"{_LONGEST_NAME}.")
+
+
 def read_study(file: Path, changes: Iterable[str] | None = None) -> "Study":
     """Read a study and override keys by assignments such as ``ground.speed=0.1``."""
     with loading():
         from fecontact.core.tables import parsed
         from fecontact.study.study import Study
     study = Study.read(file)
-    if (size := len(os.fsencode(study.name))) > _LONGEST_NAME:
-        raise InputError(f"The name of the study, {shown(study.name)}, has {size} bytes, and those "
-                         f"of its results would be longer still; rename the file to at most "
-                         f"{_LONGEST_NAME}.")
+    require_short(study.name)
     values: dict[str, Any] = {}
     for change in changes or ():
         name, equals, text = (part.strip() for part in change.partition("="))

@@ -271,9 +271,10 @@ def test_mistakes_are_one_sentence_and_leave_nothing_behind(tokens, message, cli
 
 def test_names_of_studies_leave_space_for_those_of_results(cli, study):
     long = study.rename(study.with_name(f"{'n' * 201}.toml"))
-    code, _, err = cli("run", long.name)
-    assert code == 1
-    assert "has 201 bytes, and those of its results would be longer still; rename the file" in err
+    for command in ("run", "init"):
+        code, _, err = cli(command, long.name)
+        assert code == 1
+        assert "has 201 bytes, and those of its results would be longer still; rename the file" in err
 
 
 def test_settings_of_a_movie_out_of_range(cli, study):

@@ -1,6 +1,7 @@
 """Generated solids: volumes and areas of their faces against closed forms, names, points."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from fecontact import ElasticBody, InputError, Study, generate, read_mesh, write_mesh
 from fecontact.fem import Cylinder, LapStrip, Plate, Ring, SolidBlock, SphereSegment
 from fecontact.fem.faces.surface import Surface
+from fecontact.fem.solids import generate as solid_generation
 
 ELEMENTS = ("hexahedron", "tetrahedron")
 
@@ -151,9 +153,35 @@ def test_impossible_dimensions_are_named(cls, given, message):
         cls(**given)
 
 
-def test_sizes_that_make_too_many_elements_are_refused():
-    with pytest.raises(InputError, match=r"SolidBlock: element_size = 1e-05 makes 2.4e\+11 elem"):
-        generate(SolidBlock(element_size=1e-5))
+@pytest.mark.parametrize(("shape", "message"), [
+    (SolidBlock(element_size=1e-5), "element_size = 1e-05 makes 2.4e+11 or more elements"),
+    (SphereSegment(element_size=1e-9), "element_size = 1e-09 makes"),
+    (SphereSegment(contact_element_size=1e-9), "contact_element_size = 1e-09 make"),
+    (LapStrip(element_size=1e-9), "element_size = 1e-09 makes"),
+    (Plate(layers=10**5), "element_size = 0.02 makes 1e+07 or more elements"),
+])
+def test_sizes_that_make_too_many_elements_are_refused(shape, message, monkeypatch):
+    monkeypatch.setattr(solid_generation, "available_memory", lambda: 6e9)
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        generate(shape)
+    enough = float(re.search("take at least (.*) m", str(caught.value))[1])
+    sizes = {key: max(value, enough) for key in ("element_size", "contact_element_size")
+             if (value := getattr(shape, key, None))}
+    monkeypatch.setattr(solid_generation, "swept_mesh", lambda sweep, *others: sweep.count)
+    assert 1e5 < generate(replace(shape, **sizes)) <= 5e5
+
+
+@pytest.mark.parametrize(("shape", "message"), [
+    (Plate(layers=10**7), "layers = 10000000 makes 4e+07 or more elements"),
+    (Ring(layers=10**25), "makes 4e+25 or more elements"),
+    (Ring(layers=10**5), "layers = 100000 makes 1.6e+06 or more elements"),
+    (LapStrip(holes_along=10**7, hole_radius=1e-9, washer_radius=2e-9),
+     "layers = 1, holes_along = 10000000, holes_across = 1 make 1.6e+08 or more elements"),
+])
+def test_layers_and_holes_that_make_too_many_elements_are_refused(shape, message, monkeypatch):
+    monkeypatch.setattr(solid_generation, "available_memory", lambda: 6e9)
+    with pytest.raises(InputError, match=f"{re.escape(message)}, more than 500000; take fewer"):
+        generate(shape)
 
 
 def test_a_study_takes_solids_their_supports_and_places():

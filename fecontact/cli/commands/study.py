@@ -25,12 +25,14 @@ def init(
     = False,
 ) -> None:
     """Write a commented study file to start from."""
+    from fecontact.cli.run_files import require_short
     from fecontact.cli.templates import template
     from fecontact.core.files.atomic_write import require_possible, write_text
 
     require_possible(file)
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file} must end in .toml.")
+    require_short(file.stem)
     # Resolve the path: none/../study.toml exists as soon as the folder of the new file is made.
     if file.resolve().exists() and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")

@@ -2,7 +2,9 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -33,14 +35,71 @@ from fecontact.fem.solids.swept_blocks import (
 
 MAX_CELLS = 2_000_000
 _BYTES = 12_000.0  # memory per hexahedron during meshing
+_MOST_PARTS = MAX_CELLS + 1  # of a line; so many are refused
 _NEAR = 1e-6  # of the solid's size: how close corners are to the face they lie on
 
 # Names of faces by their corners (k, n, 3) and area vectors (k, 3).
 _Names = Callable[[Array, Array], Array]
 
 
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A sweep with the names of its faces, points and groups; see :func:`swept_mesh`."""
+
+    sweep: Sweep
+    names: _Names
+    points: dict[str, tuple[float, float, float]]
+    groups: dict[str, Callable[[Array], Array]] = field(default_factory=dict)
+
+
 def generate_solid(shape: SolidShape) -> Mesh:
-    """The mesh of a solid; InputError for an element size that makes too many elements."""
+    """The mesh of a solid; InputError for keys that make too many elements."""
+    tetrahedra = shape.element == "tetrahedron"
+    each = 6 if tetrahedra else 1
+    most = int(min(MAX_CELLS, available_memory() / _BYTES * each)) // each
+    # A patch has at least 2 x 2 hexahedra in a layer, those around a hole 16.
+    counts = _given(shape, "layers", "holes_along", "holes_across")
+    least = math.prod(counts.values(), start=16 if isinstance(shape, LapStrip) else 4)
+    sizes = _given(shape, "element_size", "contact_element_size")
+    if least <= most:
+        solid = _solid(shape)
+        if (count := solid.sweep.count) <= most:
+            return swept_mesh(solid.sweep, tetrahedra, solid.names, solid.points, solid.groups)
+        coarse = 10.0 * max(value for value in vars(shape).values() if isinstance(value, float))
+        least = _count_of(shape, sizes, coarse)
+    if least > most:
+        raise InputError(f"{_keys_make(shape, counts)} {float(min(least * each, 10**99)):.3g} or "
+                         f"more elements, more than {most * each}; take fewer.")
+    fine = min(sizes.values())
+    while coarse > 1.1 * fine:
+        middle = math.sqrt(fine) * math.sqrt(coarse)
+        if _count_of(shape, sizes, middle) > most:
+            fine = middle
+        else:
+            coarse = middle
+    raise InputError(f"{_keys_make(shape, sizes)} {count * each:.3g} or more elements, more than "
+                     f"{most * each}; take at least {1.1 * coarse:.2g} m.")
+
+
+def _given(shape: SolidShape, *keys: str) -> dict[str, Any]:
+    """Values of those keys that the shape has."""
+    return {key: value for key in keys if (value := getattr(shape, key, None)) is not None}
+
+
+def _keys_make(shape: SolidShape, values: Mapping[str, float]) -> str:
+    """Begin a sentence: ``Plate: layers = 3 makes``."""
+    return (f"{type(shape).__name__}: "
+            f"{', '.join(f'{key} = {value!r}' for key, value in values.items())} "
+            f"{'makes' if len(values) == 1 else 'make'}")
+
+
+def _count_of(shape: SolidShape, sizes: Mapping[str, float], least: float) -> int:
+    """Number of hexahedra with element sizes of at least that [m]."""
+    return _solid(replace(shape, **{key: max(value, least) for key, value in sizes.items()})
+                  ).sweep.count
+
+
+def _solid(shape: SolidShape) -> _Solid:
     match shape:
         case SolidBlock():
             return _block(shape)
@@ -56,21 +115,7 @@ def generate_solid(shape: SolidShape) -> Mesh:
             return _lap_strip(shape)
 
 
-def _made(shape: SolidShape, sweep: Sweep, names: _Names,
-          points: dict[str, tuple[float, float, float]],
-          groups: dict[str, Callable[[Array], Array]] | None = None) -> Mesh:
-    tetrahedra = shape.element == "tetrahedron"
-    count = sweep.count * (6 if tetrahedra else 1)
-    most = int(min(MAX_CELLS, available_memory() / _BYTES * (6 if tetrahedra else 1)))
-    if count > most:
-        raise InputError(
-            f"{type(shape).__name__}: element_size = {shape.element_size!r} makes {count:.3g} "
-            f"elements, more than {most}; take one of at least "
-            f"{1.2 * shape.element_size * (count / most) ** (1 / 3):.2g} m.")
-    return swept_mesh(sweep, tetrahedra, names, points, groups)
-
-
-def _block(shape: SolidBlock) -> Mesh:
+def _block(shape: SolidBlock) -> _Solid:
     L, W, H = shape.length, shape.width, shape.height
     a = L if shape.contact_length is None else shape.contact_length
     b = W if shape.contact_width is None else shape.contact_width
@@ -85,11 +130,11 @@ def _block(shape: SolidBlock) -> Mesh:
         middle = np.abs(at.mean(axis=1)[:, :2] - [L / 2, W / 2])
         return np.asarray((middle < [a / 2, b / 2]).all(axis=1))
 
-    return _made(shape, sweep, _box_names(touching),
+    return _Solid(sweep, _box_names(touching),
                  {"B": (0.0, W / 2, drive), "C": (L / 2, W / 2, H)})
 
 
-def _plate(shape: Plate) -> Mesh:
+def _plate(shape: Plate) -> _Solid:
     L, W, H = shape.length, shape.width, shape.thickness
     size, near = shape.element_size, _NEAR * max(shape.length, shape.width)
     layers = shape.layers
@@ -102,23 +147,23 @@ def _plate(shape: Plate) -> Mesh:
         rim = (x < near) | (x > L - near) | (y < near) | (y > W - near)
         return np.asarray(rim & (z < 1e-6 * H))
 
-    return _made(shape, sweep, _box_names(lambda at: np.ones(len(at), bool)),
+    return _Solid(sweep, _box_names(lambda at: np.ones(len(at), bool)),
                  {"B": (0.0, W / 2, middle), "C": (L / 2, W / 2, H)},
                  {"bottom_edges": bottom_edges})
 
 
-def _ring(shape: Ring) -> Mesh:
+def _ring(shape: Ring) -> _Solid:
     R, r, H, size = shape.outer_radius, shape.inner_radius, shape.thickness, shape.element_size
     layers = shape.layers or _count(H, size)
     patches = _round(R, r, 0.25 * math.pi, size)
     sweep = Sweep(patches, lines(layers),
                   lambda xy, w: np.concatenate([xy, H * w[..., None]], axis=-1))
     middle = H * ((layers + 1) // 2) / layers
-    return _made(shape, sweep, _round_names(R, r, 2, ("contact", "top")),
+    return _Solid(sweep, _round_names(R, r, 2, ("contact", "top")),
                  {"B": (R, 0.0, middle), "C": (0.5 * (R + r) if r else 0.0, 0.0, H)})
 
 
-def _cylinder(shape: Cylinder) -> Mesh:
+def _cylinder(shape: Cylinder) -> _Solid:
     R, r, L, size = shape.radius, shape.inner_radius, shape.length, shape.element_size
     half = math.radians(0.5 * shape.contact_angle)
     y = _divided(size, 0.0, L, L / 2)
@@ -135,11 +180,11 @@ def _cylinder(shape: Cylinder) -> Mesh:
         low = np.abs(np.arctan2(x, -z)) < half
         return np.where((found == "outer") & low, "contact", found)
 
-    return _made(shape, Sweep(_round(R, r, half, size), y / L, lift), names,
+    return _Solid(Sweep(_round(R, r, half, size), y / L, lift), names,
                  {"B": (-R, L / 2, R), "C": (0.0, L / 2, 2 * R)})
 
 
-def _sphere_segment(shape: SphereSegment) -> Mesh:
+def _sphere_segment(shape: SphereSegment) -> _Solid:
     R, a, H = shape.radius, shape.base_radius, shape.height
     c = a if shape.contact_radius is None else shape.contact_radius
     fine = shape.contact_element_size or shape.element_size
@@ -169,11 +214,11 @@ def _sphere_segment(shape: SphereSegment) -> Mesh:
 
     rise = R - math.sqrt(R**2 - a**2)
     half = z[len(z) // 2]
-    return _made(shape, Sweep(patches, z, lift), names,
+    return _Solid(Sweep(patches, z, lift), names,
                  {"B": (-a, 0.0, rise + half * (H - rise)), "C": (0.0, 0.0, H)})
 
 
-def _lap_strip(shape: LapStrip) -> Mesh:
+def _lap_strip(shape: LapStrip) -> _Solid:
     L, W, H, lap = shape.length, shape.width, shape.thickness, shape.overlap
     size, r, washer = shape.element_size, shape.hole_radius, shape.washer_radius
     nx, ny = shape.holes_along, shape.holes_across
@@ -183,11 +228,13 @@ def _lap_strip(shape: LapStrip) -> Mesh:
     patches: list[Patch2D] = []
     centres = [(-lap / 2 + (i + 0.5) * cell[0], (j + 0.5) * cell[1])
                for i in range(nx) for j in range(ny)]
+    sides = [lines(count) for count in counts]
+    ring = lines(_count(washer - r, size))
+    beyond = lines(_count(math.hypot(0.5 * cell[0], 0.5 * cell[1]) - washer, 1.5 * size))
     for centre in centres:
-        patches += _cell_with_hole(centre, cell, r, washer, counts, size)
+        patches += _cell_with_hole(centre, cell, r, washer, sides, ring, beyond)
     far = _divided(size, lap / 2, L - lap / 2)
-    patches.append(rectangle(far, np.concatenate(
-        [cell[1] * (j + lines(counts[1])[(1 if j else 0):]) for j in range(ny)])))
+    patches.append(rectangle(far, W * lines(min(ny * counts[1], _MOST_PARTS))))
     sign = 1.0 if shape.layer == "upper" else -1.0
 
     def lift(xy: Array, w: Array) -> Array:
@@ -199,7 +246,8 @@ def _lap_strip(shape: LapStrip) -> Mesh:
     def names(at: Array, normals: Array) -> Array:
         x, y, z = np.moveaxis(at * [sign, 1.0, sign], 2, 0)
         middle = np.stack([x.mean(axis=1), y.mean(axis=1)], axis=1)
-        owner = np.linalg.norm(middle[:, None] - np.array(centres), axis=2).argmin(axis=1)
+        column, row = ((middle - [-lap / 2, 0.0]) // cell).T.astype(int)
+        owner = np.clip(column, 0, nx - 1) * ny + np.clip(row, 0, ny - 1)
         away = np.hypot(*(np.stack([x, y], -1) - np.array(centres)[owner][:, None]).T).T
         number = np.char.add("_", (owner + 1).astype(str))
         low, high = (np.abs(z) < near).all(axis=1), (np.abs(z - H) < near).all(axis=1)
@@ -214,14 +262,14 @@ def _lap_strip(shape: LapStrip) -> Mesh:
 
     middle = W / 2 if counts[1] * ny % 2 == 0 else W / 2 - 0.5 * cell[1] / counts[1]
     level = H * ((shape.layers + 1) // 2) / shape.layers
-    return _made(shape, Sweep(patches, lines(shape.layers), lift), names,
+    return _Solid(Sweep(patches, lines(shape.layers), lift), names,
                  {"B": (sign * (L - lap / 2), middle, sign * level),
                   "C": (-sign * lap / 2, middle, sign * H)})
 
 
 def _cell_with_hole(
     centre: tuple[float, float], cell: tuple[float, float], hole: float, washer: float,
-    counts: Sequence[int], size: float,
+    sides: Sequence[Array], ring: Array, beyond: Array,
 ) -> list[Patch2D]:
     """A rectangle around a round hole: a ring to the washer's rim, and from there to the sides."""
     x, y = 0.5 * cell[0], 0.5 * cell[1]
@@ -229,11 +277,9 @@ def _cell_with_hole(
                                                                    (-1, 1))]
     tilt = math.atan2(y, x)
     angles = [-math.pi + tilt, -tilt, tilt, math.pi - tilt, math.pi + tilt]
-    ring = lines(_count(washer - hole, size))
-    beyond = lines(_count(math.hypot(x, y) - washer, 1.5 * size))
     patches = []
     for k in range(4):
-        along = lines(counts[k % 2])
+        along = sides[k % 2]
         inner, rim = (arc(radius, angles[k], angles[k + 1], centre) for radius in (hole, washer))
         side = segment(corners[k], corners[(k + 1) % 4])
         patches += [between(inner, rim, along, ring), between(rim, side, along, beyond)]
@@ -295,13 +341,15 @@ def _divided(size: float, first: float, last: float, *between: float) -> Array:
 
 def _count(length: float, size: float) -> int:
     """Number of parts of a length that are at most as long as a size."""
-    return int(np.clip(math.ceil(length / max(size, 1e-99) - 1e-6), 1, 10**7))
+    return int(np.clip(math.ceil(length / max(size, 1e-99) - 1e-6), 1, _MOST_PARTS))
 
 
 def _growing(length: float, first: float, last: float) -> Array:
     """Lines from 0 to 1 over a length, steps growing from the first size to about the last one."""
     steps = [min(first, length)]
-    while sum(steps) < length * (1 - 1e-9) and len(steps) < 10**6:
+    reach = steps[0]
+    while reach < length * (1 - 1e-9) and len(steps) < _MOST_PARTS:
         steps.append(min(1.35 * steps[-1], max(last, first)))
+        reach += steps[-1]
     reached = np.concatenate([[0.0], np.cumsum(steps)])
     return np.asarray(reached / reached[-1])
