@@ -17,6 +17,7 @@ from fecontact.fem.elements.cell_geometry import (
     facets_of,
     oriented_solids,
     require_apart,
+    require_conforming,
     second_order_places,
     solid_volumes,
 )
@@ -121,6 +122,7 @@ class Mesh(Summarised):
                 f"remove overlapping cells."
             )
         require_apart(self._facets, self._facet_number, count, nodes)
+        require_conforming(self.outline, nodes)
         boundaries = {name: self._on_outline(name, facets) for name, facets in boundaries.items()}
         object.__setattr__(self, "boundaries", boundaries)
         for array in (nodes, cells, curved, middles, *boundaries.values(), *points.values()):

@@ -117,6 +117,26 @@ FOLDED = CUBE.copy()
 FOLDED[6] = [0.2, 0.2, 0.1]
 
 
+def test_hanging_nodes_are_refused():
+    """Of a square beside two, and of cubes where one is cut into eight."""
+    square = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 0.5), (2, 1), (1, 0.5)]
+    cells = [[0, 1, 2, 3], [1, 4, 5, 7], [7, 5, 6, 2]]
+    with pytest.raises(MeshError, match="node 7 lies inside the edge between mesh nodes 1 and 2"):
+        Mesh(square, cells)
+    thirds = [(2, 1 / 3), (2, 2 / 3), (1, 1 / 3), (1, 2 / 3)]
+    with pytest.raises(MeshError, match="node 8 lies inside the edge between mesh nodes 1 and 2"):
+        Mesh([*square[:5], (2, 1), *thirds],
+             [[0, 1, 2, 3], [1, 4, 6, 8], [8, 6, 7, 9], [9, 7, 5, 2]])
+    # A slit whose sides have nodes of their own is part of a body.
+    Mesh([*square, (1, 1)], [[0, 1, 2, 3], [1, 4, 5, 7], [7, 5, 6, 8]])
+    large = Mesh(CUBE, [np.arange(8)])
+    small = large.placed((1.0, 0.0, 0.0)).refined()
+    nodes, number = np.unique(np.concatenate([large.nodes, small.nodes]), axis=0,
+                              return_inverse=True)
+    with pytest.raises(MeshError, match="hanging node.* share whole faces"):
+        Mesh(nodes, number.reshape(-1)[np.concatenate([large.cells, small.cells + 8])])
+
+
 @pytest.mark.parametrize(("arguments", "message"), [
     ((CUBE, [[0, 1, 2]]), r"\(M, 4\) for tetrahedra or \(M, 8\) for hexahedra .* not \(1, 3\)"),
     ((FLAT, [np.arange(8)]), "1 mesh cells have no volume, or are folded or inverted, the first"),

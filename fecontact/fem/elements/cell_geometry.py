@@ -1,12 +1,15 @@
 """Geometry of cells: orientation, volume, sides in common, second-order places of curved cells."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Array, Integers
-from fecontact.fem.elements.cell_kinds import CellKind, shape_functions
+from fecontact.fem.elements.cell_kinds import CellKind, numbered_rows, shape_functions
 
 _FLAT = 1e-12  # volume of a degenerate cell, relative to the cube of its size
+_ON_EDGE = 1e-5  # distance of a node on an edge, per length: coordinates in single precision
 # Gauss points from 0 to 1, exact for determinants of second-order cells: degree 5 a direction.
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _GAUSS, _WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
@@ -76,6 +79,37 @@ def require_apart(facets: Integers, number: Integers, count: Integers, nodes: Ar
                         f"of their cells on one side, the first at "
                         f"({', '.join(f'{x:g}' for x in place)}): the mesh has inverted or "
                         f"overlapping elements; mesh the body anew.")
+
+
+def require_conforming(outline: Integers, nodes: Array) -> None:
+    """Raise :class:`MeshError` for hanging nodes, at which a cut through the mesh ends.
+
+    Such a node lies inside an edge of one cell, whose ends it shares with edges of other cells.
+    ``outline`` are the edges or faces (k, n) that belong to one cell only.
+    """
+    from scipy.spatial import KDTree
+
+    ends = np.sort(np.stack([outline, np.roll(outline, 1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    ends, _, _ = numbered_rows(ends)
+    on_outline = np.unique(ends)
+    a, b = nodes[ends[:, 0]], nodes[ends[:, 1]]
+    middles, radii = 0.5 * (a + b), 0.5 * (1.0 - _ON_EDGE) * np.linalg.norm(b - a, axis=1)
+    tree, known = KDTree(nodes[on_outline]), None
+    for edge in np.flatnonzero(tree.query_ball_point(middles, radii, return_length=True)):
+        near = on_outline[tree.query_ball_point(middles[edge], radii[edge])]
+        along = b[edge] - a[edge]
+        part = (nodes[near] - a[edge]) @ along / (along @ along)
+        off = nodes[near] - a[edge] - part[:, None] * along
+        hanging = np.linalg.norm(off, axis=1) <= _ON_EDGE * np.linalg.norm(along)
+        if not hanging.any():
+            continue
+        known = known or set(map(tuple, ends.tolist()))
+        chain = [ends[edge, 0], *near[hanging][np.argsort(part[hanging])], ends[edge, 1]]
+        if all((min(pair), max(pair)) in known for pair in pairwise(map(int, chain))):
+            raise MeshError(f"Mesh node {chain[1]} lies inside the edge between mesh nodes "
+                            f"{chain[0]} and {chain[-1]} of another cell and is not joined to it "
+                            f"(a hanging node); mesh the body anew with cells that share whole "
+                            f"{'edges' if outline.shape[1] == 2 else 'faces'}.")
 
 
 def second_order_places(
