@@ -95,8 +95,8 @@ def _keys_make(shape: SolidShape, values: Mapping[str, float]) -> str:
 
 def _count_of(shape: SolidShape, sizes: Mapping[str, float], least: float) -> int:
     """Number of hexahedra with element sizes of at least that [m]."""
-    return _solid(replace(shape, **{key: max(value, least) for key, value in sizes.items()})
-                  ).sweep.count
+    coarser: dict[str, Any] = {key: max(value, least) for key, value in sizes.items()}
+    return _solid(replace(shape, **coarser)).sweep.count
 
 
 def _solid(shape: SolidShape) -> _Solid:
