@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import ground_at
@@ -47,11 +47,30 @@ def pressing_on(j, contact, F, s):
     return pressing
 
 
+@routine
+def pressing_at(j, y, moved, s, force, rates):
+    """Normal force of node j in the state y, what friction sees of it, and the contact."""
+    F, _, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
+    return F, pressing_on(j, contact, F, s), contact
+
+
 @helper
 def limit_of(j, i, count, pressing, s):
     """Largest deflection of element i of the ``count`` elements of node j [m]."""
     p = s.friction_parameters[j]
     return p[1 + count + i] * pressing / p[1 + i]
+
+
+@routine
+def limits_at(moved, y, s, counts, force, rates):
+    """Largest deflections (n, elements) of all elements in the state y [m]."""
+    limits = np.zeros((len(counts), s.memory.max()))
+    for j in range(len(counts)):
+        if counts[j] > 0:
+            _, pressing, _ = pressing_at(j, y, moved, s, force, rates)
+            for i in range(counts[j]):
+                limits[j, i] = limit_of(j, i, counts[j], pressing, s)
+    return limits
 
 
 @helper
@@ -75,14 +94,10 @@ def set_sides(moved, y, s, counts, force, rates, sides):
     Zero for elements of open contacts, and for elements at their limit within rounding.
     """
     sides[:] = 0
+    limits = limits_at(moved, y, s, counts, force, rates)
     for j in range(len(counts)):
-        if counts[j] == 0:
-            continue
-        z = memory_of(j, y, s)
-        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
-        pressing = pressing_on(j, contact, F, s)
         for i in range(counts[j]):
-            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            limit, size = limits[j, i], deflection_of(memory_of(j, y, s), i, s)
             if limit > 0.0 and abs(size - limit) > _ROUNDING * limit:
                 sides[j, i] = 1 if size > limit else -1
 
@@ -93,14 +108,11 @@ def keep_sides(moved, y, s, counts, force, rates, sides):
 
     Derivatives of the forces there are those of elements that slide, or stick, all along a step.
     """
+    limits = limits_at(moved, y, s, counts, force, rates)
     for j in range(len(counts)):
-        if counts[j] == 0:
-            continue
         z = memory_of(j, y, s)
-        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
-        pressing = pressing_on(j, contact, F, s)
         for i in range(counts[j]):
-            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            limit, size = limits[j, i], deflection_of(z, i, s)
             target = limit * (1.0 + _APART * sides[j, i])
             if size > 0.0 and (target - size) * sides[j, i] > 0.0:
                 return_deflection(z, i, size, target, s)
@@ -113,15 +125,11 @@ def widen_scales(moved, y, s, counts, force, rates, scale):
     An error of the deflection z turns their force, c times the limit l, by l / |z| of it. A limit
     far below its scale is on its way to or from zero: its force acts for as short a time.
     """
+    limits = limits_at(moved, y, s, counts, force, rates)
     for j in range(len(counts)):
-        if counts[j] == 0:
-            continue
         first = len(y) + (j - len(counts)) * s.memory.max()
-        z = memory_of(j, y, s)
-        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
-        pressing = pressing_on(j, contact, F, s)
         for i in range(counts[j]):
-            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            limit, size = limits[j, i], deflection_of(memory_of(j, y, s), i, s)
             if size > limit:
                 begin, end = (2 * i, 2 * i + 2) if in_space(s) else (i, i + 1)
                 least = max(limit, _ROUNDING * size)
@@ -132,15 +140,11 @@ def widen_scales(moved, y, s, counts, force, rates, scale):
 @helper
 def return_to_limits(t, y, s, counts, force, rates):
     """Return all deflections of the state y at time t to their limits."""
-    moved = ground_motion(t, s)
+    limits = limits_at(ground_motion(t, s), y, s, counts, force, rates)
     for j in range(len(counts)):
-        if counts[j] == 0:
-            continue
         z = memory_of(j, y, s)
-        F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
-        pressing = pressing_on(j, contact, F, s)
         for i in range(counts[j]):
-            limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
+            limit, size = limits[j, i], deflection_of(z, i, s)
             if size > limit:
                 return_deflection(z, i, size, limit, s)
 
@@ -148,9 +152,7 @@ def return_to_limits(t, y, s, counts, force, rates):
 @kernel
 def return_states(times: Vector, states: Matrix, s: SystemArrays, counts: IntegerVector) -> None:
     """Return all deflections of states (N, size) at N times to their limits."""
-    count = s.memory.max()
-    length, width = force_room(count, in_space(s))
-    force, rates = np.empty(length), np.empty((count, width))
+    force, rates = force_room(s)
     for k in range(len(times)):
         return_to_limits(times[k], states[k], s, counts, force, rates)
 
@@ -158,36 +160,25 @@ def return_states(times: Vector, states: Matrix, s: SystemArrays, counts: Intege
 @kernel
 def excesses(t: float, y: Vector, s: SystemArrays, counts: IntegerVector, out: Matrix) -> None:
     """Fill out (n, elements) with |z| less the limit of each element [m]; -inf where none is."""
-    count = s.memory.max()
-    length, width = force_room(count, in_space(s))
-    force, rates = np.empty(length), np.empty((count, width))
-    moved = ground_motion(t, s)
+    force, rates = force_room(s)
+    limits = limits_at(ground_motion(t, s), y, s, counts, force, rates)
     out[:] = -np.inf
     for j in range(len(counts)):
-        if counts[j] > 0:
-            z = memory_of(j, y, s)
-            F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
-            pressing = pressing_on(j, contact, F, s)
-            for i in range(counts[j]):
-                out[j, i] = deflection_of(z, i, s) - limit_of(j, i, counts[j], pressing, s)
+        for i in range(counts[j]):
+            out[j, i] = deflection_of(memory_of(j, y, s), i, s) - limits[j, i]
 
 
 @kernel
 def stick_again(t: float, y: Vector, s: SystemArrays, counts: IntegerVector, ends: Matrix) -> None:
     """Return the elements to their limits for which ``ends`` (n, elements) is not zero."""
-    count = s.memory.max()
-    length, width = force_room(count, in_space(s))
-    force, rates = np.empty(length), np.empty((count, width))
-    moved = ground_motion(t, s)
+    force, rates = force_room(s)
+    limits = limits_at(ground_motion(t, s), y, s, counts, force, rates)
     for j in range(len(counts)):
-        if counts[j] > 0:
-            z = memory_of(j, y, s)
-            F, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
-            pressing = pressing_on(j, contact, F, s)
-            for i in range(counts[j]):
-                limit, size = limit_of(j, i, counts[j], pressing, s), deflection_of(z, i, s)
-                if ends[j, i] != 0.0 and size > limit:
-                    return_deflection(z, i, size, limit * (1.0 - SHORT), s)
+        z = memory_of(j, y, s)
+        for i in range(counts[j]):
+            limit, size = limits[j, i], deflection_of(z, i, s)
+            if ends[j, i] != 0.0 and size > limit:
+                return_deflection(z, i, size, limit * (1.0 - SHORT), s)
 
 
 def slider_counts(system: Any) -> Integers:

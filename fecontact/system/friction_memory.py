@@ -14,7 +14,6 @@ from fecontact.system.nodes import (
     SystemArrays,
     force_room,
     ground_motion,
-    in_space,
     memory_of,
     node_motion,
 )
@@ -24,9 +23,7 @@ from fecontact.system.powers import storing_power
 @kernel
 def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) -> None:
     """Fill out (2, N, n): what the bristles store, and the power into it at constant force."""
-    count = s.memory.max()
-    length, width = force_room(count, in_space(s))
-    force, rates = np.empty(length), np.empty((count, width))
+    force, rates = force_room(s)
     for i in range(len(times)):
         y, moved = states[i], ground_motion(times[i], s)
         for j in range(len(s.rows)):
@@ -44,9 +41,7 @@ def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) 
 def _settle(t: float, y: Vector, s: SystemArrays) -> None:
     """Bring z of each node to z' = 0 by implicit Euler steps of increasing length."""
     n = len(s.rows)
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     moved = ground_motion(t, s)
     for j in range(n):
         count = s.memory[j]

@@ -17,7 +17,6 @@ from fecontact.system.nodes import (
     force_room,
     friction_entry,
     ground_motion,
-    in_space,
     leaning,
     memory_of,
     node_motion,
@@ -95,9 +94,7 @@ def _contact_gradients(t, y, s, gradients, active, out):
     """
     n, d, m = s.rows.shape
     moved = ground_motion(t, s)
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     partial = np.empty((d + 1, 2 * d))
     count = 0
     for j in range(n):
@@ -139,9 +136,7 @@ def _fill_rates(t, x, s, load, force, rates, f):
 @kernel
 def batch_rates(t: Vector, x: Matrix, s: SystemArrays, f: Matrix) -> None:
     """Fill f (N, 2 m + n s) with y' at times t (N,) and states x (N, 2 m + n s)."""
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     load = np.empty(s.rows.shape[2])
     _fill_rates(t, x, s, load, force, rates, f)
 
@@ -240,9 +235,10 @@ def batch_derivatives(
     _, d, m = s.rows.shape
     states = s.memory.max()
     step = h if len(P) > 0 else 0.0
-    length, width = force_room(states, in_space(s))
+    force, rates = force_room(s)
+    beside, rates_beside = force_room(s)
     _fill_derivatives(t, x, s, r, laws_beside(s, r, step),
-                      (np.empty(m), np.empty(m), np.empty(length), np.empty(length),
-                       np.empty(states), np.empty(2 * d), np.empty(d), np.empty(d)),
-                      (np.empty((states, width)), np.empty((states, width)),
-                       np.empty((d + 1, 2 * d)), np.empty((d, 2 * m))), f, J, P)
+                      (np.empty(m), np.empty(m), force, beside, np.empty(states),
+                       np.empty(2 * d), np.empty(d), np.empty(d)),
+                      (rates, rates_beside, np.empty((d + 1, 2 * d)), np.empty((d, 2 * m))),
+                      f, J, P)

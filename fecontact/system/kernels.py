@@ -142,9 +142,7 @@ def contact_state(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
     """
     n = len(s.rows)
     moved = ground_motion(t, s)
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     for j in range(n):
         F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
                                     rates)
@@ -244,11 +242,10 @@ def rates_under(load, moved, y, s, force, rates, out):
 @kernel(nogil=True)
 def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     """Fill out (2 m + n s,) with y'."""
-    states = s.memory.max()
     load = np.empty(s.rows.shape[2])
     moved = given_at(t, s, load)
-    length, width = force_room(states, in_space(s))
-    rates_under(load, moved, y, s, np.empty(length), np.empty((states, width)), out)
+    force, rates = force_room(s)
+    rates_under(load, moved, y, s, force, rates, out)
 
 
 @kernel(nogil=True)

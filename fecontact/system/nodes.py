@@ -6,6 +6,8 @@ Arrays of a contact system as its compiled functions see them; the equations are
 
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
 from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, IntegerVector, Matrix, Size, Vector
 from fecontact.core.types import Array, Integers
@@ -243,9 +245,12 @@ def leaning(F, R, slope, s):
 
 
 @helper
-def force_room(states, space):
-    """Lengths of ``force`` and of a row of ``rates`` for so many internal variables.
+def force_room(s):
+    """Arrays for what a friction law says at a node of a system: ``force`` and ``rates``.
 
     In space what :mod:`fecontact.system.space_nodes` says of a node follows the friction.
     """
-    return (2 * (4 + states) + TOLD, 4 + states) if space else (3 + states, 3 + states)
+    states = s.memory.max()
+    if in_space(s):
+        return np.empty(2 * (4 + states) + TOLD), np.empty((states, 4 + states))
+    return np.empty(3 + states), np.empty((states, 3 + states))

@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Vector
 from fecontact.laws.signatures import normal_at, signal_at
@@ -147,9 +145,7 @@ def set_powers(t, y, s, stick_speed, out, nodes):
     """
     n = len(s.rows)
     moved = ground_motion(t, s)
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     body_powers(t, y, s, out)
     for j in range(n):
         add_node_powers(j, node_motion(j, y, s), moved, memory_of(j, y, s), stick_speed[j], s,

@@ -22,7 +22,7 @@ from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.records import Array4, Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import SystemArrays, force_room, ground_motion, in_space, node_motion
+from fecontact.system.nodes import SystemArrays, force_room, ground_motion, node_motion
 
 LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
@@ -164,8 +164,7 @@ def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Ma
     """
     N, n = len(t), len(s.rows)
     states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     rate, leak = N / T, LEAK / T
     path, turned = np.empty((N, states)), np.empty((N, states, 2 * states))
     z[:, :] = 0.0

@@ -24,11 +24,11 @@ from fecontact.integrate.collocation.tableau import (
     STAGES,
 )
 from fecontact.integrate.rodas5p import dynamics, state
+from fecontact.integrate.rodas5p.error_control import take_scales
 from fecontact.integrate.rodas5p.state import (
     OUTPUTS,
     RATES,
     REJECTIONS,
-    SPEED_SCALE,
     STARTED,
     STEPS,
 )
@@ -106,15 +106,6 @@ def _begin(t, end, problem, progress, room, c):
     if control.work:
         powers_at(after, progress.state, problem, room, progress.power)
     progress.counts[RATES] += 1
-
-
-@helper
-def _take_scales(control, progress):
-    m = len(control.largest)
-    for k in range(m):
-        progress.extremes[k] = max(progress.extremes[k], abs(progress.state[k]))
-        speed = abs(progress.state[m + k]) * control.largest[k]
-        progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE], speed)
 
 
 @routine
@@ -243,7 +234,7 @@ def advance(
                 h = smallest
             if c.flags[BEGINS] != 0:
                 _begin(t, end, problem, progress, room, c)
-            _take_scales(control, progress)
+            take_scales(control, progress)
             new, again, whole = False, 0, 0.0
         attempts += 1
         wanted, step = h, _span(t, h, exactly, control.breaks, end)

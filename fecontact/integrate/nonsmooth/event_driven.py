@@ -46,6 +46,7 @@ from fecontact.integrate.nonsmooth.problem import (
     Progress,
     Step,
     Workspace,
+    aimed,
 )
 from fecontact.integrate.nonsmooth.rigid_stops import (
     NO_ACCELERATION,
@@ -349,10 +350,7 @@ def run_events(
     for _ in range(most):
         if t >= end or (watch.note != 0 and full(watch)):
             break
-        goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
-        left = goal - t
-        length = min(left if h >= left * (1.0 - 1e-10) else h, longest)
-        reaching = length == left
+        goal, length, reaching = aimed(t, h, end, stop, limits)
         # At the end of a step that ends at a break, signals are as before the break.
         step = Step(t, length, np.nextafter(goal, t))
         holds = holding(progress)

@@ -60,6 +60,7 @@ from fecontact.integrate.nonsmooth.problem import (
     Output,
     Progress,
     Step,
+    aimed,
 )
 from fecontact.integrate.nonsmooth.space_contact import contact_of, scale_of
 from fecontact.integrate.nonsmooth.space_impulses import (
@@ -316,11 +317,7 @@ def run_impact_steps(
     for _ in range(most):
         if t >= end:
             break
-        goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
-        length = min(h, limits.longest)
-        reaching = length >= (goal - t) * (1.0 - 1e-10)
-        if reaching:
-            length = goal - t
+        goal, length, reaching = aimed(t, h, end, stop, limits)
         latest = np.nextafter(goal, t)
         half = 0.5 * length
         counts[STEPS] += 1

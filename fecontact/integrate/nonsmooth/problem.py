@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, Size, Vector, allocate
 from fecontact.core.types import Array, Integers
 from fecontact.system.nodes import AXES, MODES, NODES, SystemArrays
@@ -126,6 +127,15 @@ class Step(NamedTuple):
     t: float
     h: float
     latest: float
+
+
+@helper
+def aimed(t, h, end, stop, limits):
+    """The next stop or the end, length of a step to there, h at most, and whether it reaches."""
+    goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
+    length = min(h, limits.longest)
+    reaches = length >= (goal - t) * (1.0 - 1e-10)
+    return goal, goal - t if reaches else length, reaches
 
 
 class Workspace(NamedTuple):

@@ -42,6 +42,7 @@ from fecontact.integrate.nonsmooth.problem import (
     Progress,
     Step,
     Workspace,
+    aimed,
 )
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
 from fecontact.integrate.nonsmooth.stepping_room import (
@@ -360,11 +361,7 @@ def run_steps(
     for _ in range(most):
         if t >= end:
             break
-        goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
-        length = min(h, limits.longest)
-        reaching = length >= (goal - t) * (1.0 - 1e-10)
-        if reaching:
-            length = goal - t
+        goal, length, reaching = aimed(t, h, end, stop, limits)
         # At the end of a step that ends at a break, signals are as before the break.
         step = Step(t, length, np.nextafter(goal, t))
         counts[STEPS] += 1

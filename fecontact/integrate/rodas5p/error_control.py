@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.near_nodes import extend_near
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
@@ -161,6 +162,16 @@ def _energy_scale(control, progress, room):
 
 
 @helper
+def take_scales(control, progress):
+    """Note the sizes of displacements and velocities of the state that the run is at."""
+    m = len(control.largest)
+    for i in range(m):
+        progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
+        speed = abs(progress.state[m + i]) * control.largest[i]
+        progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE], speed)
+
+
+@helper
 def set_scale(control, progress, room):
     """Fill ``room.right`` with the sizes of the state: what its errors count relative to."""
     m = len(control.largest)
@@ -314,24 +325,15 @@ def _above_creep(part, j, step, problem, progress, room):
 
 @helper
 def _passing(low, high, at_low, at_high, j, step, problem, progress, room):
-    """Part of the step, between two, at which node j begins or ceases to creep (Illinois)."""
-    near, last = _CLOSE * problem.control.stick_speed[j], 0
-    part = high
+    """Part of the step, between two, at which node j begins or ceases to creep."""
+    near, part = _CLOSE * problem.control.stick_speed[j], high
+    bracket = Bracket(low, high, at_low, at_high, 0)
     for _ in range(_MOST_TRIALS):
-        part = (low * at_high - high * at_low) / (at_high - at_low)
+        part = between(bracket)
         found = _above_creep(part, j, step, problem, progress, room)
         if abs(found) <= near:
             break
-        if (found < 0.0) == (at_low < 0.0):
-            low, at_low = part, found
-            if last < 0:
-                at_high *= 0.5
-            last = -1
-        else:
-            high, at_high = part, found
-            if last > 0:
-                at_low *= 0.5
-            last = 1
+        bracket = narrowed(bracket, part, found)
     return part
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.core.records import Vector
+from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.rodas5p import dynamics, state, tableau
 from fecontact.integrate.rodas5p.step_length import LAST_STEP
 from fecontact.integrate.rodas5p.variational import Vary
@@ -25,11 +26,10 @@ from fecontact.system.elastic_sliders import (
     SHORT,
     deflection_of,
     limit_of,
-    pressing_on,
+    pressing_at,
     return_deflection,
     return_to_limits,
 )
-from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
     change_by,
     force_room,
@@ -82,18 +82,11 @@ def _look(part, step, problem, progress, room, y):
 
 
 @routine
-def _pressing(j, y, moved, s, force, rates):
-    """Normal force of node j, what friction sees of it, and the contact."""
-    F, _, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
-    return F, pressing_on(j, contact, F, s), contact
-
-
-@routine
 def _excess(part, j, i, step, problem, progress, room, y, force, rates):
     """Excess of element i of node j at a part of the step."""
     s = problem.system
     moved = _look(part, step, problem, progress, room, y)
-    _, pressing, _ = _pressing(j, y, moved, s, force, rates)
+    _, pressing, _ = pressing_at(j, y, moved, s, force, rates)
     count = problem.control.slider_counts[j]
     return deflection_of(memory_of(j, y, s), i, s) - limit_of(j, i, count, pressing, s)
 
@@ -110,7 +103,7 @@ def _touch(low, high, now, j, step, problem, progress, room, y, force, rates):
     while high - low > _PRECISION:
         part = 0.5 * (low + high)
         moved = _look(part, step, problem, progress, room, y)
-        found, _, _ = _pressing(j, y, moved, problem.system, force, rates)
+        found, _, _ = pressing_at(j, y, moved, problem.system, force, rates)
         if _begins(found, now):
             low = part
         else:
@@ -163,7 +156,7 @@ def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rate
     s, v, p = problem.system, vary.variation, problem.system.normal_parameters[j]
     tangents = 2 if in_space(s) else 1
     first = 2 * len(problem.control.largest) + j * s.memory.max() + tangents * i
-    F, pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    F, pressing, contact = pressing_at(j, y, ground_motion(t, s), s, force, rates)
     _, by_depth, by_rate = normal_at(s.normal[j])(contact.penetration, contact.rate, p)
     rate = by_depth * contact.rate + by_rate * deepening if through else contact.rate
     for c in range(len(v.columns)):
@@ -173,8 +166,9 @@ def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rate
         if through:
             change = F / pressing * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
         if vary.width != 0.0 and c == len(v.columns) - 1:
-            up, _, above = _pressing(j, y, ground_motion(t, vary.above), vary.above, force, rates)
-            down, _, below = _pressing(j, y, ground_motion(t, vary.below), vary.below, force, rates)
+            over, under = ground_motion(t, vary.above), ground_motion(t, vary.below)
+            up, _, above = pressing_at(j, y, over, vary.above, force, rates)
+            down, _, below = pressing_at(j, y, under, vary.below, force, rates)
             change += (up - down if through else above.penetration - below.penetration) / vary.width
         v.columns[c, first] = contact.slip * change / rate
         if tangents == 2:
@@ -192,7 +186,7 @@ def _begin_contact(
     """
     s, y, changed = problem.system, progress.state, False
     count = problem.control.slider_counts[j]
-    _, pressing, contact = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    _, pressing, contact = pressing_at(j, y, ground_motion(t, s), s, force, rates)
     speed = np.hypot(contact.slip, contact.slip_across) if in_space(s) else abs(contact.slip)
     deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
     z, scales = memory_of(j, y, s), problem.control.memory_scale
@@ -228,15 +222,13 @@ def _after_touch(step, t, problem, progress, room, vary):
     s, control, changed = problem.system, problem.control, False
     near = _NEAR_VARIED if len(vary.variation.columns) > 0 else _NEAR
     earlier = _PAST * max(near * progress.numbers[LAST_STEP], _BRIEFEST * abs(t))
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     moved = ground_motion(t, s)
     acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), moved, s)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
-        _, _, contact = _pressing(j, progress.state, moved, s, force, rates)
+        _, _, contact = pressing_at(j, progress.state, moved, s, force, rates)
         deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
         since, through = _since_touch(j, contact, deepening, earlier, s)
         if since >= 0.0:
@@ -256,25 +248,14 @@ def _slope(part, j, i, step, problem, progress, room, y, force, rates):
 
 @routine
 def _root(slopes, low, high, at_low, at_high, j, i, step, problem, progress, room, y, force, rates):
-    """Part of the step at which the excess, or with ``slopes`` its slope, vanishes (Illinois)."""
-    part, last = high, 0
+    """Part of the step at which the excess, or with ``slopes`` its slope, vanishes."""
+    bracket, part = Bracket(low, high, at_low, at_high, 0), high
     for _ in range(_TRIALS):
-        part = (low * at_high - high * at_low) / (at_high - at_low)
-        if not low < part < high:
-            part = 0.5 * (low + high)
+        part = between(bracket)
         found = (_slope(part, j, i, step, problem, progress, room, y, force, rates) if slopes else
                  _excess(part, j, i, step, problem, progress, room, y, force, rates))
-        if (found < 0.0) == (at_low < 0.0):
-            low, at_low = part, found
-            if last < 0:
-                at_high *= 0.5
-            last = -1
-        else:
-            high, at_high = part, found
-            if last > 0:
-                at_low *= 0.5
-            last = 1
-        if found == 0.0 or high - low < _PRECISION:
+        bracket = narrowed(bracket, part, found)
+        if found == 0.0 or bracket.high - bracket.low < _PRECISION:
             break
     return part
 
@@ -306,8 +287,8 @@ def _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates):
     for c in range(len(v.columns)):
         change = slope * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
         if vary.width != 0.0 and c == len(v.columns) - 1:
-            _, above, _ = _pressing(j, y, ground_motion(t, vary.above), vary.above, force, rates)
-            _, below, _ = _pressing(j, y, ground_motion(t, vary.below), vary.below, force, rates)
+            _, above, _ = pressing_at(j, y, ground_motion(t, vary.above), vary.above, force, rates)
+            _, below, _ = pressing_at(j, y, ground_motion(t, vary.below), vary.below, force, rates)
             change += (limit_of(j, i, count, above, vary.above)
                        - limit_of(j, i, count, below, vary.below)) / vary.width
         if tangents == 1:
@@ -324,7 +305,7 @@ def _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates):
 def _return_one(j, i, within, t, y, g, problem, vary, force, rates):
     """Return element i of node j to its limit, or a little below it, if it is beyond it."""
     s, count = problem.system, problem.control.slider_counts[j]
-    _, pressing, _ = _pressing(j, y, ground_motion(t, s), s, force, rates)
+    _, pressing, _ = pressing_at(j, y, ground_motion(t, s), s, force, rates)
     limit, size = limit_of(j, i, count, pressing, s), deflection_of(memory_of(j, y, s), i, s)
     if size <= limit:
         return
@@ -339,8 +320,7 @@ def _switch(step, problem, progress, room, vary):
     s, control = problem.system, problem.control
     n, varies = len(control.slider_counts), len(vary.variation.columns) > 0
     states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     y = np.empty(len(progress.state))
     found, places = np.empty((3, n, states)), np.full((n, states), 2.0)
     pushing, starts = np.zeros((3, n)), np.full((n, states), -1.0)
@@ -364,7 +344,7 @@ def _switch(step, problem, progress, room, vary):
             count = control.slider_counts[j]
             if count == 0:
                 continue
-            F, pressing, _ = _pressing(j, y, moved, s, force, rates)
+            F, pressing, _ = pressing_at(j, y, moved, s, force, rates)
             pushing[look % 3, j] = F
             z = memory_of(j, y, s)
             for i in range(count):
@@ -439,17 +419,15 @@ def _switch(step, problem, progress, room, vary):
 def _at_end(step, problem, progress, room, vary):
     """Return the state at the end of the step to its limits, with its derivatives."""
     s, control = problem.system, problem.control
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     y = np.empty(len(progress.state))
     earlier = _look(1.0 - _NEAR_VARIED, step, problem, progress, room, y)
     now = ground_motion(step.latest, s)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
-        _, before, _ = _pressing(j, y, earlier, s, force, rates)
-        _, after, _ = _pressing(j, room.after, now, s, force, rates)
+        _, before, _ = pressing_at(j, y, earlier, s, force, rates)
+        _, after, _ = pressing_at(j, room.after, now, s, force, rates)
         # Where the force jumps, slip ends at the begin of the next step.
         if before < 0.5 * after:
             continue
@@ -475,10 +453,7 @@ def _attend(kind, step, problem, progress, room, vary, t, y):
         _after_touch(step, np.nextafter(t, np.inf), problem, progress, room, vary)
         return 1.0
     s = problem.system
-    states = s.memory.max()
-    length, width = force_room(states, in_space(s))
-    return_to_limits(t, y, s, problem.control.slider_counts, np.empty(length),
-                     np.empty((states, width)))
+    return_to_limits(t, y, s, problem.control.slider_counts, *force_room(s))
     return 1.0
 
 

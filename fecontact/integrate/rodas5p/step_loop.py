@@ -17,6 +17,7 @@ from fecontact.integrate.rodas5p.error_control import (
     slip_error,
     state_error,
     switches,
+    take_scales,
     work_error,
     work_until,
 )
@@ -35,7 +36,6 @@ from fecontact.integrate.rodas5p.state import (
     OUTPUTS,
     RATES,
     REJECTIONS,
-    SPEED_SCALE,
     STARTED,
     STEPS,
     Step,
@@ -126,18 +126,13 @@ def _aim(t, h, exactly, smallest, moved, end, problem, progress, room):
 @routine
 def _linearise(step, after_t, problem, progress, room):
     """What a step needs of the derivatives at its start besides the matrices."""
-    s, control = problem.system, problem.control
-    m = len(control.largest)
-    later = dynamics.soon(step)
+    s, later = problem.system, dynamics.soon(step)
     acceleration = dynamics.ground_acceleration(step.t, later,
                                                 dynamics.motion_given(room.given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, room.pull_rate)
     dynamics.set_time_rate(s, room.near, room.given, acceleration, progress.gradients,
                            room.pull_rate, room.nodes, room.time_rate)
-    for i in range(m):
-        progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
-        speed = abs(progress.state[m + i]) * control.largest[i]
-        progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE], speed)
+    take_scales(problem.control, progress)
 
 
 @routine

@@ -13,6 +13,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.integrate.rodas5p import state
+from fecontact.integrate.rodas5p.error_control import take_scales
 from fecontact.integrate.rodas5p.event_kernels import (
     FOUND,
     LIFT_OFF,
@@ -237,15 +238,6 @@ def _note_change(t, change, j, progress, watch):
 
 
 @helper
-def _take_scales(control, progress):
-    m = len(control.largest)
-    for i in range(m):
-        progress.extremes[i] = max(progress.extremes[i], abs(progress.state[i]))
-        speed = abs(progress.state[m + i]) * control.largest[i]
-        progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE], speed)
-
-
-@helper
 def _expanded(t, h, problem, progress, series):
     """Expand the motion from t on; the longest step within the tolerance as a part of h."""
     s, control = problem.system, problem.control
@@ -280,7 +272,7 @@ def advance(
                 watched and watch.counts[FOUND] + 4 * _MOST_SWITCHES * n > len(watch.found))):
             break
         attempts += 1
-        _take_scales(control, progress)
+        take_scales(control, progress)
         part = _expanded(t, h, problem, progress, series)
         if part < 0.0:
             numbers[TIME], numbers[STEP] = t, h

@@ -10,7 +10,6 @@ from fecontact.system.kernels import given_at, node_forces
 from fecontact.system.nodes import (
     SystemArrays,
     force_room,
-    in_space,
     leaning,
     memory_of,
     node_motion,
@@ -32,8 +31,7 @@ def forces_at_rest(
     """
     n, _, m = s.rows.shape
     P, N, states = len(places), len(tau), s.memory.max()
-    length, width = force_room(states, in_space(s))
-    force, rates = np.empty(length), np.empty((states, width))
+    force, rates = force_room(s)
     load, still = np.empty(m), np.zeros(2 * m + n * states)
     loads, rest, matrices = np.empty((P, N, m)), np.empty((N, m)), np.empty((P, 2, m, m))
     for place in range(P):
