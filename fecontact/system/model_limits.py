@@ -24,7 +24,6 @@ from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
-from fecontact.system.linearised import linearised
 from fecontact.system.loads import mean_load
 
 # Penetration of a rough surface, in roughness heights, beyond which a wrong unit or stiffness is
@@ -260,29 +259,15 @@ def _ground(planned: Planned) -> Iterator[str]:
 
 
 def _duration(planned: Planned) -> Iterator[str]:
-    """Duration in periods of the fastest mode, with contact, and of the fastest excitation."""
+    """Duration in periods of the fastest mode and of the fastest excitation."""
     system, duration = planned.system, planned.duration
-    free = float(system.basis.frequencies_hz.max())
-    held = free if duration * free > PERIODS else _in_contact(planned)
     for what, highest, most, remedy in (
-            ("mode", free, math.inf, "keep fewer modes"),
-            ("mode with the contact stiffness", held if held > free else 0.0, math.inf,
-             "keep fewer modes, or take softer contacts"),
+            ("mode", float(system.basis.frequencies_hz.max()), math.inf, "keep fewer modes"),
             ("of drive, loads, ground and waves", 1.0 / system.shortest_period(0.0, duration),
              MOST_PERIODS, "lower that frequency")):
         if PERIODS < duration * highest <= most:
             yield (f"it lasts {duration * highest:.2g} periods of the fastest {what}, "
                    f"{highest:.4g} Hz, and will take long; end it earlier, or {remedy}.")
-
-
-def _in_contact(planned: Planned) -> float:
-    """Highest frequency [Hz] with the stiffness of the contacts that are closed at the start."""
-    m = planned.system.basis.modes
-    stiffness = -linearised(planned.system, 0.0, planned.state)[0][m : 2 * m, :m]
-    if not np.isfinite(stiffness).all():
-        return 0.0
-    largest = float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[-1])
-    return math.sqrt(max(largest, 0.0)) / (2.0 * math.pi)
 
 
 def _unheld(planned: Planned) -> Iterator[str]:

@@ -6,7 +6,6 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-import response_study
 
 from fecontact import (
     BoundaryLoad,
@@ -35,7 +34,6 @@ from fecontact.cli.templates import TEMPLATES, template
 from fecontact.core.dotted_parameters import flattened
 from fecontact.fem.shapes import Beam, Block, Pendulum
 from fecontact.integrate import SetValued
-from fecontact.integrate.initial_state import initial_state
 from fecontact.integrate.solvers import SOLVERS
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.study.study import with_given_keys
@@ -571,21 +569,6 @@ def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
     found, = implausible(tiny.with_(**changes))
     assert re.search(message, found)
     assert not implausible(tiny)
-
-
-def test_duration_counts_the_stiffness_of_closed_contacts():
-    """A rigid block of mass 1 / T^2 on 1e7 N/m: sqrt(k / m) / (2 pi)."""
-    system = response_study.study().system()
-    rest = initial_state(system, "rest", 0.0)
-    highest = np.sqrt(1e7) * system.basis.T[0, 0, 0] / (2.0 * np.pi)
-    assert not system.basis.frequencies_hz.any()
-    long = Planned(system, 2e6 / highest, rest)
-    found, = implausible_values(long)
-    assert "2e+06 periods of the fastest mode with the contact stiffness" in found
-    assert f"{highest:.4g} Hz" in found
-    assert not implausible_values(replace(long, duration=0.9e6 / highest))
-    lifted = rest + np.array([0.0, 1.0, 0.0, 0.0, 0.0])
-    assert not implausible_values(replace(long, state=lifted))
 
 
 def implausible(study):
