@@ -1,7 +1,6 @@
 """Python files of the user: laws, and functions of runs."""
 
 import importlib.util
-import pickle
 import re
 import sys
 from collections.abc import Callable
@@ -11,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from fecontact.core.checks import require_regular_file
-from fecontact.core.errors import InputError, nearest, shown
+from fecontact.core.errors import InputError, nearest
 
 
 def user_module(file: str | Path, where: str = "") -> ModuleType:
@@ -62,17 +61,6 @@ def user_function(file: Path, name: str) -> Callable[[Any], float]:
     if not callable(function):
         raise InputError(f"{file} has no function '{name}'{nearest(name, vars(module))}.")
     return function
-
-
-def require_importable(function: Any) -> None:
-    """Raise InputError for a function that pickle cannot name to another process."""
-    try:
-        pickle.dumps(function)
-    except (pickle.PicklingError, AttributeError, TypeError):
-        name = getattr(function, "__qualname__", shown(function))
-        raise InputError(f"The vector field cannot be pickled, for a file or for another process, "
-                         f"because its function {name} is a lambda or stands inside another "
-                         f"function; define it by def at the top level of a module.") from None
 
 
 def module_name(file: str | Path) -> str:

@@ -158,16 +158,6 @@ def squared(system, a):
     return with_force(system, a * a)
 
 
-def test_contact_fields_of_functions_within_functions_are_copied_but_not_pickled():
-    field = contact_field(two_mass_system(1.0), {"B": (1.0, with_force)})
-    at = np.zeros(1), np.zeros((1, field.dimension)), field.values
-    np.testing.assert_array_equal(pickle.loads(pickle.dumps(field)).rates(*at), field.rates(*at))
-    field = contact_field(two_mass_system(1.0), {"B": (1.0, lambda *given: with_force(*given))})
-    np.testing.assert_array_equal(deepcopy(field).rates(*at), field.rates(*at))
-    with pytest.raises(InputError, match=r"<lambda> is a lambda .* define it by def at the top"):
-        pickle.dumps(field)
-
-
 def test_contact_system_and_its_parameters():
     system = two_mass_system(2.0)
     field = contact_field(system, {"B": (2.0, with_force), "D": (0.1, with_damping),

@@ -12,7 +12,6 @@ from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.core.checks import as_texts, require_kind
 from fecontact.core.types import Array
-from fecontact.core.user_code import require_importable
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
@@ -47,11 +46,6 @@ class ContactField(VectorField):
                               for k in range(base.memory)))
         varying = family.varying
         self._constant_period = varying is not None and not self._moves_forcing(varying)
-
-    def __getstate__(self) -> dict[str, Any]:
-        for setter in self._family.setters:
-            require_importable(setter)
-        return super().__getstate__()
 
     def _moves_forcing(self, varying: frozenset[str]) -> bool:
         moved = varying & _FORCING

@@ -1,5 +1,6 @@
 """Vector fields from a user's function of one state."""
 
+import pickle
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
@@ -22,7 +23,6 @@ from fecontact.core.errors import (
     shown,
 )
 from fecontact.core.types import Array, ArrayLike, Integers
-from fecontact.core.user_code import require_importable
 from fecontact.system.fields import function_kernels as kernels
 from fecontact.system.fields.one_place import compiled_field
 from fecontact.system.fields.vector_field import VectorField
@@ -70,9 +70,12 @@ class FunctionField(VectorField):
         base = np.abs(self.values)
         self._sizes = np.where(base > 0.0, base, 1.0)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return copy(self)
+
     def __getstate__(self) -> dict[str, Any]:
         for function in self.functions:
-            require_importable(getattr(function, "python", function))
+            _require_importable(getattr(function, "python", function))
         # Without the compiled code, which belongs to this process.
         return {name: replace(value) if isinstance(value, CompiledLaw) else value
                 for name, value in super().__getstate__().items()}
@@ -320,6 +323,17 @@ def _period_of(period: Any) -> Callable[[Mapping[str, float]], float] | None:
 
 def _constant(period: float, parameters: Mapping[str, float]) -> float:
     return period
+
+
+def _require_importable(function: Any) -> None:
+    """Raise InputError for a function that pickle cannot name to another process."""
+    try:
+        pickle.dumps(function)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        name = getattr(function, "__qualname__", shown(function))
+        raise InputError(f"The vector field cannot be pickled, for a file or for another process, "
+                         f"because its function {name} is a lambda or stands inside another "
+                         f"function; define it by def at the top level of a module.") from None
 
 
 def _wrong_at_samples(field: FunctionField) -> str | None:

@@ -104,9 +104,6 @@ class VectorField(ABC):
         vars(made).update(vars(self))
         return made
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return copy(self)
-
     def __getstate__(self) -> dict[str, Any]:
         # Views of mappings cannot be pickled.
         return vars(self) | {"parameters": dict(self.parameters)}
