@@ -28,7 +28,6 @@ from fecontact.bifurcation import (
     equilibrium_branch,
     frequency_response,
 )
-from fecontact.bifurcation.continuation import newton, pseudo_arclength
 from fecontact.cli import execute
 from fecontact.integrate import SetValued
 from fecontact.laws import ConstantFriction, Harmonic, LinearContact
@@ -261,26 +260,3 @@ def test_commands_take_a_study_of_two_bodies_without_contact(tmp_path, capsys):
     assert ("bodies", "left, right") in run_facts(run)
     assert not [name for name, _ in run_facts(run) if name.startswith("contact")]
     assert "displacement" in variables(run)
-
-
-def test_points_of_collocation_beside_a_resonance_meet_the_tolerance(monkeypatch):
-    """Steps with the matrix of the point before lead near a point; its own one tells how near."""
-    steps = []
-
-    def found(problem, guess, row, tolerance, *others, **options):
-        solution = newton.corrected(problem, guess, row, tolerance, *others, **options)
-        if solution is not None:
-            u, at = solution[0], problem.linearise(solution[0])
-            rhs = np.empty(len(u))
-            newton.right_side(at.residual, row, u, guess, rhs)
-            steps.append(newton.norm(problem, at.solve(row, rhs))
-                         / (tolerance * (1.0 + newton.norm(problem, guess))))
-        return solution
-
-    monkeypatch.setattr(pseudo_arclength, "corrected", found)
-    given = system(damping=0.001, drive=Drive(stiffness_x=1.0, amplitude_x=0.1,
-                                              angular_frequency=1.0))
-    frequency_response(given, (0.5, 5.0), method=Collocation(),
-                       options=ContinuationOptions(step=0.03, largest_step=0.3, points=400))
-    assert len(steps) > 50
-    assert max(steps) <= 1.01

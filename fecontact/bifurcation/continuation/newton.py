@@ -147,11 +147,7 @@ def _iterated(
         change = steps[count_kept]
         if count > 2 and size > before and before <= problem.rounding * scale:
             if kept is not None:
-                u, linearisation, _ = _polished(problem, u, guess, row, tolerance * scale,
-                                                exact)
-            elif problem.keeps_matrix and size > tolerance * scale:
-                # The step before had a matrix that was kept, and was too short.
-                u = u + change
+                u, linearisation, _ = _polished(problem, u, guess, row, exact)
             return u, linearisation, count
         if not math.isfinite(size) or (count > 2 - more and size > before):
             return None
@@ -167,7 +163,7 @@ def _iterated(
                 (early and size * _LIKELY <= tolerance * scale)
                 or (known_next and size * falls <= max(0.1 * tolerance, 1e-13) * scale)):
             # A step with its own matrix tells whether the last one has led near enough.
-            u, kept, before = _polished(problem, u, guess, row, tolerance * scale, exact)
+            u, kept, before = _polished(problem, u, guess, row, exact)
             if before <= tolerance * scale:
                 return u, kept, max(1, count - 2 - more)
             count_kept = 0
@@ -181,19 +177,18 @@ def _iterated(
 
 
 def _polished(
-    problem: Problem, u: Array, guess: Array, row: Array, within: float, exact: bool
+    problem: Problem, u: Array, guess: Array, row: Array, exact: bool
 ) -> tuple[Array, Linearisation, float]:
     """The solution that a kept matrix has led to, the equations there or just beside it, and the
-    length of the step between. Problems that do not polish take a step longer than ``within`` only.
+    length of the step between.
     """
     linearisation = problem.linearise(u)
+    if not problem.polishes:
+        return u, linearisation, 0.0
     rhs = np.empty(len(u))
     right_side(linearisation.residual, row, u, guess, rhs)
     change = linearisation.solve(row, rhs)
-    size = norm(problem, change)
-    if not problem.polishes and size <= within:
-        return u, linearisation, size
-    u = u + change
+    u, size = u + change, norm(problem, change)
     moved = exact and size > _AT_REST * (1.0 + norm(problem, u))
     return u, problem.linearise(u) if moved else linearisation, size
 
