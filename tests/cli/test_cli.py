@@ -274,7 +274,7 @@ def test_names_of_studies_leave_space_for_those_of_results(cli, study):
     for command in ("run", "init"):
         code, _, err = cli(command, long.name)
         assert code == 1
-        assert "has 201 bytes, and those of its results would be longer still; rename the file" in err
+        assert "has 201 bytes, and those of its results would be longer still; rename" in err
 
 
 def test_settings_of_a_movie_out_of_range(cli, study):

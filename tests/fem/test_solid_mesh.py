@@ -133,7 +133,7 @@ def test_hanging_nodes_are_refused():
     small = large.placed((1.0, 0.0, 0.0)).refined()
     nodes, number = np.unique(np.concatenate([large.nodes, small.nodes]), axis=0,
                               return_inverse=True)
-    with pytest.raises(MeshError, match="hanging node.* share whole faces"):
+    with pytest.raises(MeshError, match=r"hanging node.* share whole faces"):
         Mesh(nodes, number.reshape(-1)[np.concatenate([large.cells, small.cells + 8])])
 
 

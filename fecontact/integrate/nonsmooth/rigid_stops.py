@@ -79,7 +79,7 @@ from fecontact.system.powers import (
     belt_normal_power,
 )
 
-# What is returned in place of a time of flight, which is never negative.
+# Returned instead of a time of flight, which is zero at least.
 NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 # Slip velocities below this part of the largest are none, energies gained rounding.
 _NEAR, _GAIN = 1e-9, 1e-10
