@@ -80,7 +80,7 @@ def system_arrays(
         friction_scale=0 if scale is None else scale.address,
         ground_motion=first.motion_kernel.address,
         second_motion=0 if second is first else second.motion_kernel.address,
-        leans=int(ground.normal == "surface"),
+        follows_surface=int(ground.normal == "surface"),
         space_node=0,
     ))
 
@@ -163,7 +163,7 @@ def with_sides(arrays: SystemArrays) -> SystemArrays:
     n = len(arrays.gap)
     columns = [arrays.gap, arrays.abscissa, arrays.ordinate, arrays.sliding,
                arrays.sliding_across[1], arrays.sliding_across[0], arrays.sliding_across[2],
-               arrays.on_ground, arrays.leans, *arrays.wave_direction]
+               arrays.on_ground, arrays.follows_surface, *arrays.wave_direction]
     sides = np.column_stack([np.broadcast_to(np.asarray(column, dtype=float), n)
                              for column in columns])
     return arrays._replace(sides=sides, space_node=space_node.address)

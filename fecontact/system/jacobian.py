@@ -17,10 +17,10 @@ from fecontact.system.nodes import (
     force_room,
     friction_entry,
     ground_motion,
-    leaning,
     memory_of,
     node_motion,
     slip_entry,
+    tangent_force,
 )
 from fecontact.system.parameter_derivatives import (
     given_rates,
@@ -199,7 +199,8 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
             _memory_jacobian(j, s, force, rates, partial, A)
             pushes[0], pushes[1] = -T, F
             if d > 2:
-                pushes[2] = -leaning(F, friction_across(force, rates), contact.slope_across, s)
+                R2 = friction_across(force, rates)
+                pushes[2] = -tangent_force(F, R2, contact.slope_across, s)
             if differs:
                 set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts)
                 found = node_rates(j, contact, z, F, shifts, s, laws, force, partial,

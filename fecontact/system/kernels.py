@@ -29,11 +29,11 @@ from fecontact.system.nodes import (
     force_room,
     ground_motion,
     in_space,
-    leaning,
     memory_of,
     node_contact,
     node_motion,
     pressing_force,
+    tangent_force,
 )
 from fecontact.system.space_nodes import tell, told_gradients
 
@@ -114,7 +114,7 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
     if in_space(s):
         F, contact = tell(j, motion, moved, z, s, force, rates)
         told_gradients(force, rates, out)
-        return F, leaning(F, force[0], contact.slope, s), contact
+        return F, tangent_force(F, force[0], contact.slope, s), contact
     contact = node_contact(j, motion, moved, s)
     F, pressing = normal_gradients(j, contact, s, out)
     R, R_v, R_F = 0.0, 0.0, 0.0
@@ -127,11 +127,11 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
     for k in range(4):
         out[0, k] = -R_F * out[2, k]
     out[0, 2] -= R_v
-    if s.leans:
+    if s.follows_surface:
         for k in range(4):
             out[0, k] -= contact.slope * out[1, k]
         out[0, 0] -= F * contact.curvature
-    return F, leaning(F, R, contact.slope, s), contact
+    return F, tangent_force(F, R, contact.slope, s), contact
 
 
 @kernel
@@ -228,11 +228,11 @@ def rates_under(load, moved, y, s, force, rates, out):
         F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
                                     rates)
         if F != 0.0:
-            T = leaning(F, R, contact.slope, s)
+            T = tangent_force(F, R, contact.slope, s)
             for i in range(m):
                 out[m + i] += s.rows[j, 1, i] * F - s.rows[j, 0, i] * T
             if in_space(s):
-                T = leaning(F, friction_across(force, rates), contact.slope_across, s)
+                T = tangent_force(F, friction_across(force, rates), contact.slope_across, s)
                 for i in range(m):
                     out[m + i] -= s.rows[j, 2, i] * T
         for k in range(s.memory[j]):

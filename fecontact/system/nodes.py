@@ -23,7 +23,7 @@ class SystemArrays(NamedTuple):
 
     ``drive_damping`` (d,) is that of relative dashpots; ``sliding`` (n,) are the factors c_j;
     ``bristle_stiffness`` (2, n, s) are a and b of the stored ``(a + b |F|) z^2 / 2``; ``on_ground``
-    is 0 for nodes between bodies, ``leans`` where contact forces stay vertical, else 1.
+    is 0 for nodes between bodies, ``follows_surface`` where contact forces stay vertical, else 1.
 
     ``rows`` (n, d, m) are those of the displacements of the nodes along their axes: the first
     tangent, the normal and, in space, the second tangent.
@@ -73,7 +73,7 @@ class SystemArrays(NamedTuple):
     friction_scale: int
     ground_motion: int
     second_motion: int
-    leans: int
+    follows_surface: int
     space_node: int
 
 
@@ -239,9 +239,9 @@ def pressing_force(j, contact, F, s):
 
 
 @helper
-def leaning(F, R, slope, s):
-    """Force of a node against a tangent: friction, and the part of the contact force that leans."""
-    return R + F * slope if s.leans else R
+def tangent_force(F, R, slope, s):
+    """Force of a node against a tangent: friction, and the contact force along the surface."""
+    return R + F * slope if s.follows_surface else R
 
 
 @helper

@@ -264,7 +264,7 @@ def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
             R_p += weight * friction_at(s.friction[j])(slip, pressing, laws.friction[k, j])[0]
         for i in range(s.memory[j]):
             memory[i] += weight * room_rates[i, 0]
-    if s.leans:
+    if s.follows_surface:
         if space:
             R_p2 += contact.slope_across * F_p + F * (
                 across + contact.twist * shifts[0] + contact.curvature_across * shifts[2])

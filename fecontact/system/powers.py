@@ -97,7 +97,7 @@ def belt_normal_power(F, slope, slip, speed, s):
 
     Along one tangent, by the slope, slip velocity and speed of the other side there.
     """
-    return -F * slope * speed if s.leans else F * slope * slip
+    return -F * slope * speed if s.follows_surface else F * slope * slip
 
 
 @helper

@@ -213,6 +213,8 @@ def test_steep_friction(slope):
     else:
         # 800 intervals do not suffice for all of them.
         worst = max(branch, key=lambda point: float(point.values["state_error"]))
+        # Which orbit has an unlucky mesh hangs on rounding.
+        assert np.quantile(branch.column("state_error"), 0.99) < 2e-5
         assert 1e-5 < worst.values["state_error"] < 5e-5
         assert len(worst.values["mesh"]) == 801
         assert "allow more than most_intervals = 800." in branch.message

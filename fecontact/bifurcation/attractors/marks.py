@@ -71,7 +71,7 @@ def _of_system(system: ContactSystem) -> list[Any]:
     # Other integers are addresses of functions, and differ from process to process.
     return facts + [item for name, item in system.arrays._asdict().items()
                     if np.asarray(item).dtype.kind == "f"
-                    or name in ("memory", "on_ground", "leans")]
+                    or name in ("memory", "on_ground", "follows_surface")]
 
 
 def _of_field(field: VectorField) -> list[Any]:

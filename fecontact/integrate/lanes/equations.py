@@ -147,9 +147,9 @@ def set_derivatives(s, forces, by_place, by_speed):
             write(by_speed[i, k], -read(s.damping[i, k]))
         for j in range(n):
             along = read(s.rows[j, 0, i])
-            leaning = along * read(forces[j, BY_FORCE]) - read(s.rows[j, 1, i])
-            place = leaning * read(forces[j, BY_PLACE])
-            rate = leaning * read(forces[j, BY_RATE])
+            pushing = along * read(forces[j, BY_FORCE]) - read(s.rows[j, 1, i])
+            place = pushing * read(forces[j, BY_PLACE])
+            rate = pushing * read(forces[j, BY_RATE])
             slip = along * read(forces[j, BY_SLIP])
             for k in range(m):
                 away = read(s.rows[j, 1, k])

@@ -169,7 +169,7 @@ def sinking_row(j, i, w, s):
 @helper
 def lifting_row(j, i, w, s):
     """Modal force i of a unit contact force of node j."""
-    return sinking_row(j, i, w, s) if s.leans else s.rows[j, 1, i]
+    return sinking_row(j, i, w, s) if s.follows_surface else s.rows[j, 1, i]
 
 
 @helper

@@ -41,7 +41,13 @@ from fecontact.integrate.nonsmooth.stepping_room import (
     InSpace,
 )
 from fecontact.laws.signatures import friction_at, normal_at
-from fecontact.system.nodes import ground_motion, leaning, moved_across, moved_along, node_motion
+from fecontact.system.nodes import (
+    ground_motion,
+    moved_across,
+    moved_along,
+    node_motion,
+    tangent_force,
+)
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
@@ -245,8 +251,8 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             R22 = R_v * e2 * e2 + around * e1 * e1 + e2 * P_2
             R1y, R2y = e1 * P_y, e2 * P_y
         force[j], force[n + j] = R1, R2
-        T1, T2 = leaning(F, R1, s1, s), leaning(F, R2, s2, s)
-        if s.leans:
+        T1, T2 = tangent_force(F, R1, s1, s), tangent_force(F, R2, s2, s)
+        if s.follows_surface:
             R11 += s1 * F_1 + g * F * contact.curvature
             R12 += s1 * F_2 + g * F * contact.twist
             R21 += s2 * F_1 + g * F * contact.twist

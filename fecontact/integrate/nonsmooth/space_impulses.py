@@ -152,7 +152,7 @@ def set_pushes(p, room):
             if b >= n:
                 pushes[b, i] = -rows[b, i]
             else:
-                pushes[b, i] = rows[b, i] if s.leans else s.rows[j, 1, i]
+                pushes[b, i] = rows[b, i] if s.follows_surface else s.rows[j, 1, i]
         solve(room.matrix, room.pivots, pushes[b])
         for a in range(3 * n):
             if touching[a % n]:

@@ -31,7 +31,7 @@ from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_lim
 from fecontact.integrate.nonsmooth.problem import CREEP, NonsmoothProblem
 from fecontact.laws.signatures import friction_at
 from fecontact.system.kernels import normal_gradients
-from fecontact.system.nodes import GroundMotion, in_space, leaning, node_contact, node_motion
+from fecontact.system.nodes import GroundMotion, in_space, node_contact, node_motion, tangent_force
 
 # Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
@@ -147,8 +147,8 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             R_along = R_v + R_F * (g * partial[2, 0] + partial[2, 2])
             R_away = R_F * (g * partial[2, 1] + partial[2, 3])
         force[j] = R
-        T = leaning(F, R, contact.slope, s)
-        if s.leans:
+        T = tangent_force(F, R, contact.slope, s)
+        if s.follows_surface:
             R_along += contact.slope * along + g * F * contact.curvature
             R_away += contact.slope * away
         for i in range(m):

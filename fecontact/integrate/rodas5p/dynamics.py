@@ -194,10 +194,10 @@ def set_forces(y, s, blocks, moved, w, scratch, rate):
         first = 2 * m + j * states
         F, R, contact = kernels.node_forces(j, motion_of(at, w, s), moved,
                                             y[first : first + s.memory[j]], s, force, rates)
-        forces[at] = -nodes.leaning(F, R, contact.slope, s)
+        forces[at] = -nodes.tangent_force(F, R, contact.slope, s)
         forces[n + at] = F
         if nodes.in_space(s):
-            forces[2 * n + at] = -nodes.leaning(F, kernels.friction_across(force, rates),
+            forces[2 * n + at] = -nodes.tangent_force(F, kernels.friction_across(force, rates),
                                                 contact.slope_across, s)
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
@@ -233,7 +233,7 @@ def set_gradients(y, s, blocks, moved, w, out):
         forces[at] = -T
         forces[n + at] = F
         if nodes.in_space(s):
-            forces[2 * n + at] = -nodes.leaning(
+            forces[2 * n + at] = -nodes.tangent_force(
                 F, kernels.friction_across(out.force[j], out.rates[j]), contact.slope_across, s)
 
 

@@ -157,14 +157,14 @@ def _local_forces(trajectory: Trajectory, which: Any) -> Array:
     """Forces (F, n, d) on the contact nodes along tangents and normals [N]."""
     normal, along = trajectory.normal_force[which], -trajectory.friction_force[which]
     ground, basis = trajectory.system.ground, trajectory.system.basis
-    leans = ground.wavy and ground.normal == "surface"
+    follows = ground.wavy and ground.normal == "surface"
     if basis.dimension == 3:
         tangential = -trajectory.friction_forces[which]
-        if leans:
+        if follows:
             tangential = tangential - (basis.ground_nodes * normal)[..., None] * (
                 _slopes_below(trajectory, which))
         return np.concatenate([tangential, normal[..., None]], axis=-1)
-    if leans:
+    if follows:
         places = basis.contact_x + trajectory.modal_coordinates[which] @ basis.contact_T[:, 0].T
         along = along - basis.ground_nodes * normal * np.array([
             ground.slope(place, time)

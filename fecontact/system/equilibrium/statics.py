@@ -110,9 +110,11 @@ def equilibrium(
     arrays = _at_mean(system)
     if not friction:
         arrays = at_rest(arrays, *(one.travel(time) for one in system.prescribed_motion.motions))
-    # On level ground, and with its normal vertical, contact forces do not lean.
-    slides = bool(arrays.leans and ground.wavy and arrays.rows[:, ::2].any() and not standing)
-    problem = Balance(with_sides(arrays._replace(leans=0)), time, system.penetration_scale)
+    # On level ground, and with its normal vertical, contact forces have no part along the surface.
+    slides = bool(arrays.follows_surface and ground.wavy and arrays.rows[:, ::2].any()
+                  and not standing)
+    upright = with_sides(arrays._replace(follows_surface=0))
+    problem = Balance(upright, time, system.penetration_scale)
     solution = problem.equilibrium()
     if system.basis.springs:
         solution = _among_springs(system, problem, solution, friction)
@@ -120,9 +122,9 @@ def equilibrium(
         raise AnalysisError(_reason(system, problem, friction))
     if not slides:
         return solution
-    leaning = Balance(arrays, time, system.penetration_scale)
+    whole = Balance(arrays, time, system.penetration_scale)
     longest = _LONGEST_SLIDE * (ground.shortest_wavelength or np.inf)
-    found = leaning.slide(solution, longest, system.stored_energy)
+    found = whole.slide(solution, longest, system.stored_energy)
     if found is None:
         raise AnalysisError("There is no static equilibrium: without friction the waves of the "
                             "ground carry the body away; give it a spring at B along the ground "

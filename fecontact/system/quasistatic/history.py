@@ -87,7 +87,7 @@ class LoadHistory(Summarised):
     contacts, c_T = tangential_ratio c_N, with c_N = dF/du at the first point of the path at which
     ``load_scale`` is largest, held all along; a node that is open there has the mean of the others.
     The ratio 0.82 is 2 (1 - nu) / (2 - nu) of Mindlin for nu = 0.3; measured values reach down to
-    half of it. Where the contact force leans with waves, so it does here; travel of the ground does
+    half of it. Where the contact force follows waves, so it does here; travel of the ground does
     the work ``-(R + F y_R') ds``. Increments are cut where nodes begin to slip, touch or lift,
     until work, stored energy and loss agree.
 
@@ -188,7 +188,7 @@ class LoadHistory(Summarised):
 
     @property
     def tangential_forces(self) -> Array:
-        """Forces (N, n, 1), in space (N, n, 2), against the tangents, leaning ones too [N]."""
+        """Forces (N, n, 1), in space (N, n, 2), against the tangents, along the surface too [N]."""
         return self.node[..., AGAINST::PER_TANGENT]
 
     @property

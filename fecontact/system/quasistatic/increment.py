@@ -29,10 +29,10 @@ from fecontact.system.nodes import (
     NodeMotion,
     SystemArrays,
     in_space,
-    leaning,
     moved_across,
     moved_along,
     node_contact,
+    tangent_force,
 )
 from fecontact.system.quasistatic.pose import (
     AGAINST,
@@ -163,7 +163,7 @@ def _rub(j, g, g_across, pressing, sliders, pose, room, out):
 
 @helper
 def _lean(F, contact, out):
-    """Add the derivatives of what leans with the ground to those of the forces of a node."""
+    """Add what contact forces along the surface change to the derivatives of a node."""
     for k in range(3):
         out[0, k] += contact.slope * out[1, k]
         out[2, k] += contact.slope_across * out[1, k]
@@ -222,10 +222,10 @@ def evaluate(
         if in_space(s):
             gone_across = moved_across(j, moved.travel, moved.second_travel, s)
         R, R2 = _rub(j, x - gone, across - gone_across, pressing, sliders, pose, room, out)
-        T = leaning(F, R, contact.slope, s)
+        T = tangent_force(F, R, contact.slope, s)
         node[j, FORCE], node[j, PRESSING], node[j, PENETRATION] = F, pressing, contact.penetration
         node[j, PLACE], node[j, AGAINST], node[j, LEANING] = x - gone, T, F * contact.slope
-        if s.leans:
+        if s.follows_surface:
             _lean(F, contact, out)
         # Springs round off with the displacements whose difference they feel.
         springs = 0.0
@@ -242,7 +242,7 @@ def evaluate(
                     for i in range(m):
                         answer[i] += sign * out[axis, other] * s.rows[j, other, i]
         if in_space(s):
-            T = leaning(F, R2, contact.slope_across, s)
+            T = tangent_force(F, R2, contact.slope_across, s)
             second = PER_TANGENT
             node[j, PLACE + second], node[j, AGAINST + second] = across - gone_across, T
             node[j, LEANING + second] = F * contact.slope_across

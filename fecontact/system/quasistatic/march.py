@@ -149,8 +149,8 @@ def _rubbed(j, e, old, new, sliders):
 
 
 @helper
-def _leant(j, tangent, old, new):
-    """Work of what leans with the ground, as node j moves along a tangent."""
+def _surface_work(j, tangent, old, new):
+    """Work of contact forces along the surface, as node j moves along a tangent."""
     k = PER_TANGENT * tangent
     return 0.5 * (old.node[j, LEANING + k] + new.node[j, LEANING + k]) * (
         new.node[j, PLACE + k] - old.node[j, PLACE + k])
@@ -162,7 +162,7 @@ def _moving(j, tangent, travelled, old, new, s):
     k = PER_TANGENT * tangent
     work = -0.5 * (old.node[j, AGAINST + k] + new.node[j, AGAINST + k]) * travelled
     # Ground that pushes vertically lifts the node wherever it moves along.
-    return work if s.leans else work + _leant(j, tangent, old, new)
+    return work if s.follows_surface else work + _surface_work(j, tangent, old, new)
 
 
 @helper
@@ -213,15 +213,15 @@ def _measure(
         part[len(WORKS) + j] = lost
         # By the trapezoidal rule F du is F y_R' dg - F dy.
         F = 0.5 * (old.node[j, FORCE] + new.node[j, FORCE])
-        lean, leaning = _leant(j, 0, old, new), 0.0
+        along, across = _surface_work(j, 0, old, new), 0.0
         if in_space(s):
-            leaning = _leant(j, 1, old, new)
+            across = _surface_work(j, 1, old, new)
         lifted = 0.0
         for i in range(len(old.q)):
             lifted += s.rows[j, 1, i] * (new.q[i] - old.q[i])
         before, after = old.node[j, PENETRATION], new.node[j, PENETRATION]
-        gap += _pressed_energy(j, before, after, s) - lean - leaning + F * lifted
-        pressed += abs(F * (after - before)) + abs(lean) + abs(leaning)
+        gap += _pressed_energy(j, before, after, s) - along - across + F * lifted
+        pressed += abs(F * (after - before)) + abs(along) + abs(across)
     turnover[ERROR], turnover[TURNED] = error, turned
     turnover[GAP], turnover[PRESSED] = abs(gap), pressed
 

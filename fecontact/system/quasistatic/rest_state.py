@@ -39,7 +39,7 @@ class RestState(Summarised):
         [m], travel of the ground [m]; in space (m + 5,), with z and the travel along y.
     node : (n, 6) array
         F [N], the force that friction sees [N], penetration [m], place relative to the ground [m],
-        force in -x [N] and its part that leans with the ground [N]; in space (n, 9), the last three
+        force in -x [N] and its part that follows the surface [N]; in space (n, 9), the last three
         along the first tangent, then along the second one.
     slider_force, slider_place : (n, e) arrays
         R of the sliders of each node [N], and the place to which each has slid [m]; in space

@@ -122,7 +122,7 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
             dR, dR_v = dR + side * R, dR_v + side * R_v
             R_F *= side * (scale if new >= 0.0 else -scale)
             by_F, by_change = by_F + R_F, R_F
-    slope = contact.slope if s.leans else 0.0
+    slope = contact.slope if s.follows_surface else 0.0
     dT = dR + slope * dF
     for i in range(m):
         f[m + i] += s.rows[j, 1, i] * dF - s.rows[j, 0, i] * dT
@@ -137,7 +137,7 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
         u_q, v_q, v_w = u_x * tx - ty, v_x * tx, contact.slope * tx - ty
         F_q, F_w = dF_u * u_q + dF_v * v_q, dF_v * v_w
         T_q = (by_F * (F_u * u_q + F_v * v_q) + (by_change + slope) * F_q
-               + (contact.curvature * tx * dF if s.leans else 0.0))
+               + (contact.curvature * tx * dF if s.follows_surface else 0.0))
         T_w = by_F * F_v * v_w + (by_change + slope) * F_w + dR_v * tx
         for i in range(m):
             A[m + i, k] += s.rows[j, 1, i] * F_q - s.rows[j, 0, i] * T_q

@@ -10,9 +10,9 @@ from fecontact.system.kernels import given_at, node_forces
 from fecontact.system.nodes import (
     SystemArrays,
     force_room,
-    leaning,
     memory_of,
     node_motion,
+    tangent_force,
 )
 
 
@@ -48,7 +48,7 @@ def forces_at_rest(
             for j in range(n):
                 F, R, contact = node_forces(j, node_motion(j, still, s), moved,
                                             memory_of(j, still, s), s, force, rates)
-                T = leaning(F, R, contact.slope, s)
+                T = tangent_force(F, R, contact.slope, s)
                 for i in range(m):
                     rest[c, i] += s.rows[j, 1, i] * F - s.rows[j, 0, i] * T
         for i in range(m):
