@@ -102,3 +102,22 @@ def test_steps_that_end_just_short_of_slip_do_not_shrink_to_nothing(systems):
     m = case.system.basis.modes
     assert np.abs(found.states[-1] - run.states[-1])[:m].max() < 1e-6 * np.abs(run.states).max()
     assert np.isfinite(found.monodromy).all()
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_steps_with_derivatives_go_on_where_sliding_elements_lift_off_in_space(systems, rtol):
+    """Directions of slip turn ever faster there, but of forces that vanish."""
+    case = systems.random_case(107)
+    found = fc.sensitivity(case.system, 0.05, initial=case.state, rtol=rtol,
+                           outputs=np.linspace(0.0, 0.05, 11))
+    assert not found.note
+    assert np.isfinite(found.monodromy).all()
+
+
+def test_steps_with_derivatives_go_on_where_the_normal_force_passes_zero(systems):
+    """Steps that end at its zero do not repeat without end; spans agree with differences."""
+    case = systems.random_case(93)
+    found = fc.sensitivity(case.system, case.end, initial=case.state, rtol=1e-8,
+                           outputs=np.linspace(0.0, case.end, 41))
+    assert not found.note
+    assert np.isfinite(found.monodromy).all()
