@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecontact.analysis.summaries import usual_point
-from fecontact.cli.run_files import StoredRun
+from fecontact.cli.run_files import StoredRun, warn_of_changed_files
 from fecontact.core.checks import whole_number
 from fecontact.core.errors import FecontactError, InputError, choices
 
@@ -74,6 +74,7 @@ def stored_orbit_or_run(
     from fecontact.output.files.stored_system import read_model
 
     named, model = read_branches(file), read_model(file, trust)
+    warn_of_changed_files(file)
     name, branch = _branch(file, named, choice.branch)
     point, run = _motion(file, branch, model, choice)
     settings = _settings(model)
@@ -197,6 +198,7 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
     from fecontact.study.study import with_given_keys
 
     named, model = read_branches(file), read_model(file, trust)
+    warn_of_changed_files(file)
     first = next(iter(named.values()))
     title = file.stem.removesuffix("-branch").removesuffix("-response")
     if "observed" in first.attributes:
@@ -232,4 +234,5 @@ def plotted(file: Path, kind: str, target: Path) -> Path:
     else:
         named = read_branches(file)
         plot_branches(list(named.values()), "observed_amplitude", names=list(named), path=target)
+    warn_of_changed_files(file)
     return target

@@ -8,7 +8,7 @@ from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fecontact.cli.console import echo, loading
+from fecontact.cli.console import echo, loading, note
 from fecontact.core.errors import FecontactError, InputError, shown
 from fecontact.core.units import listed
 
@@ -82,16 +82,13 @@ def require_same_study(study: "Study", file: Path, *free: str) -> None:
 
     Sections that say nothing of its numbers may differ, and the keys ``free`` of [response].
     """
-    from fecontact.laws.registry import law_files
-    from fecontact.output.files.stored_system import read_model
-    from fecontact.study.study import Study
+    from fecontact.output.files.stored_system import read_tables
 
-    stored = Study.from_toml(read_model(file, law_files(study.tables())).study or "", study.path)
-    kept = ("output", "render", "sweep", "branch", "simulation", "wear")
-    same = replace(stored, **{name: getattr(study, name) for name in kept},
-                   response=replace(stored.response, **{name: getattr(study.response, name)
-                                                        for name in free}))
-    if same != study:
+    stored = read_tables(file).study
+    if changed := _changed_since(study, stored):
+        raise InputError(f"{file} was computed with another content of {listed(changed)}; leave "
+                         f"out --resume.")
+    if not _same_values(study, stored, False, "branch", "simulation", "wear", free=free):
         raise InputError(f"{file} was computed with other values than {study.title} has now; "
                          f"leave out --resume.")
 
@@ -267,8 +264,9 @@ def stored_run(
         known = law_files(study.tables())
         case = read_case(path, trust=trust or known)
         warn_of_limits(case.trajectory.limits_exceeded, "In this run")
-        return StoredRun(path, case.trajectory, study.render,
-                         _same_run(study, case.study, trust or known), case.study, case.versions)
+        if current := _same_values(study, case.study, trust):
+            warn_of_changed_files(path)
+        return StoredRun(path, case.trajectory, study.render, current, case.study, case.versions)
     case = read_case(path, trust=trust)
     try:
         settings = from_table(RenderSettings, tomllib.loads(case.study or "").get("render", {}),
@@ -277,6 +275,7 @@ def stored_run(
         # The run can be drawn even if this version cannot read its study.
         settings = RenderSettings()
     warn_of_limits(case.trajectory.limits_exceeded, "In this run")
+    warn_of_changed_files(path)
     return StoredRun(path, case.trajectory, settings, True, case.study, case.versions)
 
 
@@ -301,23 +300,55 @@ def stored_or_computed_run(
     known = trust or law_files(study.tables())
     if found is not None:
         case = read_case(path, trust=known)
-        if _same_run(study, case.study, known):
+        if _same_values(study, case.study, trust) and not _changed_since(study, case.study):
             return StoredRun(path, case.trajectory, study.render, True, case.study, case.versions)
     _ = study.t_end
     return StoredRun(path, study.run(True), study.render, True, study.to_toml())
 
 
-def _same_run(study: "Study", stored: str | None, trust: bool | set[Path]) -> bool:
-    from fecontact.laws.registry import trusting
-    from fecontact.study.study import Study
+def _same_values(
+    study: "Study", stored: str | None, trust: bool, *sections: str, free: Iterable[str] = ()
+) -> bool:
+    """Whether a stored study has the values of a study, whose own laws are trusted.
+
+    The named sections, those that affect no numbers, and the keys ``free`` of [response] may
+    differ.
+    """
+    from fecontact.laws.registry import law_files
+    from fecontact.study.study import NOT_OF_THE_RUN, stored_study
 
     try:
-        with trusting(trust):
-            earlier = Study.from_toml(stored or "")
+        earlier = stored_study(stored, trust or law_files(study.tables()), study.path)
     except FecontactError:
         return False
-    return study == replace(earlier, output=study.output, render=study.render,
-                            sweep=study.sweep)
+    kept = (*NOT_OF_THE_RUN, *sections)
+    return study == replace(earlier, **{name: getattr(study, name) for name in kept},
+                            response=replace(earlier.response, **{
+                                name: getattr(study.response, name) for name in free}))
+
+
+def _changed_since(study: "Study", stored: str | None) -> list[str]:
+    """Names of files whose content differs between a study and a stored one."""
+    from fecontact.study.study import stored_hashes
+
+    return [name for name, mark in stored_hashes(stored).items()
+            if study.content_hashes.get(name, mark) != mark]
+
+
+def warn_of_changed_files(file: Path) -> None:
+    """Print one line if files that the study of stored results names have changed since."""
+    from fecontact.core.files.named_files import changed_files
+    from fecontact.output.files.stored_system import read_study_text
+    from fecontact.study.study import stored_hashes
+
+    try:
+        text, folder = read_study_text(file)
+    except InputError:  # results without a study
+        return
+    changed = [] if folder is None else changed_files(stored_hashes(text), folder)
+    if changed:
+        note(f"warning: {listed(changed)} {'have' if len(changed) > 1 else 'has'} changed since "
+             f"{file} was computed; compute it again to see what changes.")
 
 
 def wear_of(stored: StoredRun) -> "WearLaw | None":

@@ -95,7 +95,7 @@ def _parts() -> Iterator[tuple[str, str]]:
     # Interfaces refer to sections of a single body.
     for entry in sorted(fields(Study), key=lambda entry: entry.name == "interfaces"):
         name = entry.name.removesuffix("_settings")
-        if name in ("geometry", "gap", "path", "links", "_keys"):
+        if name in ("geometry", "gap", "path", "links", "content_hashes", "_keys"):
             continue
         if name in ("bodies", "interfaces"):
             name = f"{name}.NAME"

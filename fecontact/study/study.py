@@ -1,7 +1,7 @@
 """Studies: TOML files that describe a model from its geometry to the run and its plots."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.bifurcation.response_options import ResponseSettings, flat_levels
 from fecontact.core.checks import as_path, require_kind, require_regular_file, whole_number
 from fecontact.core.errors import FecontactError, InputError, choices, nearest
+from fecontact.core.files.named_files import content_hashes
 from fecontact.core.tables import (
     convert,
     from_table,
@@ -32,7 +33,7 @@ from fecontact.integrate.wear import WearHistory, wear_history
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
-from fecontact.laws.registry import PART_CLASSES, foreign_keys, with_folder
+from fecontact.laws.registry import PART_CLASSES, foreign_keys, trusting, with_folder
 from fecontact.study.assembly import LAWS, contact_system
 from fecontact.study.bodies_section import (
     BodySections,
@@ -64,8 +65,11 @@ from fecontact.system.gap import Crown
 from fecontact.system.model_limits import PlannedBodies, implausible_bodies, warn_of_limits
 from fecontact.system.quasistatic.history import LoadHistory
 
-# Begins the last line of a study with every key, which lists those that its file gives, as JSON.
-_KEYS_GIVEN = "# Keys given: "
+# Comments at the end of a study with every key, each followed by JSON: hashes of the files that it
+# names, by names relative to its folder, and the keys that its file gives.
+_FILES, _KEYS_GIVEN = "# Content of files: ", "# Keys given: "
+
+NOT_OF_THE_RUN = ("output", "render", "sweep")
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
@@ -122,6 +126,8 @@ class Study(Summarised, StudyModels):
         ``[links.NAME]``: what joins bodies at points or faces and does not open; ``kind = "weld"``.
     path : Path or None
         The study file; paths of other files are relative to it.
+    content_hashes : mapping of name to str
+        SHA-256 of the files that the study names, as they were when it was read.
     """
 
     geometry: Geometry | None = None
@@ -146,6 +152,7 @@ class Study(Summarised, StudyModels):
     links: Mapping[str, LinkSettings] = field(default_factory=dict)
     path: Path | None = field(default=None, compare=False)
     _keys: Mapping[str, Any] = field(default_factory=dict, compare=False)  # those of the file
+    content_hashes: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def summary(self) -> list[tuple[str, str]]:
         """Short description: file, geometry, modes, laws and duration of the run."""
@@ -196,13 +203,8 @@ class Study(Summarised, StudyModels):
         path = None if path is None else as_path(path, "a study")
         require_kind(_title(path), str, text=text)
         study = cls.from_tables(parsed(text, _title(path)), path)
-        last = text.rstrip().rpartition("\n")[2]
-        if not last.startswith(_KEYS_GIVEN):
-            return study
-        try:
-            return replace(study, _keys=json.loads(last.removeprefix(_KEYS_GIVEN)))
-        except (ValueError, RecursionError):  # a comment that somebody edited
-            return study
+        return replace(study, _keys=_comment(text, _KEYS_GIVEN, study._keys),
+                       content_hashes=_comment(text, _FILES, study.content_hashes))
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
@@ -247,6 +249,7 @@ class Study(Summarised, StudyModels):
             preload=from_table(PreloadSettings, tables["preload"], f"{title}: [preload]")
             if "preload" in tables else None,
             path=path, _keys=key_tree(tables),
+            content_hashes=content_hashes(of_the_run(tables), folder),
             **{name: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items() if name in tables or name not in LAWS},
         )
@@ -308,7 +311,8 @@ class Study(Summarised, StudyModels):
     def to_toml(self, *, defaults: bool = True) -> str:
         """The study as TOML text: every key that has a value, or those of :meth:`tables`.
 
-        A comment at the end of the text with every key lists those that the file gives.
+        Comments at the end of the text with every key list the hashes of the files that it names,
+        and the keys that the file gives.
         ``Study.from_toml(study.to_toml(), study.path) == study``.
         """
         import tomli_w
@@ -317,7 +321,9 @@ class Study(Summarised, StudyModels):
         if not defaults:
             return tomli_w.dumps(given)
         keys = json.dumps(key_tree(given), sort_keys=True)
-        return f"{tomli_w.dumps(self.tables())}\n{_KEYS_GIVEN}{keys}\n"
+        files = (f"{_FILES}{json.dumps(self.content_hashes, sort_keys=True)}\n"
+                 if self.content_hashes else "")
+        return f"{tomli_w.dumps(self.tables())}\n{files}{_KEYS_GIVEN}{keys}\n"
 
     def with_(self, **changes: Any) -> "Study":
         """Copy of the study with other values, given by dotted keys of the file.
@@ -436,6 +442,11 @@ class Study(Summarised, StudyModels):
                 solver=settings.chosen_solver(), rtol=settings.rtol, progress=progress)
 
 
+def of_the_run(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables of a study without the sections that do not affect the run."""
+    return {name: table for name, table in tables.items() if name not in NOT_OF_THE_RUN}
+
+
 def _number(text: str, items: list[Any], name: str, title: str) -> int:
     number = whole_number(text)
     if number is None or number >= len(items):
@@ -456,14 +467,42 @@ def _gap(value: Any, title: str) -> Gap:
     return gap
 
 
+def _comment(text: str, begin: str, default: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Content of one of the comments at the end of a study; the default without a sound one."""
+    found = [line for line in text.rstrip().rsplit("\n", 2)[1:] if line.startswith(begin)]
+    try:
+        content = json.loads(found[-1].removeprefix(begin)) if found else default
+    except (ValueError, RecursionError):  # a comment that somebody edited
+        return default
+    return content if isinstance(content, Mapping) else default
+
+
+def stored_hashes(text: str | None) -> Mapping[str, str]:
+    """Hashes of the files that a stored study names, by names relative to its folder."""
+    return _comment(text or "", _FILES, {})
+
+
+def stored_study(
+    text: str | None, trust: bool | Iterable[Path] = False, path: Path | None = None
+) -> Study:
+    """Study in a file of results, from its TOML text; ``path`` is the study file it stands for.
+
+    Code of laws that the text names is executed only as far as ``trust`` allows, see
+    :func:`~fecontact.laws.registry.trusting`.
+    """
+    with trusting(trust):
+        return Study.from_toml(text or "", path)
+
+
 def with_given_keys(text: str | None) -> str | None:
     """Study as TOML text with the keys that its file gives, if that runs no code of its author.
 
-    Text that names laws in Python files, or that this version cannot read, is returned unchanged.
+    Text that names laws that are not loaded, or that this version cannot read, is returned
+    unchanged.
     """
-    if text is None or ".py:" in text:
+    if text is None:
         return text
     try:
-        return Study.from_toml(text).to_toml(defaults=False)
+        return stored_study(text).to_toml(defaults=False)
     except FecontactError:
         return text

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,12 +9,12 @@ from typing import Any
 from fecontact import __version__
 from fecontact.core.dotted_parameters import flattened
 from fecontact.core.errors import InputError
+from fecontact.core.files.named_files import content_hash, named_file
 from fecontact.core.tables import shown
-from fecontact.study.study import Study
+from fecontact.study.study import Study, of_the_run
 from fecontact.sweeps.case import of_basis
 
 _DIGITS = 24  # of a hash: 96 bits
-_NOT_OF_THE_RUN = ("output", "render", "sweep")
 
 
 def case_keys(
@@ -64,11 +63,6 @@ def flat(study: Study) -> dict[str, Any]:
     return flattened(of_the_run(study.tables()))
 
 
-def of_the_run(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables of a study without the sections that do not affect the run."""
-    return {name: table for name, table in tables.items() if name not in _NOT_OF_THE_RUN}
-
-
 def _converter(
     name: str, values: Sequence[Any], base: Mapping[str, Any]
 ) -> Callable[[Any], Any] | None:
@@ -108,12 +102,12 @@ def _digester(folder: Path) -> Callable[[Mapping[str, Any]], str]:
 
 
 def _with_content(text: str, folder: Path) -> str:
-    name, colon, rest = text.partition(".py:")
-    file = folder / (f"{name}.py" if colon else text)
-    if not os.path.isfile(file):  # also false, not an error, for a text that is too long
+    file = named_file(text, folder)
+    if file is None:
         return text
+    _, colon, rest = text.partition(".py:")
     try:
-        return f"{hashlib.sha256(file.read_bytes()).hexdigest()}{colon}{rest}"
+        return f"{content_hash(file)}{colon}{rest}"
     except OSError as error:
         raise InputError(f"{shown(text)} cannot be read "
                          f"({(error.strerror or str(error)).lower()}).") from None

@@ -147,6 +147,47 @@ def test_going_on_needs_the_same_values(cli, file):
     assert "no interrupted response to go on with" in said
 
 
+MESHED = STUDY.replace('shape = "block", contact_length = 0.08, element_size = 0.02',
+                       'file = "part.msh"')
+
+
+def test_results_are_of_the_files_that_the_study_named(cli, file):
+    """Another mesh under the same name is not mixed with results of the first one."""
+    results = file.parent / "results"
+    assert cli("mesh", file, "-o", ".")[0] == 0
+    mesh = file.with_name("block.msh").replace(file.with_name("part.msh"))
+    file.write_text(MESHED)
+    short = ("--hz", 9, 9.5, "--harmonics", 1, "--samples", 64)
+    of_mode = ("modes", file, "--nonlinear", 1, "--amplitudes", 1e-5, 2e-5)
+    assert cli("response", file, *short)[0] == 0
+    assert cli("response", file, *short, "--resume")[0] == 0
+    assert cli(*of_mode)[0] == 0
+    stored, mode = results / "block-response.h5", results / "block-mode-1.h5"
+    commands = [("plot", stored, "response"), ("plot", stored, "phase", "--branch", 0),
+                ("report", stored), ("plot", mode, "mode"), ("compare", stored, stored)]
+    for command in commands:
+        code, _, said = cli(*command)
+        assert (code, said) == (0, ""), command
+    before = stored.read_bytes()
+    mesh.write_text(mesh.read_text() + "\n")
+    for command in ("response", file, *short, "--resume"), (*of_mode, "--resume"):
+        code, _, said = cli(*command)
+        assert (code, said.count("\n")) == (1, 1)
+        assert "was computed with another content of part.msh; leave out --resume" in said
+    assert stored.read_bytes() == before
+    for command in commands:
+        code, _, said = cli(*command)
+        assert code == 0
+        assert set(said.splitlines()) == {
+            f"warning: part.msh has changed since {command[1]} was computed; compute it again to "
+            f"see what changes."}, command
+    # Elsewhere there is no such file to compare with.
+    moved = file.parent / "far" / "away" / "block-response.h5"
+    moved.parent.mkdir(parents=True)
+    stored.rename(moved)
+    assert cli("plot", moved, "response")[::2] == (0, "")
+
+
 def test_a_level_that_fails_leaves_the_others(monkeypatch):
     from fecontact.bifurcation import responses as module
     from fecontact.core.errors import AnalysisError

@@ -6,6 +6,7 @@ import webbrowser
 
 import pytest
 from matplotlib.image import imread
+from tiny_study import TINY
 
 from fecontact.cli import viewers
 
@@ -66,6 +67,30 @@ def test_set_is_for_studies_alone(cli, study):
                     ["export", "results"], ["open", "results"]):
         code, _, err = cli(*command, "--set", "load.normal=3.0")
         assert (code, "name the study instead" in err) == (1, True), command
+
+
+def test_runs_of_files_that_have_changed_since(cli, study, tmp_path, opened):
+    """Of a law's data, by the run itself and by its study, which is run again for a report."""
+    data, run = tmp_path / "ground.csv", tmp_path / "results" / "tiny.vtkhdf"
+    data.write_text("0.0, 0.0\n0.1, 1e-6\n0.2, 0.0\n")
+    study.write_text(TINY.replace("ground = { speed = 0.1 }", (
+        'ground = { speed = 0.1, profile = { law = "measured-profile", file = "ground.csv" } }')))
+    assert cli("run", study)[0] == 0
+    commands = [("plot", study, "history"), ("plot", run, "history"), ("export", "results"),
+                ("open", run), ("render", run, "--frames", 1, "-o", "a.png")]
+    for command in (*commands, ("report", study)):
+        code, _, err = cli(*command)
+        assert (code, err) == (0, ""), command
+    data.write_text("0.0, 0.0\n0.1, 2e-6\n0.2, 0.0\n")
+    for command in commands:
+        code, _, err = cli(*command)
+        assert code == 0
+        assert err.count("\n") == 1
+        assert ("other values than" if study in command else
+                f"warning: ground.csv has changed since {run.relative_to(tmp_path)} was computed"
+                ) in err.replace(f"{tmp_path}/", "")
+    code, _, err = cli("report", study)
+    assert (code, err) == (0, "")
 
 
 def test_plots_of_the_command_line_take_a_style(cli, study, tmp_path):

@@ -3,11 +3,14 @@
 import json
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+import response_study
+import tomli_w
 
 import fecontact as fc
 from fecontact import Study
@@ -58,6 +61,8 @@ render = { frames = 2, size = [320, 180] }
 normal = { law = "own.py:Stiff" }
 friction = { law = "frictionless" }
 """
+RESPONSE = ["--hz", "10", "10.5", "--harmonics", "1", "--samples", "64"]
+MODE = ["--nonlinear", "1", "--amplitudes", "1e-5", "2e-5"]
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +190,69 @@ def test_a_hostile_file_runs_nothing(stored, place, capsys):
         assert "should not happen" not in said
     assert not (stored.parent / "harm").exists()
     assert not ran(stored)
+
+
+@pytest.fixture(scope="module")
+def orbits(tmp_path_factory):
+    """A study with a response and a nonlinear mode, by laws of the package."""
+    folder = tmp_path_factory.mktemp("orbits")
+    (folder / "b.toml").write_text(response_study.STUDY)
+    file, out = str(folder / "b.toml"), str(folder / "results")
+    assert execute(["response", file, *RESPONSE]) == 0
+    assert execute(["modes", file, *MODE, "-o", out]) == 0
+    return folder
+
+
+@pytest.mark.parametrize("named", ["hostile.py:Harm", r"hostile\u002epy:Harm", "{}/hostile.py:Harm",
+                                   r"{}/hostile\u002epy:Harm"])
+def test_no_command_runs_what_a_stored_study_names(named, orbits, stored, capsys, monkeypatch):
+    """The study that is stored with results names a law, the model beside it does not."""
+    folder = stored.parent
+    for file in ("results/b-response.h5", "results/b-mode-1.h5", "b.toml"):
+        (stored.parent.parent / file).write_bytes((orbits / file).read_bytes())
+    response, mode = folder / "b-response.h5", folder / "b-mode-1.h5"
+    study = folder.parent / "b.toml"
+    (folder / "hostile.py").write_text(
+        "from pathlib import Path\nPath(__file__).with_name('harm').touch()\n")
+    for file in (response, mode, stored):
+        with h5py.File(file, "a") as content:
+            tables = tomllib.loads(content["study"].attrs["toml"]) | {"friction": {"law": "NAME"}}
+            content["study"].attrs["toml"] = tomli_w.dumps(tables).replace(
+                "NAME", named.format(folder))
+    monkeypatch.setattr("webbrowser.open", lambda address: True)
+    page, picture = (str(folder / f"out.{ending}") for ending in ("html", "png"))
+    commands = [
+        *(["response", study, *RESPONSE, "--resume"], ["modes", study, *MODE, "--resume"]),
+        *(["report", file, "-o", page] for file in (response, mode, stored)),
+        *(["open", file, "--with", "browser"] for file in (response, mode, stored)),
+        *(["plot", file, "phase", "--branch", "0", "-o", picture] for file in (response, mode)),
+        ["plot", response, "response", "-o", picture], ["plot", mode, "mode", "-o", picture],
+        ["plot", stored, "history", "-o", picture], ["export", stored, "--format", "csv"],
+        ["compare", response, response, "-o", page], ["compare", stored, stored, "-o", page],
+        ["render", stored, "--frames", "1", "-o", picture]]
+    for tokens in commands:
+        code = execute(list(map(str, tokens)))
+        said = capsys.readouterr().err
+        refused = "--resume" in tokens
+        assert code == refused, (tokens, said)
+        assert not refused or "was computed with other values" in said
+        assert not (folder / "harm").exists(), tokens
+    assert not ran(stored)
+
+
+def test_open_runs_no_law_of_a_study(stored, capsys, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+    study = stored.parent.parent / "s.toml"
+    assert execute(["open", str(study), "--with", "browser"]) == 1
+    said = capsys.readouterr().err
+    assert "say --trust" in said
+    assert said.count("\n") == 1
+    assert not ran(stored)
+    assert opened == []
+    assert execute(["open", str(study), "--with", "browser", "--trust"]) == 0
+    assert ran(stored)
+    assert opened == [stored.with_suffix(".html").as_uri()]
 
 
 def test_a_law_that_is_loaded_needs_no_trust(tmp_path, monkeypatch):

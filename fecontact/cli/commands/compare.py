@@ -103,6 +103,7 @@ def _show_parameters(names: "Sequence[str]", rows: "Sequence[Sequence[str]]") ->
 
 def _compare_branches(files: "Sequence[Path]", picture: Path, trust: bool) -> None:
     from fecontact.analysis.comparison import differing_parameters
+    from fecontact.cli.run_files import warn_of_changed_files
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.output.files.branches import read_branches
     from fecontact.output.files.stored_system import read_model
@@ -115,6 +116,8 @@ def _compare_branches(files: "Sequence[Path]", picture: Path, trust: bool) -> No
     if len(parameters) > 1:
         raise InputError(f"the branches are over different parameters, "
                          f"{' and '.join(sorted(parameters))}; compare those over the same.")
+    for file in files:
+        warn_of_changed_files(file)
     differences = differing_parameters([read_model(file, trust).study for file in files])
     _show_parameters(names, [(key, *values) for key, values in differences.items()])
     with output_folder(picture.parent), waiting("Drawing"):

@@ -116,7 +116,7 @@ def _changes_of(file: Path, study: "Study", path: Path) -> list[str]:
     """
     from fecontact.core.dotted_parameters import flattened
     from fecontact.core.tables import parsed
-    from fecontact.sweeps.case_key import of_the_run
+    from fecontact.study.study import of_the_run
     from fecontact.sweeps.table import text_of
 
     def leaves(tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """The model in a file of results: basis, parameters, study, and the versions that computed it."""
 
 import json
+import os
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -56,8 +57,11 @@ def store_model(
     file.create_group("system").attrs["json"] = json.dumps(
         movable(system_tables(system), folder, root))
     if study is not None:
-        file.create_group("study").attrs["toml"] = _changed(
-            study, lambda table: movable(table, folder, root))
+        attributes = file.create_group("study").attrs
+        attributes["toml"] = _changed(study, lambda table: movable(table, folder, root))
+        attributes["folder"] = (
+            os.path.relpath(root.resolve(), folder.resolve())
+            if folder.resolve().is_relative_to(root.resolve()) else str(root.resolve()))
 
 
 def stored_tables(file: Any, path: Path) -> StoredTables:
@@ -71,6 +75,37 @@ def stored_tables(file: Any, path: Path) -> StoredTables:
     return StoredTables(basis, tables, study, versions)
 
 
+def read_study_text(path: str | Path) -> tuple[str, Path | None]:
+    """TOML text of the study in a file of results, and the folder of that study, if stored.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is damaged or holds no study.
+    """
+    path = as_path(path, "a file of results")
+    with open_file(path, "study") as file:
+        group = member(file, "study")
+        return text(group, "toml"), (path.parent / text(group, "folder")
+                                     if "folder" in group.attrs else None)
+
+
+def read_tables(path: str | Path) -> StoredTables:
+    """Tables of the model of a file of branches or responses; no code of laws is executed.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it holds no model.
+    """
+    path = as_path(path, "a file of results")
+    with open_file(path, "branches") as file:
+        if "system" not in file:
+            raise InputError(f"{path} holds branches alone, without the system that they are of; "
+                             f"write it with the argument system, or by a command.")
+        return stored_tables(file, path)
+
+
 def read_model(path: str | Path, trust: bool | Iterable[Path] = False) -> StoredModel:
     """The model of a file of branches or responses.
 
@@ -79,12 +114,7 @@ def read_model(path: str | Path, trust: bool | Iterable[Path] = False) -> Stored
     InputError
         If there is no such file, it holds no model or needs code that is not trusted.
     """
-    path = as_path(path, "a file of results")
-    with open_file(path, "branches") as file:
-        if "system" not in file:
-            raise InputError(f"{path} holds branches alone, without the system that they are of; "
-                             f"write it with the argument system, or by a command.")
-        stored = stored_tables(file, path)
+    stored = read_tables(path)
     with trusting(trust):
         system = system_from_tables(stored.basis, stored.tables, str(path))
     return StoredModel(system, stored.study, stored.versions)
@@ -110,11 +140,15 @@ def read_system(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Co
 
 
 def _changed(study: str, change: Callable[[Any], Any]) -> str:
-    """Study text with changed tables, except [geometry]; the same text if nothing changes."""
+    """Study text with changed tables, except those of geometries; comments at its end are kept.
+
+    The same text if nothing changes.
+    """
     tables = tomllib.loads(study)
-    changed = {name: table if name == "geometry" else change(table)
+    changed = {name: table if name in ("geometry", "bodies") else change(table)
                for name, table in tables.items()}
-    return study if changed == tables else tomli_w.dumps(changed)
+    comments = "".join(f"{line}\n" for line in study.splitlines() if line.startswith("# "))
+    return study if changed == tables else f"{tomli_w.dumps(changed)}\n{comments}"
 
 
 def library_versions() -> dict[str, str]:
