@@ -332,6 +332,8 @@ equilibrium_branch(field,point)
 equilibrium_branch(field,branch)
 equilibrium_branch(field,branch.points[0])
 find_equilibrium(field,"x")
+find_equilibrium(field,tolerance=nan)
+find_equilibrium(field,tolerance=np.inf)
 find_equilibrium(field,start="x")
 codim2_curve(None,point,"ground.speed")
 codim2_curve(field,None,"ground.speed")
@@ -860,6 +862,14 @@ def test_sizes_are_held_against_memory_before_anything_is_made(names, monkeypatc
     assert 1e5 < fits < 1e9 / 8
     assert np.zeros((fits, oscillator.size)).nbytes < 1e9
     memory.require_memory("outputs", fits, 0.9e9 / fits)
+    bifurcation, strobe = fecontact.bifurcation, fecontact.integrate.strobe
+    with pytest.raises(InputError, match="harmonics = 100000 would"):
+        bifurcation.HarmonicBalance(10**5)
+    with pytest.raises(InputError, match=r"number of times = 4000001 would .* or fewer runs"):
+        strobe([oscillator] * 10, transient_periods=3, keep=4 * 10**6)
+    with pytest.raises(InputError, match="keep = 1000000 would"):
+        bifurcation.poincare_scan(oscillator, "ground.speed", np.linspace(0.1, 0.2, 100),
+                                  transient_periods=3, keep=10**6)
     monkeypatch.setattr(memory, "available_memory", lambda: 1e5)
     with pytest.raises(InputError, match="cells = 20 would need"):
         ElasticBody(mesh)

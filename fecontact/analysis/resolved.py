@@ -6,6 +6,7 @@ the motion after it, the run is repeated from there with more outputs until curv
 
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -35,13 +36,20 @@ _WINDOW, _GAP = 256, 16  # intervals repeated in one run; largest gap skipped wi
 _NUMBERS = 20_000_000  # stored per run
 _STEPS = 1_000_000  # repeated per run
 _SMALL_SOLID = 40  # values of a state of a solid up to which that many steps are repeated
+# Times that a repeated run may report its progress, and more for each thousand steps of the run.
+_REPORTS, _REPORTS_MORE = 5, 2
 _FAILURES = 8  # consecutive failures before the run is considered not repeatable
+_LONG = "between them the run took too many steps"
 _TOLD = 2e-3  # fraction of the time
 _NODES = 8  # contact nodes monitored besides the named points
 
 _COUNTED = ("work", "node_friction_work", "node_creep_work")  # relative to the first time of a run
 _STATE = ("modal_coordinates", "modal_velocities", "memory", "held_normal_force",
           "held_friction_force")
+
+
+class _TooManyStepsError(Exception):
+    """A repeated run takes far more steps than the run itself."""
 
 
 class Resolved(NamedTuple):
@@ -105,7 +113,7 @@ def _resolved(run: Trajectory) -> Resolved:
         parts = min(parts, _room(run) // int(flags.sum()))
         why = "this history was not computed by a run"
         if "solver" in run.statistics:
-            why = "between them the run took too many steps" if average > left else ""
+            why = _LONG if average > left else ""
         if parts < 2:
             why = "it moves too fast for its duration to be kept"
         if why:
@@ -205,7 +213,7 @@ def _repeated(
         if not len(ahead):
             break
         if steps > most:
-            why = "between them the run took too many steps"
+            why = _LONG
             break
         if failures >= _FAILURES:
             break
@@ -214,7 +222,11 @@ def _repeated(
         times = np.concatenate([
             *(np.linspace(t[k], t[k + 1], parts + 1)[:-1] if flags[k] else t[k : k + 1]
               for k in range(first, end)), t[end : end + 1]])
-        again = _again(run, first, times)
+        try:
+            again = _again(run, first, times)
+        except _TooManyStepsError:
+            why = _LONG
+            break
         good = 0
         if again is not None:
             good = _agreeing(run, again, first, end, sizes)
@@ -238,7 +250,13 @@ def _end(flags: Flags, first: int, length: int) -> int:
 
 
 def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
-    """Repeat the run from an output; None if it does not reach the end."""
+    """Repeat the run from an output; None if it does not reach the end.
+
+    Raises
+    ------
+    _TooManyStepsError
+        See :func:`_limit`.
+    """
     rows = slice(first, first + 1)
     start = replace(run, time=run.time[rows], work=run.work[rows], node_friction_work=None,
                     node_creep_work=None, events=None, **_cut(run, rows, _STATE))
@@ -252,7 +270,7 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
             # The original run has already issued these warnings.
             warnings.simplefilter("ignore")
             again = simulate(run.system, float(times[-1]), t_start=float(times[0]), initial=start,
-                             outputs=times, **options)
+                             outputs=times, progress=_limit(run, times), **options)
     except FecontactError:
         return None
     if again.status is Status.INTERRUPTED:
@@ -261,6 +279,26 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
     if not np.array_equal(again.time, times) or not np.isfinite(again.states).all():
         return None
     return again
+
+
+def _limit(run: Trajectory, times: Array) -> Callable[[float], None] | None:
+    """Function of the progress that ends a repeated set-valued run of far more steps than the run.
+
+    Where a node is at the border of stick and slip, steps from a state within them can become very
+    short.
+    """
+    if run.statistics["solver"] != SetValued().name:
+        return None
+    part = (times[-1] - times[0]) / (run.time[-1] - run.time[0])
+    left = _REPORTS + _REPORTS_MORE * part * float(run.statistics.get("steps", 0)) / 1e3
+
+    def count(time: float) -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise _TooManyStepsError
+
+    return count
 
 
 def _agreeing(

@@ -18,6 +18,7 @@ from fecontact.fem.elements.cell_geometry import (
     oriented_solids,
     require_apart,
     require_conforming,
+    require_no_overlap,
     second_order_places,
     solid_volumes,
 )
@@ -123,6 +124,7 @@ class Mesh(Summarised):
             )
         require_apart(self._facets, self._facet_number, count, nodes)
         require_conforming(self.outline, nodes)
+        require_no_overlap(nodes, cells, kind, np.flatnonzero(count[self._facet_number] == 1))
         boundaries = {name: self._on_outline(name, facets) for name, facets in boundaries.items()}
         object.__setattr__(self, "boundaries", boundaries)
         for array in (nodes, cells, curved, middles, *boundaries.values(), *points.values()):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_count, as_floats, require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, require_positive
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.read_only import read_only_arrays
@@ -32,7 +32,11 @@ from fecontact.integrate.lanes.driver import SideBySide, side_by_side
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, again
 from fecontact.integrate.rodas5p.run import Run
-from fecontact.integrate.simulate import require_max_step, require_rodas
+from fecontact.integrate.simulate import (
+    require_max_step,
+    require_resolved_span,
+    require_rodas,
+)
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
@@ -309,10 +313,10 @@ def strobe(
         periods = np.array([forcing_period(system) for system in given])
     else:
         periods = as_floats(period, "period")
-        if not (np.isfinite(periods).all() and (periods > 0.0).all()):
-            raise InputError(f"period = {text_of(period)} must be above zero and finite.")
+        for one in periods.ravel().tolist():
+            require_positive("strobe", period=one)
     # Times of a run are made from these.
-    require_memory("keep", int(keep), 16.0)
+    require_memory("keep", int(keep), 16.0 * (1 + periods.size))
     counts = np.arange(transient_periods, transient_periods + keep, dtype=float)
     first = 1 if transient_periods else 0
     if transient_periods:
@@ -344,12 +348,18 @@ def _members(
         raise InputError(f"The states of all systems must have the same size, not {sorted(sizes)}.")
     if many is not None and len(many) != count:
         raise InputError(f"There are {len(many)} initial states for {count} systems.")
+    # Times, states and the largest of what is derived from them.
+    require_memory("ensemble: the number of times", instants.shape[-1] if instants.ndim else 1,
+                   8.0 * count * (3 + max(sizes)), ", or fewer runs")
     if instants.ndim == 1 or (instants.ndim and len(instants) == 1):
         instants = np.tile(instants, (count, 1))
     if instants.ndim != 2 or len(instants) != count or instants.shape[1] < 1 or (
             not np.isfinite(instants).all() or not (np.diff(instants, axis=1) > 0.0).all()):
         raise InputError(f"times must be ascending and finite, of shape (K,) or ({count}, K), not "
                          f"{np.shape(times)}.")
+    if instants.shape[1] > 1:
+        for begin, end in instants[:, [0, -1]].tolist():
+            require_resolved_span("the last of the times", end, "the first", begin)
 
     def state(index: int) -> Array:
         given = initial if many is None else many[index]

@@ -273,6 +273,15 @@ def require_max_step(max_step: Any) -> None:
                          f"leave it out for steps as long as the tolerance allows.")
 
 
+def require_resolved_span(last: str, t_end: float, first: str, t_start: float) -> None:
+    """Raise :class:`InputError` if no steps fit between two times; their names come before them."""
+    latest = max(abs(t_start), abs(t_end))
+    if t_end - t_start < max(_SHORTEST, _SPACINGS * float(np.spacing(latest))):
+        raise InputError(f"{last} = {text_of(t_end)} is too close to {first} = {text_of(t_start)}: "
+                         f"floating-point numbers cannot resolve steps between them; choose a "
+                         f"later end.")
+
+
 def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
     """Output times (N,) of a run; see :func:`simulate`.
 
@@ -285,11 +294,7 @@ def output_times(t_start: float, t_end: float, outputs: Any) -> Array:
             and -sys.float_info.max <= t_start < t_end <= sys.float_info.max):
         raise InputError(f"t_end = {text_of(t_end)} must be a finite time after t_start = "
                          f"{text_of(t_start)}.")
-    latest = max(abs(t_start), abs(t_end))
-    if t_end - t_start < max(_SHORTEST, _SPACINGS * float(np.spacing(latest))):
-        raise InputError(f"t_end = {t_end!r} is too close to t_start = {t_start!r}: "
-                         f"floating-point numbers cannot resolve steps between them; choose a "
-                         f"later end.")
+    require_resolved_span("t_end", t_end, "t_start", t_start)
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         if outputs < 2:
             raise InputError(f"outputs = {outputs} must be at least 2.")

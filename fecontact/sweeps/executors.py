@@ -1,5 +1,6 @@
 """Executors of batches: processes on this machine, a Dask cluster, or any other."""
 
+import asyncio
 import contextlib
 import multiprocessing
 import os
@@ -7,7 +8,7 @@ import re
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing.connection import wait
 from typing import Any
 
@@ -198,8 +199,9 @@ def dask_executor(address: str, timeout: float | None = None) -> Iterator[Execut
         raise MissingLibraryError("A sweep over a cluster needs Dask; install it with "
                                   "pip install 'fecontact[dask]'.") from None
     try:
+        _greet(address, timeout)
         client = Client(address, timeout=timeout, set_as_default=False)
-    except (OSError, ValueError, TypeError):
+    except Exception:  # servers of other kinds answer in any way
         raise InputError(f"No Dask scheduler answers at {address} within {timeout:g} s; start one "
                          f"with dask scheduler, and workers with dask worker {address}.") from None
     try:
@@ -211,3 +213,18 @@ def dask_executor(address: str, timeout: float | None = None) -> Iterator[Execut
                          f"dask worker {address}.") from None
     finally:
         client.close(timeout=timeout)
+
+
+def _greet(address: str, timeout: float) -> None:
+    """Exchange the first messages with a Dask server; an exception if it does not answer in time.
+
+    A client of Dask waits for them without limit at a server of another kind.
+    """
+    from distributed.comm.core import connect
+
+    async def greet() -> None:
+        comm = await asyncio.wait_for(connect(address, timeout=timeout), timeout)
+        await comm.close()
+
+    with ThreadPoolExecutor(1) as thread:  # notebooks have an event loop in theirs
+        thread.submit(lambda: asyncio.run(greet())).result()

@@ -164,6 +164,25 @@ def test_unusable_solids_are_refused(arguments, message):
         Mesh(*arguments)
 
 
+@pytest.mark.parametrize("shape", ["block", "plate"])
+def test_overlapping_parts_are_refused(shape):
+    """Parts without common nodes; those that touch, or lie apart, are accepted."""
+    part = block_mesh((2, 2, 2)) if shape == "block" else Mesh(
+        [(0, 0), (0.5, 0), (1, 0), (0, 1), (0.5, 1), (1, 1)], [[0, 1, 4, 3], [1, 2, 5, 4]])
+    across = (0.0,) * (part.dimension - 1)
+
+    def joined(shift, scale=1.0):
+        nodes = np.concatenate([part.nodes, scale * part.nodes + shift])
+        return Mesh(nodes, np.concatenate([part.cells, part.cells + len(part.nodes)]))
+
+    for shift in (np.ptp(part.nodes[:, 0]), 2.0 * np.ptp(part.nodes[:, 0])):
+        assert len(joined((shift, *across)).cells) == 2 * len(part.cells)
+    for shift, scale in (((0.7 * np.ptp(part.nodes[:, 0]), *across), 1.0),
+                         ((0.1 * np.ptp(part.nodes, axis=0)), 0.05)):
+        with pytest.raises(MeshError, match=r"Mesh cells \d+ and \d+ overlap at \(.*; remove"):
+            joined(shift, scale)
+
+
 def test_area_is_of_plane_bodies_and_volume_of_solids():
     with pytest.raises(MeshError, match="A solid has a volume"):
         _ = block_mesh((1, 1, 1)).area

@@ -7,6 +7,7 @@ from systems import friction_oscillator, impact_oscillator
 import fecontact as fc
 from fecontact.core.errors import InputError
 from fecontact.integrate import Rodas5P, Scipy, SetValued
+from fecontact.integrate.nonsmooth import driver, problem
 
 SOLVERS = (Rodas5P(), Rodas5P(series="never"), Rodas5P(collocation="always"), Scipy("LSODA"))
 
@@ -47,3 +48,41 @@ def test_short_runs_of_fast_drives_end():
     run = fc.simulate(system, 20.0 * np.pi / 1e12, outputs=11)
     assert run.status is fc.Status.FINISHED
     assert np.abs(run.modal_coordinates - run.modal_coordinates[0]).max() < 1e-12
+
+
+@pytest.mark.parametrize("scheme", ["events", "stepping"])
+def test_set_valued_runs_whose_steps_stay_too_short_end_with_a_status(scheme, monkeypatch):
+    """Impacts can follow each other ever closer: what was computed until then is kept."""
+    begin, lengths, advance = driver.start, [], 1e-14
+
+    def start(*given, **options):
+        run = begin(*given, **options)
+        run.go(1)
+
+        def go(most):
+            lengths.append(float(run.course.clock[problem.LENGTH]))
+            run.course.counts[[problem.STEPS, problem.REJECTED]] += most
+            run.course.clock[problem.TIME] += most * advance
+            run.course.clock[problem.LENGTH] = advance
+            return problem.GOING_ON
+
+        return run._replace(go=go, scheme=scheme)
+
+    monkeypatch.setattr(driver, "start", start)
+    run = fc.simulate(friction_oscillator(), 1.0, solver=SetValued())
+    assert run.status is fc.Status.MINIMUM_STEP
+    assert len(lengths) < 1000
+    # Implicit steps that are rejected are tried at their longest now and then.
+    assert max(lengths[1:]) == (1.0 / 50.0 if scheme == "stepping" else advance)
+
+
+def test_times_too_close_for_steps_are_refused():
+    system = friction_oscillator()
+    with pytest.raises(InputError, match="period = 5e-324 must be a number from 1e-60 to 1e"):
+        fc.integrate.strobe([system], transient_periods=3, keep=2, period=5e-324)
+    with pytest.raises(InputError, match="the last of the times = 5e-324 is too close to the "):
+        fc.ensemble([system], [0.0, 5e-324])
+    with pytest.raises(InputError, match="transient = 5e-324 is too close to the start = 0"):
+        fc.bifurcation.lyapunov_exponents(system, 1.0, transient=5e-324)
+    with pytest.raises(InputError, match=r"number of intervals in duration = 1e\+59 would need"):
+        fc.bifurcation.lyapunov_exponents(system, 0.1, interval=1e-60)

@@ -86,6 +86,9 @@ DAMAGES = {
     "json-contact": attribute("system", "json", '{"interfaces": [1]}'),
     "json-group": attribute("system", "json", '{"interfaces": {"contact": {"drive": {}}}}'),
     "json-gap": attribute("system", "json", '{"gap": "wide"}'),
+    "json-file": attribute("system", "json", '{"ground": {"height_map": {"file": "h.txt"}}}'),
+    "json-device": attribute("system", "json", '{"normal": {"law": "measured-surface", "file": '
+                                               '"/dev/zero"}}'),
     "no-json": lambda file: file["system"].attrs.pop("json"),
     "no-system": lambda file: file.pop("system"),
     "statistics": attribute("trajectory", "statistics", '"fast"'),

@@ -12,6 +12,7 @@ from fecontact import read_case, write_case
 from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
 from fecontact.integrate import SetValued
+from fecontact.integrate.nonsmooth import driver, problem
 from fecontact.laws import ExponentialFriction, LinearContact, RoughSurface
 from fecontact.output.plots.run import thinned
 from fecontact.plot import plot_contact_map, plot_friction_work, plot_history, plot_phase
@@ -130,6 +131,30 @@ def test_set_valued_runs_are_repeated_with_what_they_were_told():
     second = fine.displacement("B")[fine.time > np.sqrt(2.0 * 0.1 / 9.81), 1]
     assert second.max() == pytest.approx(0.25 * 0.1, rel=5e-3)
     assert fine.normal_force[-1, 0] == pytest.approx(9.81 * MASS)
+
+
+def test_repeats_that_take_far_more_steps_than_the_run_are_given_up(monkeypatch):
+    """Set-valued steps can become very short from a state at the border of stick and slip."""
+    run = fc.simulate(friction_oscillator(), 0.1, outputs=11, solver=SetValued())
+    begin, calls = driver.start, []
+
+    def start(*given, **options):
+        made = begin(*given, **options)
+        made.go(1)
+
+        def go(most):
+            calls.append(most)
+            made.course.counts[problem.STEPS] += most
+            made.course.clock[problem.TIME] += 1e-6
+            return problem.GOING_ON
+
+        return made._replace(go=go)
+
+    monkeypatch.setattr(driver, "start", start)
+    found = resolved(run)
+    assert found.trajectory is run
+    assert found.reason == "between them the run took too many steps"
+    assert 0 < len(calls) < 100
 
 
 def test_files_read_back_are_drawn_alike(tmp_path, capsys):

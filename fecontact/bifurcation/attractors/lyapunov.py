@@ -20,6 +20,7 @@ from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
+from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.field_runs.saltation import joined, passages, with_passages
@@ -27,6 +28,7 @@ from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish
+from fecontact.integrate.simulate import require_resolved_span
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import Moving, in_time, state_size
 from fecontact.system.fields.vector_field import VectorField
@@ -124,8 +126,15 @@ def lyapunov_exponents(
                      **({} if interval is None else {"interval": interval}))
     if not (isinstance(transient, Real) and 0.0 <= transient <= sys.float_info.max):
         raise InputError(f"transient = {text_of(transient)} must be zero or above [s].")
+    if transient > 0.0:
+        require_resolved_span("transient", transient, "the start", 0.0)
+    require_resolved_span("the end of duration", transient + duration, "transient", transient)
     if as_count(count, "count") > size:
         raise InputError(f"count = {count} must be a whole number from 1 to {size}.")
+    if interval is not None:
+        # Instants, and per exponent the growth in each interval, its history and temporaries.
+        require_memory("lyapunov_exponents: the number of intervals in duration",
+                       duration / interval, 8.0 * (4 + 4 * count), ", by a longer interval")
     state, time = start_state(moving, initial, 0.0), float(transient)
     with (shown(progress, lambda: progress_bar("Lyapunov exponents", time + duration)) as tell,
           one_blas_thread):

@@ -18,6 +18,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.read_only import read_only_arrays
+from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensembles import ensemble, is_many, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
@@ -168,6 +169,8 @@ def poincare_scan(
         for made in ends:
             forcing_period(made)
     count = len(points)
+    # States as they are read and as they are returned, and times of each run.
+    require_memory("poincare_scan: keep", keep, 16.0 * count * (2 + 2 * state_size(moving)))
     most = chains or max(min(_CHAINS, count // 8), count // _LONGEST, 1)
     length = -(-count // min(most, count))
     # All chains have the same length; where the values do not divide, the last ones are run twice.

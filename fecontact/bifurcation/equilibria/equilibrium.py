@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
@@ -177,6 +177,7 @@ def find_equilibrium(
     """
     require_field(field)
     require_kind("find_equilibrium", (Mapping, type(None)), parameters=parameters)
+    require_positive("find_equilibrium", tolerance=tolerance)
     values = field.values_with(**dict(parameters or {}))
     require_autonomous(field, values)
     if start is None:

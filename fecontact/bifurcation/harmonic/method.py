@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecontact.core.errors import InputError, require_positive
+from fecontact.core.resources.memory import require_memory
 
 _STABILITY = ("transitions", "Koopman-Hill", None)
 # Samples per harmonic, and at least.
@@ -73,6 +74,8 @@ class HarmonicBalance:
                                              and least <= self.samples <= MOST):
             raise InputError(f"HarmonicBalance: samples = {self.samples!r} must be a whole number "
                              f"from {least}, twice the harmonics and two, to {MOST}.")
+        # Cosines and sines of all harmonics at all samples.
+        require_memory("HarmonicBalance: harmonics", self.harmonics, 16.0 * self.count)
         for name in ("tolerance", "sampling_tolerance"):
             if getattr(self, name) is not None:
                 require_positive("HarmonicBalance", **{name: getattr(self, name)})

@@ -10,6 +10,9 @@ from fecontact.fem.elements.cell_kinds import CellKind, numbered_rows, shape_fun
 
 _FLAT = 1e-12  # volume of a degenerate cell, relative to the cube of its size
 _ON_EDGE = 1e-5  # distance of a node on an edge, per length: coordinates in single precision
+# Cells whose places are compared at once, and the depth in a cell at which a place lies within it,
+# relative to its centre.
+_AT_ONCE, _WITHIN = 4000, 0.1
 # Gauss points from 0 to 1, exact for determinants of second-order cells: degree 5 a direction.
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _GAUSS, _WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
@@ -79,6 +82,55 @@ def require_apart(facets: Integers, number: Integers, count: Integers, nodes: Ar
                         f"of their cells on one side, the first at "
                         f"({', '.join(f'{x:g}' for x in place)}): the mesh has inverted or "
                         f"overlapping elements; mesh the body anew.")
+
+
+def require_no_overlap(nodes: Array, cells: Integers, kind: CellKind, outline: Integers) -> None:
+    """Raise :class:`MeshError` where a cell at the outline lies partly within another cell.
+
+    Overlaps that leave the centre of a cell, and the places half way from there to its corners,
+    outside other cells are not found: of curved faces that touch, the chords may overlap.
+    ``outline`` are the numbers of the sides that belong to one cell only, in the order of
+    :func:`facets_of`.
+    """
+    from scipy.spatial import KDTree
+
+    sides = nodes[cells[:, np.array(kind.facets)]]
+    on_side, normal = sides.mean(axis=2), _side_normals(sides)
+    centre = nodes[cells].mean(axis=1)
+    inside = np.einsum("mfd,mfd->mf", on_side - centre[:, None], normal)
+    radius = np.linalg.norm(nodes[cells] - centre[:, None], axis=2).max(axis=1)
+    at_outline = np.unique(outline // len(kind.facets))
+    places = np.concatenate([centre[at_outline, None],
+                             0.5 * (centre[at_outline, None] + nodes[cells[at_outline]])], axis=1)
+    level = np.floor(np.log2(radius))
+    for one in np.unique(level):
+        large = np.flatnonzero(level == one)
+        tree = KDTree(centre[large])
+        for first in range(0, len(at_outline), _AT_ONCE):
+            some = places[first : first + _AT_ONCE]
+            near = tree.query_ball_point(some.reshape(-1, kind.dimension), radius[large].max())
+            sizes = np.array([len(found) for found in near])
+            place = np.repeat(np.arange(len(near)), sizes)
+            cell = large[np.concatenate([np.asarray(found, np.int64) for found in near])]
+            own = at_outline[first + place // some.shape[1]]
+            at = some.reshape(-1, kind.dimension)[place]
+            depth = np.einsum("pfd,pfd->pf", on_side[cell] - at[:, None], normal[cell])
+            within = (depth > _WITHIN * inside[cell]).all(axis=1) & (own != cell)
+            for a, b in zip(own[within], cell[within], strict=True):
+                # Two cells with a common side lie apart, see require_apart.
+                if len(np.intersect1d(cells[a], cells[b])) < len(kind.facets[0]):
+                    where = ", ".join(f"{x:g}" for x in centre[a])
+                    raise MeshError(f"Mesh cells {a} and {b} overlap at ({where}); remove one of "
+                                    f"them, or move the parts of the mesh apart.")
+
+
+def _side_normals(sides: Array) -> Array:
+    """Outward vectors (M, f, d) normal to sides (M, f, n, d) of cells."""
+    if sides.shape[3] == 2:
+        along = sides[:, :, 1] - sides[:, :, 0]
+        return np.stack([along[..., 1], -along[..., 0]], axis=-1)
+    return np.asarray(np.cross(sides[:, :, 2] - sides[:, :, 0],
+                               sides[:, :, -1] - sides[:, :, 1]))
 
 
 def require_conforming(outline: Integers, nodes: Array) -> None:

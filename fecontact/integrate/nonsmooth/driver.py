@@ -33,6 +33,12 @@ _STEPS_PER_CALL = 2000
 # Changes of contact in a row without any time between them after which a run is stuck, and the time
 # that rounding adds to each, in parts of the times of the run.
 _MOST_AT_ONCE, _ROUNDING = 200, 1e-14
+# A run is stuck that advances by less than this part of its span in so many steps.
+_MANY_STEPS, _LEAST_PART = 20_000, 1e-8
+# Where implicit steps are shorter on average than this part of the longest and half are rejected,
+# so many are followed by a longest one: stages may fail in a range of lengths that steps from below
+# do not get past.
+_SHORT, _STEPS_BETWEEN = 1e-3, 100
 # How runs end before their last output time.
 _EARLY = {kinds.STUCK: Status.MINIMUM_STEP, kinds.DIVERGED: Status.NOT_FINITE,
           kinds.PARADOX: Status.PARADOX, kinds.UNSOLVED: Status.IMPACT_UNSOLVED,
@@ -129,10 +135,23 @@ def integrate_set_valued(
     outcome, ended = kinds.GOING_ON, Status.FINISHED
     since, before = float(times[0]), 0
     still = _ROUNDING * max(abs(float(times[0])), abs(float(times[-1])))
+    mark, steps, most = since, 0, _STEPS_PER_CALL
     try:
         while outcome == kinds.GOING_ON:
-            outcome = run.go(_STEPS_PER_CALL)
+            begun, failed = float(reached[kinds.TIME]), int(counts[kinds.REJECTED])
+            outcome = run.go(most)
             found.empty()
+            caught = (run.scheme == "stepping"
+                      and reached[kinds.TIME] - begun < _SHORT * most * run.longest
+                      and counts[kinds.REJECTED] - failed >= most // 2)
+            if caught:
+                reached[kinds.LENGTH] = run.longest
+            most = _STEPS_BETWEEN if caught else _STEPS_PER_CALL
+            if counts[kinds.STEPS] - steps >= _MANY_STEPS:
+                if outcome == kinds.GOING_ON and (
+                        reached[kinds.TIME] - mark < _LEAST_PART * (times[-1] - times[0])):
+                    outcome = kinds.STUCK
+                mark, steps = float(reached[kinds.TIME]), int(counts[kinds.STEPS])
             # A call that ends as the table of events is full does not know of those before.
             if reached[kinds.TIME] - since > _MOST_AT_ONCE * still:
                 since, before = float(reached[kinds.TIME]), int(counts[kinds.EVENTS])
@@ -175,6 +194,7 @@ class Run(NamedTuple):
     output: kinds.Output
     found: "_Found"
     scheme: str
+    longest: float
 
 
 def start(
@@ -233,7 +253,7 @@ def start(
         _require_no_events(events)
         run = partial(run_steps, problem, limits, course, output, workspace,
                       stepping_room(problem, in_space() if solid else IN_PLANE))
-    return Run(run, course, output, found, scheme)
+    return Run(run, course, output, found, scheme, limits.longest)
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:

@@ -12,8 +12,8 @@ from typing import Any
 import tomli_w
 
 from fecontact.core.checks import as_path
-from fecontact.core.errors import InputError
-from fecontact.core.files.stored import from_json, member, text
+from fecontact.core.errors import InputError, shown
+from fecontact.core.files.stored import DamagedError, from_json, member, text
 from fecontact.laws.registry import movable, trusting, with_folder
 from fecontact.output.files.hdf5 import open_file, store_basis, stored_basis
 from fecontact.reduction.modal_basis import ModalBasis
@@ -67,8 +67,9 @@ def store_model(
 def stored_tables(file: Any, path: Path) -> StoredTables:
     """Read what :func:`store_model` has written."""
     basis = stored_basis(member(file, "basis"))
-    tables = with_folder(from_json(text(member(file, "system"), "json"), dict, "the system"),
-                         path.parent)
+    tables = from_json(text(member(file, "system"), "json"), dict, "the system")
+    _require_no_data_files(tables)
+    tables = with_folder(tables, path.parent)
     study = (_changed(text(member(file, "study"), "toml"),
                       lambda table: with_folder(table, path.parent)) if "study" in file else None)
     versions = {name: str(one) for name, one in member(file, "versions").attrs.items()}
@@ -104,6 +105,22 @@ def read_tables(path: str | Path) -> StoredTables:
             raise InputError(f"{path} holds branches alone, without the system that they are of; "
                              f"write it with the argument system, or by a command.")
         return stored_tables(file, path)
+
+
+def _require_no_data_files(table: Any) -> None:
+    """Raise :class:`DamagedError` where a stored system names a file of data for a known law.
+
+    The data itself is stored; a file named instead is not by :func:`store_model`.
+    """
+    if isinstance(table, list):
+        for item in table:
+            _require_no_data_files(item)
+    elif isinstance(table, dict):
+        if table.get("file") is not None and ".py:" not in str(table.get("law")):
+            raise DamagedError(f"the system names the file {shown(table['file'])}, where its data "
+                               f"must be stored")
+        for item in table.values():
+            _require_no_data_files(item)
 
 
 def read_model(path: str | Path, trust: bool | Iterable[Path] = False) -> StoredModel:
