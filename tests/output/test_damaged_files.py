@@ -162,6 +162,17 @@ def test_a_damaged_run_is_one_sentence(case, change, tmp_path):
     assert len(said) < 700
 
 
+def test_a_stored_system_that_names_a_file_of_data_is_refused(case, tmp_path):
+    """The file is not opened: it may be a pipe, or another file than that of the run."""
+    path = tmp_path / "named.vtkhdf"
+    path.write_bytes(case.read_bytes())
+    with h5py.File(path, "a") as file:
+        DAMAGES["json-device"](file)
+    append_checksum(path)
+    with pytest.raises(InputError, match=r"names the file '/dev/zero', where its data must be"):
+        read_case(path)
+
+
 def test_a_run_cut_anywhere_is_refused(case, tmp_path):
     whole, path = case.read_bytes(), tmp_path / "cut.vtkhdf"
     for place in np.linspace(0, len(whole) - 27, 6).astype(int):
