@@ -31,6 +31,12 @@ def failing(run):
     return 1.0
 
 
+def leaving(run):
+    if run.system.friction.static_coefficient > 0.75:
+        sys.exit(0)
+    return 1.0
+
+
 def deadly(run):
     if run.system.friction.static_coefficient > 0.75:
         os._exit(3)

@@ -87,6 +87,9 @@ def _execute(tokens: list[str]) -> int:
         return fail(str(error), 1)
     except KeyboardInterrupt:
         return fail("interrupted.", INTERRUPTED)
+    except SystemExit as error:
+        return fail(f"code of a law or function of your own ended the program by "
+                    f"sys.exit({error.code!r}); raise an exception there instead.", 1)
     except BrokenPipeError:
         # The reader of the output pipe has ended: no message can reach it.
         sys.stdout = None

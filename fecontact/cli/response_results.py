@@ -111,7 +111,8 @@ def response_table(
         for place, point in enumerate(branch.points):
             if point is not peak and point.kind is None:
                 continue
-            words = ", ".join(filter(None, ("peak" if point is peak else "", point.kind)))
+            largest = "peak" if response.peak_reached(level) else "largest"
+            words = ", ".join(filter(None, (largest if point is peak else "", point.kind)))
             hertz = 1.0 / float(point.values["period"])
             remarks = ", ".join(filter(None, (_stability(point), beyond_basis(hertz, usable_hz))))
             rows.append((*([texts[level]] if name else []), words,

@@ -397,6 +397,15 @@ def write_report(stored: StoredRun, name: str, target: Path) -> Path:
                   scale=stored.settings.scale, versions=stored.versions or None)
 
 
+def own_page(file: Path) -> Path:
+    """Page beside a file of results; InputError if a file of the user's has that name."""
+    from fecontact.output.report.page import require_own_page
+
+    page = file.with_suffix(".html")
+    require_own_page(page)
+    return page
+
+
 def interfaces_of(study: "Study") -> list["InterfaceCompliance"]:
     """Compliance of the interfaces of several bodies, or of several boundaries of one body."""
     from fecontact.reduction.assembly.assembled_basis import assembled_basis

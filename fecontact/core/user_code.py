@@ -43,7 +43,7 @@ def user_module(file: str | Path, where: str = "") -> ModuleType:
         return _module(path, written)
     except InputError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"{where}{file} cannot be loaded "
                          f"({type(error).__name__}: {error}).") from None
 

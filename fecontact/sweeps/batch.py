@@ -140,7 +140,7 @@ def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functi
         return Row(case=case.key, values={}, reason=str(error))
     except (MemoryError, OSError):
         raise
-    except Exception as error:  # user-defined laws and summaries may raise any exception
+    except (Exception, SystemExit) as error:  # laws and summaries of the user may raise any
         return Row(case=case.key, values={}, reason=f"{type(error).__name__}: {error}")
     if batch.files is not None:
         _write(batch, case, study, trajectory)

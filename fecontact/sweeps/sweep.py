@@ -241,6 +241,10 @@ def _clear_or_refuse(store: Store, *, resume: bool, overwrite: bool) -> None:
         for what in ("shards", "cases", "bases"):
             for path in store.kept(what):
                 path.unlink(missing_ok=True)
+    elif (table := store.folder / "index.csv").exists() and not (
+            store.kept("shards") or (store.folder / "sweep.toml").exists()):
+        raise InputError(f"{table} is of no sweep; choose another folder, or replace it with "
+                         f"--overwrite (overwrite=True).")
     elif not resume and store.kept("shards"):
         raise InputError(f"{store.folder} holds a sweep; go on with --resume (resume=True), begin "
                          f"anew with --overwrite (overwrite=True), or choose another folder.")

@@ -137,6 +137,27 @@ def test_resumed_response_has_the_numbers_of_an_uninterrupted_one(points, file, 
             assert all(np.array_equal(a.values[name], b.values[name]) for name in b.values)
 
 
+def test_points_that_run_out_before_the_peak(cli, file):
+    """The last point is no peak; a note says where the branch ends and how to go on."""
+    few = ("--hz", 9, 13, "--set", "response.points=4")
+    code, said, _ = cli("response", file, *few)
+    assert code == 0
+    found = read_response(file.parent / "results" / "block-response.h5")
+    assert not any(found.peak_reached(level) for level in range(2))
+    rows = [line for line in said.splitlines() if "stable" in line]
+    assert len(rows) == 2
+    assert all("largest" in row and "peak" not in row for row in rows)
+    for level, branch in zip(("2e-05", "0.0003"), found.branches, strict=True):
+        assert f"note: drive.amplitude_x = {level}: {branch.end} No peak is reached." in said
+        assert "raise points = 4 to go on" in branch.end
+    summary = dict(found.summary())
+    assert summary["peak"].startswith("not reached at 2e-05, 0.0003: ")
+    assert cli("response", file, *few[:3], "--levels", "drive.amplitude_x=2e-5")[0] == 0
+    whole = read_response(file.parent / "results" / "block-response.h5")
+    assert whole.peak_reached()
+    assert "peak" not in dict(whole.summary())
+
+
 def test_going_on_needs_the_same_values(cli, file):
     assert cli("response", file, "--hz", 9, 9.5)[0] == 0
     code, _, said = cli("response", file, "--hz", 9, 9.5, "--set", "load.normal=15.0", "--resume")

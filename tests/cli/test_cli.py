@@ -175,6 +175,9 @@ def test_init_writes_every_shape_and_never_overwrites(cli, shape, tmp_path, monk
     assert (tmp_path / "study.toml").read_text() == "mine"
     assert cli("init", "--force")[0] == 0
     assert (tmp_path / "study.toml").read_text() != "mine"
+    (tmp_path / "link.toml").symlink_to("nowhere.toml")
+    assert cli("init", "link.toml", "--shape", shape)[0] == 1
+    assert (tmp_path / "link.toml").is_symlink()
 
 
 def test_init_for_a_mesh_of_ones_own(cli, tmp_path, monkeypatch):
@@ -317,6 +320,23 @@ def test_errors_that_should_not_happen_are_said_in_one_sentence(cli, study, monk
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize("code", [
+    "sys.exit(0)",
+    "@dataclass(frozen=True)\nclass Law(LinearContact):\n    def __post_init__(self):\n"
+    "        sys.exit(0)"])
+def test_a_law_that_ends_the_program_is_an_error(cli, study, tmp_path, code):
+    (tmp_path / "own.py").write_text("import sys\nfrom dataclasses import dataclass\n\n"
+                                     f"from fecontact.laws import LinearContact\n\n\n{code}\n")
+    study.write_text(TINY.replace("normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, "
+                                  "damping = 6.0 }",
+                                  'normal = { law = "own.py:Law", stiffness = 0.3e6 }'))
+    code, _, err = cli("run", study)
+    assert code == 1
+    assert err.count("\n") == 1
+    assert "SystemExit: 0" in err or "ended the program by sys.exit(0)" in err
+    assert not (tmp_path / "results").exists()
+
+
 def test_a_run_that_fails_is_written_and_reported(cli, study, monkeypatch):
     whole = Study.run
 
@@ -396,11 +416,21 @@ def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
     assert 0.0 < part.time[-1] < 0.05
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
+    checkpoint = tmp_path / "results" / "tiny.checkpoint"
+    kept = checkpoint.read_bytes()
+    code, _, err = cli("run", study, *longer)
+    assert (code, err) == (1, f"error: {checkpoint} holds an interrupted run; go on with --resume, "
+                              f"begin anew with --overwrite, or choose another folder with -o.\n")
+    assert cli("run", study, "--resume", "--overwrite")[0] == 1
+    assert checkpoint.read_bytes() == kept
     assert cli("run", study, *longer, "--resume")[0] == 0
     resumed = read_case("results/tiny.vtkhdf").trajectory
     assert (resumed.states == whole.states).all()
     assert (resumed.friction_work == whole.friction_work).all()
-    assert not (tmp_path / "results" / "tiny.checkpoint").exists()
+    assert not checkpoint.exists()
+    checkpoint.write_bytes(kept)
+    assert cli("run", study, *longer, "--overwrite")[0] == 0
+    assert not checkpoint.exists()
 
 
 def test_help_comes_at_once_and_version_is_said():

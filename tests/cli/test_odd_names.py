@@ -49,20 +49,21 @@ def test_characters_that_the_font_lacks_are_named_once(capsys):
 
 def test_cells_of_tables_are_no_markup(capsys):
     """[s], [red] and [/b] are markup for rich, or an error."""
-    show(table("time [s]", "[red]", rows=[(CLEARS, "[/b] [i]x")]))
+    show(table("time [s]", "[red]", rows=[(CLEARS, "[/b] [i]x"), ("top [/left]", "[/]")]))
     out, err = capsys.readouterr()
     assert err == ""
-    for text in ("time [s]", "[red]", SHOWN, "[/b] [i]x"):
+    for text in ("time [s]", "[red]", SHOWN, "[/b] [i]x", "top [/left]", "[/]"):
         assert text in out
     assert "\x1b" not in out
 
 
-def test_dollars_in_labels_are_no_mathematics(tmp_path):
+@pytest.mark.parametrize("name", [r"$\frac{1}{$", "$a{$", "$a{$ $b$", r"$\mathdefault{$"])
+def test_dollars_in_labels_are_no_mathematics(name, tmp_path):
     """A fraction without its end is an error as mathematics; powers of ten remain."""
     with new_figure(3.0, 2.0, tmp_path / "odd.png") as figure:
         axes = figure.subplots()
-        axes.semilogy([1.0, 2.0], [1e-3, 1e3], label=r"$\frac{1}{$")
-        axes.set(xlabel=r"force at $\frac{1}{$ [N]")
+        axes.semilogy([1.0, 2.0], [1e-3, 1e3], label=name)
+        axes.set(xlabel=f"force at {name} [N]")
         axes.legend()
     assert (tmp_path / "odd.png").is_file()
     assert all(text.get_parse_math() for text in axes.get_yticklabels())

@@ -1,6 +1,7 @@
 """Runs that commands find by their study, and ``fecontact open``."""
 
 import os
+import re
 import time
 import webbrowser
 
@@ -9,6 +10,7 @@ from matplotlib.image import imread
 from tiny_study import TINY
 
 from fecontact.cli import viewers
+from fecontact.cli.templates import template
 
 
 @pytest.fixture
@@ -93,6 +95,25 @@ def test_runs_of_files_that_have_changed_since(cli, study, tmp_path, opened):
     assert (code, err) == (0, "")
 
 
+def test_runs_of_bodies_from_mesh_files_are_current(cli, tmp_path, monkeypatch):
+    """Meshes of several bodies are named relative to the study, not to its results."""
+    monkeypatch.chdir(tmp_path)
+    study, text = tmp_path / "s.toml", template("pad")
+    study.write_text(text)
+    assert cli("mesh", study, "-o", ".")[0] == 0
+    block, pad = re.findall(r"\.geometry\]\n(.*?)\n\n", text, re.DOTALL)
+    study.write_text(text.replace(block, 'file = "s-block.msh"').replace(
+        pad, 'file = "s-pad.msh"'))
+    run = ("run", study, "--set", "simulation.t_end=1e-4", "--set", "simulation.outputs=3")
+    assert cli(*run)[0] == 0
+    code, _, err = cli("plot", study, "energies", *run[2:])
+    assert (code, err) == (0, "")
+    (tmp_path / "s-pad.msh").write_text((tmp_path / "s-pad.msh").read_text() + "\n")
+    code, _, err = cli("plot", study, "energies", *run[2:])
+    assert code == 0
+    assert err.startswith("warning: s-pad.msh has changed since ")
+
+
 def test_plots_of_the_command_line_take_a_style(cli, study, tmp_path):
     assert cli("run", study)[0] == 0
     (tmp_path / "red.mplstyle").write_text("figure.facecolor: ff0000\n")
@@ -124,6 +145,29 @@ def test_a_run_without_frames_is_no_matter_for_paraview(cli, study, tmp_path, op
     assert "holds no fields over the body" in cli("open", "results", "--with", "paraview")[2]
     assert cli("open", "results")[0] == 0
     assert opened == [(tmp_path / "results" / "tiny.html").as_uri()]
+
+
+def test_pages_of_the_user_are_not_replaced(cli, study, tmp_path, opened):
+    """Pages of this package are."""
+    assert cli("run", study)[0] == 0
+    page = tmp_path / "results" / "tiny.html"
+    commands = [("open", study), ("open", "results"), ("report", study)]
+    for text in "<!doctype html>\n<p>mine</p>\n", "":
+        page.write_text(text)
+        for command in commands:
+            code, _, err = cli(*command)
+            assert (code, err.count("\n")) == (1, 1), command
+            assert "tiny.html exists and is no page of fecontact; move it" in err
+            assert page.read_text() == text
+    page.unlink()
+    page.symlink_to("nowhere.html")
+    assert cli("report", study)[0] == 1
+    assert page.is_symlink()
+    page.unlink()
+    for command in commands:
+        assert cli(*command)[0] == 0
+    page.write_text("mine")
+    assert cli("report", study, "-o", page)[0] == 0  # named by the user
 
 
 def test_nothing_that_may_hold_scripts_is_opened(cli, study, tmp_path, opened):

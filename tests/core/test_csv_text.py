@@ -13,7 +13,8 @@ from fecontact.sweeps.table import SweepTable, read_table
 
 FORMULAS = ["=1+1", '=HYPERLINK("http://x")', "+cmd", "-2+3", "@SUM(A1)", "\t=1", "'=1", "''@x"]
 CONTROLS = ["pad\x1b[2J\x07", "\x9b2J", r"C:\x1bfolder", r"\x5cx1b", "=\x001", "\x1b=1"]
-TEXTS = ["", "x", "a=b", "'quoted'", "a,b", 'say "no"', "-1.5", "-inf", "+3", "1e-3"]
+TEXTS = ["", "x", "a=b", "'quoted'", "a,b", 'say "no"', "a\nb", "a\r\n=b", '"\n"', "-1.5", "-inf",
+         "+3", "1e-3"]
 
 
 @pytest.mark.parametrize("text", [*FORMULAS, *CONTROLS, *TEXTS])

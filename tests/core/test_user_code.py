@@ -62,6 +62,7 @@ def test_a_file_that_no_longer_loads_leaves_the_module_that_was_loaded(tmp_path)
     (None, r"there is no file .*own\.py\.$"),
     ("def\n", r"own\.py cannot be loaded \(SyntaxError: .*\)\.$"),
     ("open('/none/data.csv')\n", r"own\.py cannot be loaded \(FileNotFoundError: .*data\.csv"),
+    ("import sys\nsys.exit(0)\n", r"own\.py cannot be loaded \(SystemExit: 0\)\.$"),
 ])
 def test_messages_are_the_same_for_all(load, text, message, tmp_path):
     if text is not None:

@@ -168,6 +168,12 @@ def test_failed_cases_have_reasons_and_do_not_stop_the_others(study, tmp_path, c
     assert len(counts()) == 1
 
 
+def test_a_summary_that_ends_the_program_is_a_failed_case(study, tmp_path):
+    table = sweep(study, {"friction.static_coefficient": [0.6, 0.8, 0.7]}, Serial(),
+                  folder=tmp_path / "f", summaries=["own.py:leaving"])
+    assert table.failed == {1: "SystemExit: 0"}
+
+
 @pytest.mark.slow
 def test_a_case_that_ends_its_process_is_found_and_the_others_go_on(study, tmp_path):
     table = sweep(study, {"friction.static_coefficient": [0.5, 0.6, 0.8, 0.7]},

@@ -74,6 +74,24 @@ def test_a_sweep_of_a_study_file(cli, tmp_path):
     assert len(read_table(folder / "index.csv")) == 24
 
 
+def test_tables_and_pages_of_the_user_are_not_replaced(cli, tmp_path):
+    study = write_study(tmp_path, SWEEP)
+    for name, message in (("index.csv", "is of no sweep; choose another folder"),
+                          ("index.html", "exists and is no page of fecontact")):
+        mine = tmp_path / "out" / name
+        mine.parent.mkdir(exist_ok=True)
+        mine.write_text("mine\n")
+        for more in (), ("--resume",):
+            code, _, err = cli("sweep", study, "--set", "simulation.t_end=0.01", "-o",
+                               mine.parent, *more)
+            assert (code, err.count("\n")) == (1, 1)
+            assert f"{name} " in err
+            assert message in err
+        assert {path.name: path.read_text() for path in mine.parent.iterdir()
+                if path.name != ".lock"} == {name: "mine\n"}
+        mine.unlink()
+
+
 def test_cases_are_printed_with_the_command_that_runs_each(cli, tmp_path):
     """The printed command runs the very case: its study has the values of the case."""
     study = write_study(tmp_path, """

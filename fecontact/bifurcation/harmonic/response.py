@@ -119,12 +119,23 @@ class FrequencyResponse(Summarised):
         """The regular or special point of largest amplitude of a branch."""
         return self.branches[level].points[int(np.argmax(self.amplitude(level)))]
 
+    def peak_reached(self, level: int = 0) -> bool:
+        """Whether the amplitude falls on both sides of the peak, which is then no end of a branch.
+
+        Closed branches have no ends.
+        """
+        branch, place = self.branches[level], int(np.argmax(self.amplitude(level)))
+        return branch.status is BranchStatus.CLOSED or 0 < place < len(branch) - 1
+
     def summary(self) -> list[tuple[str, str]]:
         """Parameter, levels, special points of each branch, and how branches ended."""
         special = [f"{point.kind} at {point.parameter:.5g}" for branch in self.branches
                    for point in branch.special]
         ends = dict.fromkeys(branch.status.name.lower() for branch in self.branches)
         ranges = np.concatenate([branch.parameter for branch in self.branches])
+        rising = [f"{value:.5g}" for level, value in enumerate(self.levels)
+                  if not self.peak_reached(level)]
+        where = f" at {listed(rising, 6)}" if self.level_name else ""
         return [("parameter", self.parameter_name), ("range", span(ranges)),
                 *([(self.level_name, listed([f"{level:.5g}" for level in self.levels], 6))]
                   if self.level_name else []),
@@ -134,6 +145,8 @@ class FrequencyResponse(Summarised):
                 *([(UNRESOLVED, UNRESOLVED_MEANING)]
                   if any(point.kind == UNRESOLVED for branch in self.branches
                          for point in branch.special) else []),
+                *([("peak", f"not reached{where}: the amplitude is largest at an end")]
+                  if rising else []),
                 ("ends", ", ".join(ends))]
 
 

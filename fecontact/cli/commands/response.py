@@ -63,6 +63,7 @@ def response(
     with located(f"{described.title}:"):
         _ = wanted.checked_bounds
     described = replace(described, response=wanted)
+    from fecontact.bifurcation.continuation.problem import BranchStatus
     from fecontact.bifurcation.responses import follow_responses, observed_point
     from fecontact.cli.branch_results import echo_unresolved
     from fecontact.cli.response_results import (
@@ -91,7 +92,12 @@ def response(
             files = write_response_results(described, found.response, observe, folder)
         show(response_table(found.response, described.usable_hz, system))
         echo_unresolved(found.response.branches)
-        for branch in found.response.branches:
+        name = found.response.level_name
+        for number, branch in enumerate(found.response.branches):
+            if branch.status is BranchStatus.POINTS:
+                where = "" if name is None else f"{name} = {found.response.levels[number]:g}: "
+                peak = "" if found.response.peak_reached(number) else " No peak is reached."
+                echo(f"note: {where}{branch.end}{peak}")
             if branch.message:
                 echo(f"note: {branch.message}")
         for note in found.notes:

@@ -33,18 +33,23 @@ def report(
     """
     from fecontact.analysis.run_facts import notes
     from fecontact.cli.orbit_files import holds_branches, write_orbit_page
-    from fecontact.cli.run_files import require_stored, stored_or_computed_run, write_report
+    from fecontact.cli.run_files import (
+        own_page,
+        require_stored,
+        stored_or_computed_run,
+        write_report,
+    )
     from fecontact.core.files.atomic_write import output_folder, require_possible
 
     require_possible(output)
     if holds_branches(file):
         require_stored(file, set_)
-        target = output or file.with_suffix(".html")
+        target = output or own_page(file)
         with output_folder(target.parent), waiting("Writing"):
             echo_written(write_orbit_page(file, target, trust))
         return 0
     stored = stored_or_computed_run(file, set_, trust)
-    target = output or stored.path.with_suffix(".html")
+    target = output or own_page(stored.path)
     with output_folder(target.parent), waiting("Writing"):
         written = write_report(stored, file.stem, target)
     for note in notes(stored.trajectory):
@@ -74,7 +79,7 @@ def open(
     """
     from fecontact.cli import viewers
     from fecontact.cli.orbit_files import holds_branches, write_orbit_page
-    from fecontact.cli.run_files import has_run, stored_run, write_report
+    from fecontact.cli.run_files import has_run, own_page, stored_run, write_report
     from fecontact.laws.registry import trusting
 
     shown, study = file, file.suffix.lower() == ".toml"
@@ -83,7 +88,7 @@ def open(
             shown = has_run(file, set_)
         viewers.require_kind_of_result(shown)
         if holds_branches(shown):
-            page = shown.with_suffix(".html")
+            page = own_page(shown)
             with waiting("Writing"):
                 write_orbit_page(shown, page, trust)
             echo_written(page)
@@ -100,7 +105,7 @@ def open(
             return
         if run:
             stored = stored_run(file if study else shown, trust, set_)
-            page = shown.with_suffix(".html")
+            page = own_page(shown)
             with waiting("Writing"):
                 write_report(stored, shown.stem, page)
             echo_written(page)

@@ -1,5 +1,6 @@
 """Commands that work on a study: ``init``, ``mesh``, ``modes``, ``run``, ``wear``."""
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -34,7 +35,7 @@ def init(
         raise InputError(f"{file} must end in .toml.")
     require_short(file.stem)
     # Resolve the path: none/../study.toml exists as soon as the folder of the new file is made.
-    if file.resolve().exists() and not force:
+    if (os.path.lexists(file) or file.resolve().exists()) and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
     write_text(file, template(shape))
     following = {"mesh": "put your mesh beside it as part.msh, or change its name there; then: "
@@ -226,6 +227,8 @@ def run(
     output: Folder = None,
     resume: Annotated[bool, Parameter(
         negative=(), help="Resume an interrupted run.")] = False,
+    overwrite: Annotated[bool, Parameter(
+        negative=(), help="Remove an interrupted run and start again.")] = False,
 ) -> int:
     """Run a study in time; write the run (NAME.vtkhdf, opens in ParaView) and plots.
 
@@ -233,7 +236,7 @@ def run(
     steady: at rest, or periodic to within 1 % over the last quarter of the run.
 
     Ctrl-C, SIGTERM and SIGHUP stop the run; the part computed so far is written, and --resume
-    continues it.
+    continues it. --overwrite begins anew.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_results_of_run
@@ -241,6 +244,9 @@ def run(
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.files.locks import locked
 
+    if resume and overwrite:
+        raise InputError("--resume goes on with an interrupted run and --overwrite removes it; "
+                         "give one of them.")
     described = read_study(study, set_)
     _ = described.t_end
     with waiting("Compiling, once after an installation"):
@@ -252,9 +258,12 @@ def run(
         with waiting("Computing modes"):
             described.system()
         checkpoint = folder / f"{described.name}.checkpoint"
-        if not resume:
+        if overwrite:
             checkpoint.unlink(missing_ok=True)
-        elif not checkpoint.exists():
+        elif checkpoint.exists() and not resume:
+            raise InputError(f"{checkpoint} holds an interrupted run; go on with --resume, begin "
+                             f"anew with --overwrite, or choose another folder with -o.")
+        elif resume and not checkpoint.exists():
             raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
                              f"exist; run the study without --resume.")
         trajectory = described.run(True, checkpoint)

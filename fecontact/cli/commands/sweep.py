@@ -59,6 +59,7 @@ def sweep(
                          f"in [sweep.axes].")
     if dask is not None and workers is not None:
         raise InputError("--workers is for processes on this machine; leave it out with --dask.")
+    from fecontact.output.report.page import require_own_page
     from fecontact.sweeps.executors import dask_executor
     from fecontact.sweeps.sweep import sweep as run_sweep
 
@@ -75,6 +76,8 @@ def sweep(
         for case in _chosen(stored, cases):
             echo(_told(stored, case) + f"\n  {stored.command(case, study, *changes)}")
         return 0
+    if not overwrite:
+        require_own_page(folder / "index.html")
     with waiting("Compiling, once after an installation"):
         pass
     with contextlib.ExitStack() as stack:

@@ -14,6 +14,7 @@ from matplotlib import RcParams, rc_context, rc_params_from_file
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
 
 from fecontact.core.checks import as_path
@@ -100,7 +101,7 @@ class StyledFigure(Figure):
         """See :meth:`matplotlib.figure.Figure.draw`."""
         # Names may contain dollars; ticks of logarithmic axes alone are mathematical text.
         for text in self.findobj(Text):
-            if isinstance(text, Text) and r"\mathdefault" not in (written := text.get_text()):
+            if isinstance(text, Text) and not _is_tick(written := text.get_text()):
                 text.set_parse_math("$" not in written)
                 if (shown := _legible(written)) != written:
                     text.set_text(shown)
@@ -118,6 +119,17 @@ class StyledFigure(Figure):
         self.savefig(drawn, format="png")
         width, height = (round(_PIXELS_PER_INCH * inches) for inches in self.get_size_inches())
         return drawn.getvalue(), {"width": width, "height": height}
+
+
+def _is_tick(text: str) -> bool:
+    """True for mathematical text of ticks, False for names that only look like it."""
+    if r"\mathdefault" not in text:
+        return False
+    try:
+        MathTextParser("path").parse(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _legible(text: str) -> str:

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import os
 import re
 import warnings
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from fecontact.core.errors import ModelWarning
+from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.files.atomic_write import write_text
 from fecontact.output.report.payload import as_text
 from fecontact.output.report.shorten import shortened
@@ -80,6 +81,21 @@ def write_page(path: Path, title: str, block: bytes, kind: Kind = "run") -> Path
                       stacklevel=3)
     write_text(path, text)
     return path
+
+
+def require_own_page(path: Path) -> None:
+    """Raise InputError if a path exists and is no page of this package, which may be replaced."""
+    if not os.path.lexists(path) or path.is_dir():
+        return
+    begin = _PAGE.partition("{seal}")[0].encode()
+    try:
+        with path.open("rb") as file:
+            own = file.read(len(begin)) == begin
+    except OSError:
+        own = False
+    if not own:
+        raise InputError(f"{path} exists and is no page of fecontact; move it, or choose another "
+                         f"name by fecontact report -o NAME.html.")
 
 
 def _asset(name: str) -> str:
