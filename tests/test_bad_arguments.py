@@ -867,6 +867,8 @@ def test_sizes_are_held_against_memory_before_anything_is_made(names, monkeypatc
         bifurcation.HarmonicBalance(10**5)
     with pytest.raises(InputError, match=r"number of times = 4000001 would .* or fewer runs"):
         strobe([oscillator] * 10, transient_periods=3, keep=4 * 10**6)
+    with pytest.raises(InputError, match="padding = 1000000 would"):
+        fecontact.analysis.amplitude_spectrum(np.arange(101.0), np.ones(101), padding=10**6)
     with pytest.raises(InputError, match="keep = 1000000 would"):
         bifurcation.poincare_scan(oscillator, "ground.speed", np.linspace(0.1, 0.2, 100),
                                   transient_periods=3, keep=10**6)

@@ -9,6 +9,7 @@ from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.magnitude import magnitude
 from fecontact.core.read_only import read_only_arrays
+from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike
 
 _EVEN = 1e-6  # largest deviation of times from even spacing, relative to the spacing
@@ -173,6 +174,8 @@ def amplitude_spectrum(
                          f"zero.")
     n, step = len(x), float(t[1] - t[0])
     weights = get_window(window, n)
+    # The padded values, their transform, amplitudes and frequencies.
+    require_memory("amplitude_spectrum: padding", padding, 32.0 * n)
     transform = np.fft.rfft(weights * (x - x.mean()), padding * n)
     amplitude = np.asarray(2.0 / weights.sum() * np.abs(transform), dtype=np.float64)
     # Zero and the Nyquist frequency have no counterpart at negative frequencies.
