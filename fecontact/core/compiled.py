@@ -9,6 +9,7 @@ import dis
 import hashlib
 import inspect
 import re
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
 
 from fecontact.core.addresses import contract_signature
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.kernel_parts import BorrowingCompiler, kernel_compiler, part
 from fecontact.core.records import is_record, signature_of
 
@@ -159,8 +160,16 @@ def _remove(path: str) -> None:
         Path(path).unlink()
 
 
-def _stamp(compiled: Any, function: Any, module: str = "", variant: str = "") -> None:
-    """Key stored code by the sources it is made from, and by the module name it refers to."""
+def _keep_on_disk(compiled: Any, function: Any, module: str = "", variant: str = "") -> None:
+    """Store code in a file, keyed by the sources it is made from and the module it refers to.
+
+    Where no file can be written, the code is compiled in memory, and a warning says so once.
+    """
+    try:
+        compiled.enable_caching()
+    except RuntimeError:  # numba's, for a source whose code has no folder
+        _warn_of_compilation()
+        return
     stored: Any = getattr(compiled, "_cache", None)
     if isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
         mark = f".{hashlib.sha256(variant.encode()).hexdigest()[:16]}" if variant else ""
@@ -168,6 +177,14 @@ def _stamp(compiled: Any, function: Any, module: str = "", variant: str = "") ->
         name = re.sub(r"-\d+(?=\.py)", "", stored._impl.filename_base)
         stored._cache_file = _StoredCode(stored.cache_path, name + mark,
                                          (source_digest(function), module))
+
+
+@cache
+def _warn_of_compilation() -> None:
+    """Warn that compiled code is lost with the process; repeated calls do nothing."""
+    warnings.warn("Compiled code cannot be stored, so that every process compiles it anew, which "
+                  "takes minutes; name a writable folder in the environment variable "
+                  "NUMBA_CACHE_DIR.", ModelWarning, stacklevel=4)
 
 
 class _Kernel(CPUDispatcher):
@@ -280,8 +297,7 @@ def kernel(
     kind = _RecordKernel if any(map(is_record, function.__annotations__.values())) else _Kernel
     made = kind(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
     made.given, made.by_address, made.options = signature, by_address, options
-    made.enable_caching()
-    _stamp(made, made, variant=constants)
+    _keep_on_disk(made, made, variant=constants)
     KERNELS.append(made)
     return made
 
@@ -348,8 +364,7 @@ class CompiledLaw:
                     {"error_model": "numpy"}, BorrowingCompiler)
         # Functions typed into a console have no file beside which they could be stored.
         if Path(inspect.getfile(function)).is_file():
-            law.enable_caching()
-            _stamp(law, function, function.__module__)
+            _keep_on_disk(law, function, function.__module__)
         try:
             law.compile()
         except (NumbaError, TypeError) as error:

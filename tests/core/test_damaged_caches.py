@@ -46,12 +46,16 @@ for folder in sys.argv[1:]:
 """
 
 
+def without_folder_of_numba():
+    """The environment of a process that stores code beside its source."""
+    return {name: value for name, value in os.environ.items()
+            if name not in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES")}
+
+
 def hits(*folders):
     """What a new process says that imports the module of each folder: whether it was on disk."""
-    # Stored code lies beside its source.
-    given = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     done = subprocess.run([sys.executable, "-c", IMPORTS, *map(str, folders)], check=False,
-                          capture_output=True, text=True, env=given)
+                          capture_output=True, text=True, env=without_folder_of_numba())
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     said = [line.split() for line in done.stdout.splitlines()]
@@ -192,3 +196,39 @@ def test_intrinsics_count_with_their_whole_file():
         compiled._own_digest.cache_clear()
         assert compiled.source_digest(vectors.read) != digest
     compiled._own_digest.cache_clear()
+
+
+NOWHERE = """
+import sys, warnings
+from numba.core.caching import CacheImpl
+CacheImpl._locator_classes = []  # as in folders without rights and without a home
+warnings.simplefilter("always")
+"""
+OWN_KERNELS = """
+sys.path[0] = sys.argv[1]
+import own_kernels
+"""
+ONE_MASS = """
+import numpy as np
+from fecontact import ContactSystem, basis_from_matrices, simulate
+from fecontact.integrate import Scipy
+from fecontact.laws import ConstantFriction, LinearContact
+rows = np.array([[0.0], [1.0], [0.0]])
+modes = basis_from_matrices([[1.0]], [[1e4]], {"contact": rows[None], "C": rows})
+mass = ContactSystem(modes, LinearContact(1e5), ConstantFriction(0.5))
+print(simulate(mass, 0.01, outputs=3, solver=Scipy()).status.name)
+"""
+
+
+@pytest.mark.parametrize(("code", "output"), [
+    (OWN_KERNELS, "0 0"), pytest.param(ONE_MASS, "FINISHED", marks=pytest.mark.long)])
+def test_code_is_compiled_in_memory_where_no_folder_can_store_it(tmp_path, code, output):
+    (tmp_path / "own_kernels.py").write_text(MODULE)
+    done = subprocess.run([sys.executable, "-c", NOWHERE + code, tmp_path], check=False,
+                          capture_output=True, text=True, env=without_folder_of_numba())
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split("\n") == [output, ""]
+    assert done.stderr.count("Warning") == 1
+    assert "ModelWarning: Compiled code cannot be stored" in done.stderr
+    assert "environment variable NUMBA_CACHE_DIR" in done.stderr
+    assert not list(tmp_path.rglob("*.nb?"))
