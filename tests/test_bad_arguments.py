@@ -4,6 +4,7 @@ Each is refused by one of the package's errors, in one sentence, and leaves noth
 """
 
 import gzip
+import os
 import shutil
 from pathlib import Path
 
@@ -748,6 +749,17 @@ SetValued(static_coefficient=True)
 Rodas5P(keep_checkpoint=3)
 simulate(osc,1,solver=Rodas5P(checkpoint="/dev/zero"))
 HeightMap(file="/dev/zero")
+BasisSettings(modes="a")
+BasisSettings(modes=None)
+BasisSettings(modes=5,points=None)
+SimulationSettings(t_end="a")
+SimulationSettings(t_end=1.0,t_start=None)
+SimulationSettings(t_end=1.0,outputs="a")
+WearSettings(periods=[1])
+WearSettings(blocks=None)
+OutputSettings(frames=None)
+OutputSettings(frames=1j)
+RenderSettings(frames="a")
 read_table("/dev/zero")
 basis_from_matrices(np.eye(2),np.eye(2),None)
 basis_from_matrices(np.eye(2),[[2.0,1.0],[0.0,2.0]],{"contact":np.zeros((1,3,2))})
@@ -850,6 +862,16 @@ def test_folders_and_missing_files(name, tmp_path):
     assert_refused(lambda: READERS[name](tmp_path / name))
     (tmp_path / name).mkdir()
     assert_refused(lambda: READERS[name](tmp_path / name))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names")
+def test_a_checkpoint_that_is_a_pipe_is_not_opened(names, tmp_path):
+    """Reading it would wait for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    solver = fecontact.integrate.Rodas5P(checkpoint=tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe cannot be read as a checkpoint: it is a pipe or"):
+        fecontact.simulate(names["osc"], 1.0, solver=solver)
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 
 def test_sizes_are_held_against_memory_before_anything_is_made(names, monkeypatch):

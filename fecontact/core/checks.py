@@ -37,7 +37,9 @@ def require_kind(owner: str, kind: type | tuple[type, ...], **values: Any) -> No
 
 
 _NAMES: dict[Any, str] = {Mapping: "a mapping of names", Sequence: "a sequence", str: "a text",
-                          int: "a whole number", Callable: "a function", bool: "true or false"}
+                          int: "a whole number", Integral: "a whole number",
+                          Real: "a number", type(None): "None", Callable: "a function",
+                          bool: "true or false"}
 
 
 def require_flags(owner: str, **values: Any) -> None:

@@ -4,14 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices, require_positive
+from fecontact.core.errors import LARGEST, InputError, choices, require_positive
 from fecontact.core.units import listed
 
 
 def frozen_arrays(basis: Any) -> None:
     """Replace the arrays of a basis by copies of floats that nobody can write to.
 
-    InputError for values that are not finite.
+    InputError for values that are not finite, frequencies below zero, and values beyond 1e60, whose
+    squares overflow.
     """
     names = ["angular_frequencies", "damping", "T", "positions", "tributary", "boundary_rows"]
     names += [name for name in ("inertia_rows", "stiffness", "contact_normals", "link_load")
@@ -20,6 +21,11 @@ def frozen_arrays(basis: Any) -> None:
         array = np.array(getattr(basis, name), dtype=float, order="C")
         if not np.isfinite(array).all():
             raise InputError(f"Modal basis: {name} holds values that are not finite.")
+        least = 0.0 if name == "angular_frequencies" else -LARGEST
+        if ((array < least) | (array > LARGEST)).any():
+            worst = array.max() if array.max() > LARGEST else array.min()
+            raise InputError(f"Modal basis: {name} holds {worst:g}; every value must be a number "
+                             f"from {least:g} to {LARGEST:g}.")
         array.setflags(write=False)
         object.__setattr__(basis, name, array)
 

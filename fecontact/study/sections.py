@@ -3,9 +3,10 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from numbers import Integral, Real
 from typing import Annotated, Any, Literal
 
-from fecontact.core.checks import require_frame_rate, require_scale, whole_number
+from fecontact.core.checks import require_frame_rate, require_kind, require_scale, whole_number
 from fecontact.core.errors import (
     InputError,
     choices,
@@ -172,6 +173,8 @@ class BasisSettings:
     eigensolver: Literal["auto", "direct", "iterative"] = "auto"
 
     def __post_init__(self) -> None:
+        require_kind("BasisSettings", Integral, modes=self.modes)
+        require_kind("BasisSettings", Mapping, points=self.points)
         if self.modes < 1:
             raise InputError(f"BasisSettings: modes = {self.modes} must be at least 1.")
         given = self.contact_nodes
@@ -275,6 +278,9 @@ class SimulationSettings:
     initial: Literal["rest", "sliding", "preload"] | RigidStart | PointStart = "rest"
 
     def __post_init__(self) -> None:
+        require_kind("SimulationSettings", Real, t_start=self.t_start)
+        require_kind("SimulationSettings", (Real, type(None)), t_end=self.t_end)
+        require_kind("SimulationSettings", Integral, outputs=self.outputs)
         if not math.isfinite(self.t_start):
             raise InputError(f"SimulationSettings: t_start = {self.t_start!r} must be finite.")
         if self.t_end is not None and not self.t_start < self.t_end < math.inf:
@@ -340,6 +346,7 @@ class WearSettings:
     def __post_init__(self) -> None:
         require_positive("WearSettings", acceleration=self.acceleration)
         for name, least in (("blocks", 1), ("periods", 1), ("settling", 0), ("outputs", 2)):
+            require_kind("WearSettings", Integral, **{name: getattr(self, name)})
             if (count := getattr(self, name)) < least:
                 raise InputError(f"WearSettings: {name} = {count} must be at least {least}.")
         if self.period is not None:
@@ -375,6 +382,7 @@ class OutputSettings:
     points: tuple[str | int, ...] = ()
 
     def __post_init__(self) -> None:
+        require_kind("OutputSettings", Integral, frames=self.frames)
         if self.frames < 0:
             raise InputError(f"OutputSettings: frames = {self.frames} must be zero or above.")
 
@@ -414,6 +422,7 @@ class RenderSettings:
     view: Literal["above", "below"] = "above"
 
     def __post_init__(self) -> None:
+        require_kind("RenderSettings", Integral, frames=self.frames)
         if self.frames < 1:
             raise InputError(f"RenderSettings: frames = {self.frames} must be at least 1.")
         require_frame_rate("RenderSettings", self.fps)

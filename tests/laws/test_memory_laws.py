@@ -345,6 +345,8 @@ def test_scales_are_those_of_the_pre_sliding_deflection():
     (JenkinsFriction, {"friction_coefficient": -1.0}, "friction_coefficient"),
     (IwanFriction, {"elements": 0}, "IwanFriction: elements = 0 must be a whole number"),
     (IwanFriction, {"elements": 2.5}, "elements = 2.5 must be a whole number"),
+    (IwanFriction, {"elements": 1e9}, "elements = 1000000000.0 must be .* from 1 to 10000"),
+    (FourParameterIwanFriction, {"elements": 10**9}, "must be a whole number from 1 to 10000"),
     (IwanFriction, {"elements": (2, 3)}, "elements"),
     (IwanFriction, {"elements": "many"}, "elements = 'many' must be a number"),
     (FourParameterIwanFriction, {"chi": -1.0}, "chi = -1.0 must be above -1 and at most 0"),

@@ -1,21 +1,42 @@
 """Files of results that were cut, changed or made up: one sentence each, and nothing else."""
 
 import json
+import warnings
+from contextlib import suppress
+from dataclasses import replace
+from itertools import product
 
 import h5py
 import numpy as np
 import pytest
+import response_study
 from sweep_study import Serial, write_study
 from synthetic import basis, run
 
 from fecontact import InputError, read_case, sweep, write_case
-from fecontact.bifurcation import Branch, BranchPoint, BranchStatus
+from fecontact.bifurcation import (
+    Branch,
+    BranchPoint,
+    BranchStatus,
+    HarmonicBalance,
+    frequency_response,
+)
 from fecontact.bifurcation.continuation.points import details_of
+from fecontact.cli import execute
 from fecontact.core.files import hdf5_check
 from fecontact.core.files.hdf5_check import append_checksum
 from fecontact.core.files.stored import DamagedError, npz_arrays
 from fecontact.integrate import Events
-from fecontact.io import read_basis, read_branches, read_table, write_basis, write_branches
+from fecontact.io import (
+    read_basis,
+    read_branches,
+    read_response,
+    read_table,
+    report,
+    write_basis,
+    write_branches,
+    write_response,
+)
 from fecontact.study import Span
 
 
@@ -362,3 +383,143 @@ def test_arrays_that_a_file_does_not_hold(tmp_path):
     assert found["x"].shape == (2000, 500)
     assert np.array_equal(found["y"], np.arange(6.0).reshape(2, 3))
     assert found["z"] == 3
+
+
+@pytest.fixture(scope="module")
+def response(tmp_path_factory):
+    """A small response, whose orbits are Fourier coefficients, with the study that it is of."""
+    described = response_study.study()
+    found = frequency_response(described.system(), (50.0, 55.0),
+                               method=HarmonicBalance(3, 32))
+    return write_response(tmp_path_factory.mktemp("response") / "response.h5", found,
+                          system=described.system(), study=response_study.STUDY)
+
+
+def without(group, name):
+    """A change of a file: an attribute or dataset that it lacks."""
+    def change(file):
+        del file[group][name]
+    return change
+
+
+def filled(name, value):
+    """A change of a file: one value everywhere in a dataset."""
+    return lambda file: other(name, np.full(file[name].shape, value))(file)
+
+
+ATTRIBUTES, VALUES = "branches/0/attributes", "branches/0/values"
+
+
+@pytest.mark.parametrize("change", [
+    *(without(ATTRIBUTES, name) for name in (
+        "displacements", "harmonics", "level_name", "memory", "memory_nodes", "observed", "periods",
+        "state_names")),
+    *(without(VALUES, name) for name in (
+        "memory", "observed_amplitude", "period", "truncation_error")),
+    *(filled(f"{ATTRIBUTES}/{name}", 2**40) for name in ("displacements", "memory", "periods")),
+    other(f"{ATTRIBUTES}/level", "high"), other(f"{ATTRIBUTES}/level", np.ones(2)),
+    other(f"{ATTRIBUTES}/level", 1j), other(f"{ATTRIBUTES}/observed", 3.0),
+    other(f"{ATTRIBUTES}/state_names", "qqqqq"), other(f"{ATTRIBUTES}/state_names", ["q1"]),
+    other(f"{ATTRIBUTES}/scales", 1.0), other(f"{ATTRIBUTES}/harmonics", -1),
+    *(filled(f"{VALUES}/observed_amplitude", value) for value in (np.nan, np.inf)),
+    filled(f"{VALUES}/unstable", np.nan), filled("branches/0/u", np.nan),
+    filled("branches/0/u", 1e300), filled("branches/0/tangent", -np.inf),
+])
+def test_a_damaged_response_is_one_sentence(response, change, tmp_path):
+    path = tmp_path / "damaged.h5"
+    path.write_bytes(response.read_bytes())
+    with h5py.File(path, "a") as file:
+        change(file)
+    append_checksum(path)
+    with pytest.raises(InputError) as caught:
+        read_response(path)
+    assert str(caught.value).startswith(f"{path} is damaged")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("name", "value"), [
+    *product(("nodes", "shapes", "restriction/data"), (np.nan, np.inf, 1e300)),
+    ("stress", np.nan), ("stress", 1e300)])
+def test_shapes_that_cannot_be_drawn_are_refused(case, name, value, tmp_path):
+    path = tmp_path / "damaged.vtkhdf"
+    path.write_bytes(case.read_bytes())
+    with h5py.File(path, "a") as file:
+        filled(f"basis/mode_shapes/{name}", value)(file)
+    append_checksum(path)
+    with pytest.raises(InputError, match=f"{name}' holds values that are not finite or beyond 1e"):
+        read_case(path)
+
+
+def test_reports_end_where_work_is_not_finite(case, tmp_path):
+    """As where the state is not: loads beyond all make such runs, files are damaged to them."""
+    found = read_case(case).trajectory
+    work = found.work.copy()
+    work[4:] = np.nan
+    report(replace(found, work=work), tmp_path / "a.html")
+    work[1:] = np.inf
+    with pytest.raises(InputError, match="has no motion to report"):
+        report(replace(found, work=work), tmp_path / "b.html")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
+
+
+def parts_of(path):
+    """Datasets of a file, and attributes of its groups, by path; attributes behind a bar."""
+    found = {}
+    with h5py.File(path) as file:
+        def see(name, item):
+            found.update({f"{name}|{key}": value for key, value in item.attrs.items()})
+            if isinstance(item, h5py.Dataset):
+                found[name] = item[()]
+        file.visititems(see)
+    return found
+
+
+def worse(value):
+    """Values of other kinds, shapes and sizes in the place of one."""
+    array = np.asarray(value)
+    kinds = ["x" * 60_000, "", "a\nb\x1b[1m", 3.0, 1j, np.nan, np.zeros((1, 1, 1, 1)),
+             np.array([1.0, np.inf]), h5py.Empty("f8"), np.void(b"abc"), np.bytes_(b"\xff"), None]
+    if array.dtype.kind in "fiub" and array.size:
+        kinds += [np.full(array.shape, number) for number in (np.nan, np.inf, -1.0, 0.0, 1e300)]
+        kinds += [np.full(array.shape, number) for number in (0, -3, 2**40)]
+    if array.ndim:
+        kinds += [array[:-1], np.concatenate([array, array[:1]]), array[::-1].copy()]
+    return kinds
+
+
+@pytest.mark.parametrize("kind", ["case", "response", "basis"])
+def test_files_changed_anywhere_are_read_or_refused(kind, request, tmp_path, capsys):
+    """A sample of all values in a file; what is read is reported, or refused, too."""
+    path, whole = tmp_path / "changed.h5", tmp_path / "whole.h5"
+    if kind == "basis":
+        write_basis(whole, run(basis(contact_nodes=3), times=3).system.basis)
+    else:
+        whole.write_bytes(request.getfixturevalue(kind).read_bytes())
+    changes = [(name, value) for name, old in parts_of(whole).items()
+               if not name.startswith(("VTKHDF", "versions")) for value in worse(old)]
+    chance = np.random.default_rng(7)
+    read = {"case": read_case, "response": read_response, "basis": read_basis}[kind]
+    for index in chance.permutation(len(changes))[:150]:
+        name, value = changes[index]
+        path.write_bytes(whole.read_bytes())
+        with h5py.File(path, "a") as file:
+            place, _, attribute_name = name.partition("|")
+            members = file[place].attrs if attribute_name else file
+            del members[attribute_name or place]
+            with suppress(TypeError, ValueError, OSError):  # values that no file can hold
+                if value is not None:
+                    members[attribute_name or place] = value
+        append_checksum(path)
+        try:
+            read(path)
+        except InputError as error:
+            said = str(error)
+        else:
+            said = ""
+        assert "\n" not in said, (name, value)
+        assert len(said) < 700, (name, value)
+        if not said and kind == "response" and "basis" not in name:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                execute(["report", str(path), "-o", str(tmp_path / "a.html")])
+            assert "should not happen" not in capsys.readouterr().err, (name, value)

@@ -326,3 +326,25 @@ def test_rigid_stops_beside_a_nonlinear_spring_are_refused():
     with pytest.raises(fc.InputError, match="nonlinear springs, 'mount'; leave restitution out"):
         fc.simulate(system, 1.0, solver=SetValued(restitution=0.5),
                     initial=released(system, 0.1))
+
+
+@pytest.mark.parametrize(("stiffness", "cubic", "preload"), [
+    (-50.0, 0.0, 0.0), (-50.0, 0.0, 3.0), (-50.0, -3e4, 0.0), (50.0, -3e4, 20.0)])
+def test_springs_without_a_place_of_rest(stiffness, cubic, preload):
+    """Equilibrium ends in a sentence, a run with a status."""
+    system = oscillator(CubicSpring("a.p", None, stiffness, cubic, 0.0, UP, preload))
+    with pytest.raises(fc.AnalysisError, match="force of the spring mount falls with its elong"):
+        fc.static_equilibrium(system)
+    assert complex_modes(system).summary()
+    run = fc.simulate(system, 100.0, initial=released(system, 0.1), outputs=3)
+    assert run.status in (
+        fc.Status.MINIMUM_STEP, fc.Status.NOT_FINITE, fc.Status.ENERGY_NOT_FINITE)
+
+
+@pytest.mark.parametrize("preload", [0.0, 0.1])
+def test_a_softening_spring_rests_beside_zero_elongation(preload):
+    """At the root of N = 0 at which the spring still holds."""
+    system = oscillator(CubicSpring("a.p", None, 50.0, -3e4, 0.0, UP, preload))
+    rest = abs(height(system, fc.static_equilibrium(system)))
+    assert 50.0 * rest - 3e4 * rest**3 == pytest.approx(preload, abs=1e-9)
+    assert 3.0 * 3e4 * rest**2 < 50.0

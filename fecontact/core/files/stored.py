@@ -99,6 +99,15 @@ def array(group: Any, name: str, shape: Shape, kind: str = "f") -> NDArray[Any]:
     return np.asarray(values(data), dtype=dtype)
 
 
+def bounded(group: Any, name: str, shape: Shape, largest: float = 1e60) -> NDArray[np.float64]:
+    """Floats of a dataset, as :func:`array`; DamagedError for NaN and values beyond ``largest``."""
+    found = array(group, name, shape)
+    if not (np.abs(found) <= largest).all():
+        raise DamagedError(f"'{member(group, name).name}' holds values that are not finite or "
+                           f"beyond {largest:g}")
+    return found
+
+
 def indices(group: Any, name: str, shape: Shape, end: int) -> NDArray[np.int64]:
     """As :func:`array` of integers, each from 0 to below ``end``."""
     found = array(group, name, shape, "i")

@@ -6,13 +6,15 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.errors import InputError, require_positive, shown
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NotNegative, Positive
 from fecontact.laws.friction.base import LimitedFriction
 from fecontact.laws.friction.planar import clear
 from fecontact.laws.signatures import memory_friction_law, planar_friction_law
+
+_MOST_ELEMENTS = 10_000  # of which each contact node has one internal variable
 
 # Time [s] within which elements return to their limits in equations that are solved as a whole.
 RETURN_TIME = 1e-7
@@ -229,7 +231,7 @@ class IwanFriction(_MaxwellSlip):
     Parameters
     ----------
     elements : int
-        N, one or above: internal variables of each node.
+        N, from 1 to 10,000: internal variables of each node.
 
     References
     ----------
@@ -287,7 +289,7 @@ class FourParameterIwanFriction(_MaxwellSlip):
     beta : float
         Ratio of stiffnesses of the delta and of the power law, zero or above.
     elements : int
-        N, one or above: internal variables of each node, with one more for beta > 0.
+        N, from 1 to 10,000: internal variables of each node, with one more for beta > 0.
     spacing_ratio : float
         Width of an interval over that of the one before, one or above.
 
@@ -363,7 +365,8 @@ class FourParameterIwanFriction(_MaxwellSlip):
 
 
 def _whole(law: str, elements: int) -> int:
-    """The number of elements; InputError if it is not a whole number above zero."""
-    if np.ndim(elements) or elements != int(elements) or elements < 1:
-        raise InputError(f"{law}: elements = {elements!r} must be a whole number, one or above.")
+    """The number of elements; InputError if it is not a whole number from 1 to the largest."""
+    if np.ndim(elements) or not 1 <= elements <= _MOST_ELEMENTS or elements != int(elements):
+        raise InputError(f"{law}: elements = {shown(elements)} must be a whole number from 1 to "
+                         f"{_MOST_ELEMENTS}.")
     return int(elements)

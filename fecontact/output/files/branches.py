@@ -1,5 +1,6 @@
 """Branches in HDF5 files."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,14 +9,15 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.points import details_of, special_point
+from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, response_of
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode, mode_of
 from fecontact.bifurcation.nonlinear_modes.resonance_curve import ResonanceCurve, resonances_of
 from fecontact.core.checks import as_path, require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, shown
 from fecontact.core.files.stored import (
     DamagedError,
-    array,
+    bounded,
     member,
     reading,
     require_lengths,
@@ -23,6 +25,7 @@ from fecontact.core.files.stored import (
     texts,
     values,
 )
+from fecontact.core.types import Array
 from fecontact.output.files.hdf5 import new_file, open_file
 from fecontact.output.files.stored_system import store_model
 from fecontact.system.contact_system import ContactSystem
@@ -232,8 +235,75 @@ def _stored(group: Any, path: str | Path) -> Branch:
                           kinds[k] or None, details.get(k, {})) for k in range(count))
         attributes = {name: _value(item)
                       for name, item in _members(group, "attributes").items()}
+        _require_kinds(attributes)
+        _require_orbits(attributes, u, stored)
         return Branch(text(group, "parameter"), points, BranchStatus[text(group, "status")],
                       text(group, "message"), attributes)
+
+
+# Attributes of branches by what they are.
+_COUNTS = ("degree", "displacements", "harmonics", "memory", "memory_nodes", "mode_number",
+           "periods", "samples")
+_LAYOUT = ("displacements", "harmonics", "memory", "memory_nodes", "state_names")
+_NUMBERS = ("level",)
+_TEXTS = ("condition", "kind", "level_label", "level_name", "observed", "stability")
+_LISTS = ("labels", "parameter_names", "parameters", "state_names")
+_ARRAYS = ("limits", "parameter_values", "scales", "widths")
+
+
+def _require_kinds(attributes: dict[str, Any]) -> None:
+    """Raise DamagedError for attributes of another kind."""
+    for name, value in attributes.items():
+        if name in _COUNTS:
+            sound = isinstance(value, int) and value >= 0
+        elif name in _NUMBERS:
+            sound = isinstance(value, int | float) and not math.isinf(value)  # NaN without a level
+        elif name in _TEXTS:
+            sound = isinstance(value, str)
+        elif name in _LISTS:
+            sound = (all(isinstance(one, str) for one in value) if isinstance(value, list)
+                     else isinstance(value, np.ndarray) and not value.size)
+        elif name in _ARRAYS:
+            sound = isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "fiu"
+        else:
+            sound = True
+        if not sound:
+            raise DamagedError(f"the attribute '{name}' is {shown(value)}")
+
+
+def _require_orbits(attributes: dict[str, Any], u: list[Array], stored: dict[str, Any]) -> None:
+    """Raise DamagedError where responses and orbits by harmonic balance lack a part, or disagree.
+
+    ``u`` are the unknowns of the points, ``stored`` their values by name.
+    """
+    balanced, response = not attributes.keys().isdisjoint(_LAYOUT[:2]), "level" in attributes
+    needed = (_LAYOUT if balanced else ()) + (
+        ("level_name", "observed", "periods") if response else ())
+    values = (("period", "truncation_error") if balanced else ()) + (
+        ("observed_amplitude", "period") if response else ())
+    for name, one in stored.items():
+        if name == "period" or name.startswith("observed_"):
+            if not np.isfinite(one).all():
+                raise DamagedError(f"'values/{name}' holds values that are not finite")
+        elif name == "unstable" and not all(isinstance(each, int) for each in one):
+            raise DamagedError("'values/unstable' holds no whole numbers")
+    missing = [*(name for name in needed if name not in attributes),
+               *(name for name in values if u and name not in stored)]
+    if missing:
+        raise DamagedError(f"it lacks '{missing[0]}'")
+    if response and any(not 0 < attributes["periods"] < len(each)
+                        for each in stored.get("observed_harmonics", [])):
+        raise DamagedError(f"the attribute 'periods' is {attributes['periods']}")
+    if not balanced:
+        return
+    layout = layout_from(attributes)
+    count = (2 * attributes["harmonics"] + 1) * layout.harmonic
+    if not (2 * layout.displacements + layout.memory <= layout.states and layout.nodes <= (
+            layout.memory) and all(count < len(each) for each in u)):
+        raise DamagedError(f"{layout.states} states do not fit its displacements and harmonics")
+    if layout.memory and u and any(np.shape(each)[1:] != (layout.memory,)
+                                   for each in stored.get("memory", [()])):
+        raise DamagedError(f"'values/memory' has no {layout.memory} internal variables")
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:
@@ -249,8 +319,8 @@ def _write(group: Any, name: str, values: list[Any]) -> None:
 def _vectors(group: Any, name: str, count: int) -> list[Any]:
     """Vectors written by :func:`_write`."""
     if hasattr(member(group, name), "shape"):
-        return [*array(group, name, (count, None) if count else (0,))]
-    return [array(group, f"{name}/{index}", (None,)) for index in range(count)]
+        return [*bounded(group, name, (count, None) if count else (0,), 1e100)]
+    return [bounded(group, f"{name}/{index}", (None,), 1e100) for index in range(count)]
 
 
 def _members(group: Any, name: str) -> Any:

@@ -15,6 +15,7 @@ from fecontact.core.files.hdf5_check import append_checksum, open_hdf5
 from fecontact.core.files.stored import (
     DamagedError,
     array,
+    bounded,
     indices,
     member,
     reading,
@@ -252,7 +253,7 @@ def _read_mode_shapes(group: Any, modes: int, T: Array) -> ModeShapes:
     import scipy.sparse as sp
 
     d = 2 if T.shape[1] == 3 else 3
-    nodes = array(group, "nodes", (None, d))
+    nodes = bounded(group, "nodes", (None, d))
     N = len(nodes)
     cells = indices(group, "cells", (None, None), N)
     if cells.shape[1] not in (d + 1, 2**d):
@@ -264,7 +265,7 @@ def _read_mode_shapes(group: Any, modes: int, T: Array) -> ModeShapes:
                            f"{(T.shape[0] * T.shape[1], d * N)}")
     rows = array(stored, "indptr", (shape[0] + 1,), "i")
     columns = array(stored, "indices", (None,), "i")
-    restriction = sp.csr_array((array(stored, "data", (len(columns),)), columns, rows),
+    restriction = sp.csr_array((bounded(stored, "data", (len(columns),)), columns, rows),
                                shape=shape)
     outline = indices(group, "outline", (None, None), N)
     if outline.shape[1] not in ((2,) if d == 2 else (3, 4)):
@@ -274,8 +275,8 @@ def _read_mode_shapes(group: Any, modes: int, T: Array) -> ModeShapes:
         nodes_of = array(group, "outline_nodes", (len(outline),), "i")
         if nodes_of.size and not -1 <= nodes_of.min() <= nodes_of.max() < len(T) - 2:
             raise DamagedError("'outline_nodes' names contact nodes that are not there")
-    return ModeShapes(nodes, cells, outline, array(group, "shapes", (N, d, modes)),
-                      array(group, "stress", (N, 4 if d == 2 else 6, modes)),
+    return ModeShapes(nodes, cells, outline, bounded(group, "shapes", (N, d, modes)),
+                      bounded(group, "stress", (N, 4 if d == 2 else 6, modes), 1e100),
                       sound_sparse(restriction), _elements(group, N, d), nodes_of)
 
 
@@ -292,8 +293,8 @@ def _elements(group: Any, nodes: int, dimension: int) -> Any:
 
 def _read_rotation(group: Any, modes: int) -> ModalRotation:
     return ModalRotation(
-        float(values(member(group, "speed")).item()), array(group, "coriolis", (modes, modes)),
-        array(group, "stiffening", (modes, modes)), array(group, "load", (modes,)))
+        float(values(member(group, "speed")).item()), bounded(group, "coriolis", (modes, modes)),
+        bounded(group, "stiffening", (modes, modes)), bounded(group, "load", (modes,)))
 
 
 def _read_quality(

@@ -205,7 +205,7 @@ def _text(value: Any) -> str:
 
 def _finite(run: Trajectory) -> Trajectory:
     """The run up to its last output time that can be drawn."""
-    bad = np.flatnonzero(~drawable(run))
+    bad = np.flatnonzero(~(drawable(run) & np.isfinite(run.work).all(axis=1)))
     if not len(bad):
         return run
     end = int(bad[0])

@@ -40,11 +40,14 @@ class Balance:
         self._initial = np.abs(arrays.rows[:, 1]).T @ np.where(
             arrays.on_ground, 0.0, np.abs(undisplaced[:, kernels.NORMAL_FORCE]))
         self.scale = np.abs(np.diag(arrays.stiffness)) + np.einsum(
-            "jai,jai,j->i", arrays.rows, arrays.rows, self.face_stiffness)
+            "jai,jai,j->i", arrays.rows, arrays.rows, np.abs(self.face_stiffness))
         self.scale[self.scale == 0.0] = 1.0
 
     def _penetration(self, scale: float) -> float:
-        """Uniform penetration under which the face carries the load, at most 1e6 scales."""
+        """Uniform penetration under which the face carries the load, at most 1e6 scales.
+
+        It is ``scale`` for laws whose force falls with penetration, which never carry the load.
+        """
         # Work of the load in a unit mean rise of the contact nodes.
         rise = self.arrays.rows[:, 1].sum(axis=0) / max(len(self.arrays.rows), 1)
         wanted = abs(float(self.load @ rise)) / max(float(rise @ rise), 1e-300)
@@ -52,7 +55,8 @@ class Balance:
         while depth < 1e6 * scale and self.normal(np.full(len(self.arrays.gap), depth))[0].sum() < (
                 wanted):
             depth *= 2.0
-        return depth
+        falls = self.normal(np.full(len(self.arrays.gap), depth))[1].sum() < 0.0
+        return scale if falls else depth
 
     def normal(self, penetration: Array) -> tuple[Array, Array]:
         """Normal forces (n,) and their slopes at rest."""

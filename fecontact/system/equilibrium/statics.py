@@ -7,6 +7,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, require_finite
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
+from fecontact.core.units import listed
 from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
@@ -138,8 +139,13 @@ def _among_springs(
     """A stable equilibrium beside springs that may soften, whose energy is not convex."""
     if solution is not None and (friction or problem.stable(solution)):
         return solution
-    start = np.zeros(system.basis.modes) if solution is None else solution
-    return problem.slide(start, system.penetration_scale, system.stored_energy)
+    # From a crest it may go down on the side on which a softening spring never holds.
+    for start in (solution, np.zeros(system.basis.modes)):
+        if start is not None:
+            found = problem.slide(start, system.penetration_scale, system.stored_energy)
+            if found is not None:
+                return found
+    return None
 
 
 def at_rest(
@@ -197,6 +203,14 @@ def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
         remedy = (f"a spring at B ({springs}) or a support"
                   if not system.basis.parts else "a support, an interface or a link")
         return f"There is no {kind}: nothing holds {body} against {motion}; give it {remedy}."
+    names = [name for name, count in system.basis.groups for _ in range(count)]
+    falls = problem.face_stiffness < 0.0
+    giving = sorted({name for name, fall in zip(names, falls, strict=True)
+                     if fall and name in system.basis.springs})
+    if giving:
+        return (f"There is no {kind}: the force of the spring {listed(giving)} falls with its "
+                f"elongation, and nothing else holds the load; check its stiffnesses and preload, "
+                f"or add a spring that holds.")
     load = system.load
     more = " and the further loads" if load != Load(load.normal) else ""
     return (f"There is no {kind}: under load.normal = {load.normal:g} N{more} the body lifts off "
