@@ -29,7 +29,6 @@ from fecontact.integrate.events import AnyEvent, Events, as_events
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.lanes.driver import SideBySide, side_by_side
-from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, again
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.simulate import (
@@ -38,6 +37,7 @@ from fecontact.integrate.simulate import (
     require_rodas,
 )
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
+from fecontact.integrate.step_loop import RUNNING
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import MOVING, Moving, in_time, state_size
@@ -176,8 +176,8 @@ def ensemble(
             run = start_any(system, state, instants[index], rtol=float(rtol), max_step=max_step,
                             events=watched, series=series, collocation=collocation)
         before.keep(system, run)
-        result = step_loop.RUNNING
-        while result == step_loop.RUNNING:
+        result = RUNNING
+        while result == RUNNING:
             if leave[0]:
                 raise _LeftError
             result = run.advance(100_000)

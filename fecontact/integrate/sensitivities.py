@@ -13,12 +13,12 @@ from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate import step_loop
 from fecontact.integrate.collocation.room import chosen_collocation
 from fecontact.integrate.derivative_check import doubts
 from fecontact.integrate.ensembles import Ensemble, ensemble
 from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages
 from fecontact.integrate.initial_state import Initial, initial_state
-from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish, start
 from fecontact.integrate.rodas5p.variational import MOVE
 from fecontact.integrate.simulate import output_times, require_max_step

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fecontact.integrate.rodas5p import driver, step_loop
+from fecontact.integrate import step_loop
+from fecontact.integrate.rodas5p import driver
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 

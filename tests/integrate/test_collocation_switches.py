@@ -10,10 +10,10 @@ from systems import friction_oscillator, mass_in_plane, mass_in_y
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, simulate
-from fecontact.integrate import Rodas5P
+from fecontact.integrate import Rodas5P, step_loop
 from fecontact.integrate.collocation import tableau
 from fecontact.integrate.collocation.courses import first_switch
-from fecontact.integrate.rodas5p import driver, step_loop
+from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.state import REJECTIONS, WORST_NODE
 from fecontact.laws import (
     BilateralCubic,

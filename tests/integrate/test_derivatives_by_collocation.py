@@ -12,9 +12,8 @@ from test_small_systems import system as block
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, sensitivity
-from fecontact.integrate import Rodas5P
-from fecontact.integrate.rodas5p import driver, step_loop
-from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate import Rodas5P, step_loop
+from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.sensitivities import _moved
 from fecontact.laws import (
     ConstantFriction,
@@ -52,7 +51,7 @@ def one_step(system, state, h, vary=False):
     """End of a step of exactly this length, and its derivatives; None where it is cut short."""
     run = driver.start(system, state, np.array([BEGIN, BEGIN + h]), rtol=1e-10, work=False,
                        vary=vary, vary_rtol=1e8, collocation="always")
-    run.progress.numbers[run_arrays.STEP] = h
+    run.progress.numbers[step_loop.STEP] = h
     run.advance(1)
     if run.outputs < 2 or run.attempts != 1:
         return None

@@ -6,8 +6,8 @@ import pytest
 import scipy.linalg
 
 from fecontact import sensitivity
+from fecontact.integrate import step_loop
 from fecontact.integrate.rodas5p import driver
-from fecontact.integrate.rodas5p import state as run_arrays
 
 LOAD = "load.normal"
 
@@ -37,7 +37,7 @@ def one_step(system, h, rtol):
     vary = (system.with_(**{LOAD: 14.0 + wide}), system.with_(**{LOAD: 14.0 - wide}), 2.0 * wide)
     run = driver.start(system, np.zeros(system.size), np.array([0.0, h]), rtol=1e8, work=False,
                        vary=vary, vary_rtol=rtol)
-    run.progress.numbers[run_arrays.STEP] = h
+    run.progress.numbers[step_loop.STEP] = h
     run.advance(1)
     assert run.outputs == 2
     assert run.attempts == 1

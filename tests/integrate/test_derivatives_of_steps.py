@@ -8,8 +8,8 @@ import pytest
 from systems import mass_in_plane
 
 from fecontact import Drive, Ground, Load
+from fecontact.integrate import step_loop
 from fecontact.integrate.rodas5p import driver
-from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.sensitivities import _moved
 from fecontact.laws import (
     ExponentialFriction,
@@ -42,7 +42,7 @@ def one_step(system, state, h, vary=False):
     """End of a step of exactly this length, and its derivatives; None where it is cut short."""
     run = driver.start(system, state, np.array([BEGIN, BEGIN + h]), rtol=1e8, work=False,
                        vary=vary, vary_rtol=1e8, series="never")
-    run.progress.numbers[run_arrays.STEP] = h
+    run.progress.numbers[step_loop.STEP] = h
     run.advance(1)
     if run.outputs < 2 or run.attempts != 1:
         return None

@@ -18,9 +18,8 @@ from fecontact import (
     PointLoad,
     Trajectory,
 )
+from fecontact.integrate import step_loop
 from fecontact.integrate.rodas5p import driver as control
-from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.integrate.rodas5p import step_loop
 from fecontact.laws import (
     ExponentialFriction,
     Harmonic,
@@ -80,7 +79,7 @@ def test_order_on_a_smooth_problem():
         longest = times[-1] / steps
         limited = run.problem.control._replace(longest=longest, slip_part=1e9)
         run = replace(run, problem=run.problem._replace(control=limited))
-        run.progress.numbers[run_arrays.STEP] = longest
+        run.progress.numbers[step_loop.STEP] = longest
         assert run.advance(10 * steps) == step_loop.FINISHED
         assert run.statistics["steps"] == steps
         errors.append(np.abs(run.states[-1] - wanted).max())

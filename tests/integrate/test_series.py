@@ -15,7 +15,7 @@ from fecontact.core.records import Matrix, Vector
 from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.series import polynomials, small_systems
-from fecontact.integrate.series.advance import advance
+from fecontact.integrate.series.method import Data, advance
 from fecontact.integrate.series.branches import MOST_MODES
 from fecontact.laws import (
     ConstantFriction,
@@ -480,5 +480,6 @@ def test_what_small_systems_take_for_granted(modes, nodes):
     own = runs[0]
     progressed(own, 10**9)
     general = runs[1]
-    advance(general.problem, general.progress, general.output, general.watch, general.series, 10**9)
+    advance(Data(general.problem, general.progress, general.output, general.watch,
+                 general.series), 10**9)
     assert own.states == pytest.approx(general.states, rel=1e-9, abs=1e-14)

@@ -5,8 +5,8 @@ import pytest
 from systems import impact_oscillator, mass_in_y
 
 from fecontact import ContactSystem, Ground, Load, ModalBasis, Status, simulate
-from fecontact.integrate import ContactEvents, Rodas5P
-from fecontact.integrate.rodas5p import driver, step_loop
+from fecontact.integrate import ContactEvents, Rodas5P, step_loop
+from fecontact.integrate.rodas5p import driver
 from fecontact.laws import ConstantFriction, LinearContact, SpeedRamp, TwoSidedStop
 
 SERIES, STEPS = Rodas5P(series="always"), Rodas5P(series="never")

@@ -7,7 +7,7 @@ from systems import friction_oscillator, two_mass_system
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate.lanes import small_systems as lane_systems
 from fecontact.integrate.lanes.driver import side_by_side
-from fecontact.integrate.rodas5p import driver, small_systems, step_loop
+from fecontact.integrate.rodas5p import driver, method, small_systems
 from fecontact.integrate.rodas5p.state import Output
 from fecontact.integrate.rodas5p.variational import Variation
 from fecontact.laws import DahlFriction, ExponentialFriction, RoughSurface
@@ -80,10 +80,10 @@ def test_what_step_loops_of_lanes_take_for_granted(modes, nodes):
 def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
     # Steps of one length: where they follow the error, rounding shifts their ends.
     own, other = (run_of(system(modes, nodes), max_step=2e-5) for _ in range(2))
-    assert small_systems.advance_for(own.problem, own.variation) is not step_loop.advance
+    assert small_systems.advance_for(own.problem, own.variation) is not method.advance
     own.advance(400)
-    step_loop.advance(other.problem, other.progress, other.room, other.output, other.variation,
-                      other.watch, 400)
+    method.advance(method.Data(other.problem, other.progress, other.room, other.output,
+                               other.variation, other.watch), 400)
     assert own.statistics == other.statistics
     assert own.time == pytest.approx(other.time, rel=1e-12)
     for name in ("state", "rate", "work", "power"):
@@ -126,9 +126,9 @@ def test_systems_with_more_to_them_have_the_step_loop_of_all():
     small = friction_oscillator()
     for other in (system(5, 1), system(2, 3), small.with_(friction=DahlFriction(0.3, 1e6))):
         run = run_of(other)
-        assert small_systems.advance_for(run.problem, run.variation) is step_loop.advance
+        assert small_systems.advance_for(run.problem, run.variation) is method.advance
     run = run_of(small, vary=True)
-    assert small_systems.advance_for(run.problem, run.variation) is step_loop.advance
+    assert small_systems.advance_for(run.problem, run.variation) is method.advance
     for other in (small, two_mass_system()):
         run = run_of(other)
-        assert small_systems.advance_for(run.problem, run.variation) is not step_loop.advance
+        assert small_systems.advance_for(run.problem, run.variation) is not method.advance

@@ -10,9 +10,9 @@ from test_small_systems import system as block
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, Status, simulate
 from fecontact.core.errors import InputError
-from fecontact.integrate import ContactEvents, Rodas5P
+from fecontact.integrate import ContactEvents, Rodas5P, step_loop
 from fecontact.integrate.collocation import small_systems, tableau
-from fecontact.integrate.rodas5p import driver, step_loop
+from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.variational import Variation
 from fecontact.laws import (
     ConstantFriction,

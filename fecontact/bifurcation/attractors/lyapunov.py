@@ -22,11 +22,11 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array
+from fecontact.integrate import step_loop
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.field_runs.saltation import joined, passages, with_passages
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
-from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish
 from fecontact.integrate.simulate import require_resolved_span
 from fecontact.system.contact_system import ContactSystem

@@ -23,7 +23,8 @@ from fecontact.integrate.collocation.tableau import (
     TO_BERNSTEIN,
 )
 from fecontact.integrate.rodas5p import dynamics, stage_solver
-from fecontact.integrate.rodas5p.state import ENERGY, RATES, WORST_NODE
+from fecontact.integrate.rodas5p.state import ENERGY, WORST_NODE
+from fecontact.integrate.step_loop import RATES
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import ground_motion, node_motion
 from fecontact.system.powers import (

@@ -28,6 +28,9 @@ ACCURATE = 1e-7
 _PART, _ROUNDING = 0.1, 1e-13
 # Entries of `Collocation.flags`.
 BEGINS, JACOBIANS, ITERATIONS = range(3)
+# Entries of `Collocation.cuts`: attempts at a step that ended at a switch, the longest of these,
+# and by which part the last one ended beyond it.
+AGAIN, WHOLE, PAST = range(3)
 
 
 class Collocation(NamedTuple):
@@ -42,6 +45,8 @@ class Collocation(NamedTuple):
     flags : (3,) integer array
         Whether the equations may change here, so that nothing is foretold from the step before;
         Jacobians so far; iterations of the last step.
+    cuts : (3,) array
+        Why and by how much the step was cut short.
     accelerations : (s + 1, m) array
         At the begin of the step and at its stages.
     before : (s + 1, m) array
@@ -66,6 +71,7 @@ class Collocation(NamedTuple):
 
     tolerance: float
     flags: Annotated[Integers, 3]
+    cuts: Annotated[Array, 3]
     accelerations: Annotated[Array, RATE_TERMS, MODES]
     before: Annotated[Array, RATE_TERMS, MODES]
     matrix: Annotated[Array, STAGES * MODES, STAGES * MODES]

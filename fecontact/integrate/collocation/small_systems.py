@@ -8,11 +8,10 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
-from fecontact.core.compiled import kernel
 from fecontact.core.constants import constants
 from fecontact.core.records import shapes
-from fecontact.integrate.collocation.advance import advance
 from fecontact.integrate.collocation.columns import propagate
+from fecontact.integrate.collocation.method import advance
 from fecontact.integrate.collocation.room import Collocation
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.integrate.rodas5p.state import Problem
@@ -27,7 +26,7 @@ def advance_for(problem: Problem) -> Any:
 
 @cache
 def _advance(modes: int, nodes: int) -> Any:
-    return kernel(advance, constants=constants(fixed_values(modes, nodes)), nogil=True)
+    return advance.for_values(constants(fixed_values(modes, nodes)))
 
 
 def propagate_for(problem: Problem) -> int:

@@ -7,8 +7,9 @@ from fecontact.core.dense_lu import backward, factorise, forward
 from fecontact.integrate.collocation.room import BEGINS, ITERATIONS, JACOBIANS
 from fecontact.integrate.collocation.tableau import ONCE, POINTS, RATE_TERMS, STAGES, TWICE
 from fecontact.integrate.rodas5p import dynamics, stage_solver
-from fecontact.integrate.rodas5p.state import RATES, SPEED_SCALE
+from fecontact.integrate.rodas5p.state import SPEED_SCALE
 from fecontact.integrate.rodas5p.step_length import LAST_STEP
+from fecontact.integrate.step_loop import RATES
 
 # Part of the tolerance to which the stages are solved, and the change after which one iteration is
 # enough.

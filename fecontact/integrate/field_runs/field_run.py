@@ -14,8 +14,8 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.integrate.events import AnyEvent, Events
-from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.driver import ENDS, finish
+from fecontact.integrate.step_loop import RUNNING
 from fecontact.integrate.trajectory import Status, output_part
 from fecontact.system.fields.vector_field import VectorField
 
@@ -118,7 +118,7 @@ def run_field(
 
     begin = clock.perf_counter()
     run = start_field(moving, state, times, rtol=rtol, max_step=max_step, events=events)
-    ended, result = None, step_loop.RUNNING
+    ended, result = None, RUNNING
     try:
         result = finish(run, progress)
     except KeyboardInterrupt:

@@ -12,14 +12,20 @@ from fecontact.integrate.bernstein import DEPTH
 from fecontact.integrate.courses import COEFFICIENTS
 from fecontact.integrate.event_arrays import take_events, watch_for
 from fecontact.integrate.events import AnyEvent, Events
-from fecontact.integrate.field_runs import step_loop
+from fecontact.integrate.field_runs.method import Data, Output, Progress, Room, advance
 from fecontact.integrate.field_runs.python_functions import PythonFunction
-from fecontact.integrate.field_runs.step_loop import Output, Progress, Room
 from fecontact.integrate.field_runs.variational import Varied, varied_for
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.event_kernels import Watch
-from fecontact.integrate.rodas5p.step_length import STEP, TIME
-from fecontact.integrate.rodas5p.step_loop import RUNNING
+from fecontact.integrate.step_loop import (
+    OUTPUTS,
+    RATES,
+    REJECTIONS,
+    RUNNING,
+    STEP,
+    STEPS,
+    TIME,
+)
 from fecontact.system.fields.one_place import FieldKernel, python_field
 from fecontact.system.fields.vector_field import VectorField
 
@@ -66,7 +72,7 @@ class FieldSteps:
     @property
     def outputs(self) -> int:
         """Number of output times passed."""
-        return int(self.progress.counts[step_loop.OUTPUTS])
+        return int(self.progress.counts[OUTPUTS])
 
     @property
     def time(self) -> float:
@@ -77,15 +83,15 @@ class FieldSteps:
     def attempts(self) -> int:
         """Steps so far, those that failed included."""
         counts = self.progress.counts
-        return int(counts[step_loop.STEPS] + counts[step_loop.REJECTIONS])
+        return int(counts[STEPS] + counts[REJECTIONS])
 
     @property
     def statistics(self) -> dict[str, Any]:
         """Counts of steps, rejected steps, right-hand sides of the stages and Jacobians."""
         counts = self.progress.counts
-        steps = int(counts[step_loop.STEPS])
-        return {"steps": steps, "rejected": int(counts[step_loop.REJECTIONS]),
-                "right_hand_sides": int(counts[step_loop.RATES]), "jacobians": steps + 1}
+        steps = int(counts[STEPS])
+        return {"steps": steps, "rejected": int(counts[REJECTIONS]),
+                "right_hand_sides": int(counts[RATES]), "jacobians": steps + 1}
 
     @property
     def events(self) -> Events:
@@ -107,8 +113,8 @@ class FieldSteps:
             If an event is not finite.
         """
         try:
-            status = step_loop.advance(self.kernel, self.progress, self.room, self.output,
-                                       self.varied, self.watch, most)
+            status = advance(Data(self.kernel, self.progress, self.room, self.output, self.varied,
+                                  self.watch), most)
         finally:
             # An interrupt shows when the compiled code has returned, and its events are there.
             take_events(self.watch, self.found, self.time)

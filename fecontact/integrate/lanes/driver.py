@@ -25,8 +25,8 @@ from fecontact.integrate.lanes.small_systems import USUAL, advance_for
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import ENDS, control_for, start
 from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
-from fecontact.integrate.rodas5p.step_loop import FINISHED, RUNNING
 from fecontact.integrate.series.branches import series_pay
+from fecontact.integrate.step_loop import FINISHED, RUNNING
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.ground.motion import constant_speed
 from fecontact.laws.simd import simd_address

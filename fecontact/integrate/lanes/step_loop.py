@@ -45,8 +45,8 @@ from fecontact.integrate.lanes.arrays import (
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.driver import SWITCH_PART as _SWITCH_PART
 from fecontact.integrate.rodas5p.state import Step
-from fecontact.integrate.rodas5p.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
+from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
 from fecontact.system.nodes import GroundMotion
 
 # How a call returned: so many attempts were made, lanes are free that more runs may take, or all

@@ -15,7 +15,7 @@ from fecontact.core.files.atomic_write import replaced
 from fecontact.core.files.stored import DamagedError, npz_arrays, reading
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.run import Run
-from fecontact.integrate.rodas5p.state import OUTPUTS
+from fecontact.integrate.step_loop import OUTPUTS
 
 _COUNTS = 1  # place of the counts among the leaves of the progress
 

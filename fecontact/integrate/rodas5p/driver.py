@@ -10,6 +10,7 @@ import numpy as np
 from fecontact.core.checks import require_state
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
+from fecontact.integrate import step_loop
 from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
@@ -21,7 +22,6 @@ from fecontact.integrate.reference.scipy import (
     work_of_jump,
 )
 from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.integrate.rodas5p import step_loop
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.run import Run
@@ -372,6 +372,6 @@ ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINI
 
 def _place(run: Run, ended: Status) -> str:
     where = f"It ended at t = {run.time:.9g} s"
-    if ended is Status.MINIMUM_STEP and run.progress.counts[run_arrays.REJECTIONS]:
+    if ended is Status.MINIMUM_STEP and run.progress.counts[step_loop.REJECTIONS]:
         where += f", near contact node {int(run.progress.counts[run_arrays.WORST_NODE])}"
     return f"{where}."

@@ -9,7 +9,8 @@ from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.near_nodes import extend_near
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.integrate.rodas5p.state import ENERGY, RATES, SPEED_SCALE, WORST_NODE
+from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
+from fecontact.integrate.step_loop import RATES
 from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
 

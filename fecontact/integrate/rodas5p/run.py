@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -10,13 +11,13 @@ from fecontact.core.types import Array
 from fecontact.integrate.collocation.room import JACOBIANS, Collocation
 from fecontact.integrate.event_arrays import take_events
 from fecontact.integrate.events import Events
-from fecontact.integrate.rodas5p import state
 from fecontact.integrate.rodas5p.event_kernels import Watch
+from fecontact.integrate.rodas5p.method import Data
 from fecontact.integrate.rodas5p.small_systems import advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
-from fecontact.integrate.rodas5p.step_length import TIME
 from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.integrate.series.branches import Series
+from fecontact.integrate.step_loop import OUTPUTS, RATES, REJECTIONS, STEPS, TIME
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,7 @@ class Run:
     @property
     def outputs(self) -> int:
         """Number of output times passed."""
-        return int(self.progress.counts[state.OUTPUTS])
+        return int(self.progress.counts[OUTPUTS])
 
     @property
     def time(self) -> float:
@@ -92,21 +93,21 @@ class Run:
     def attempts(self) -> int:
         """Steps so far, those that failed included."""
         counts = self.progress.counts
-        return int(counts[state.STEPS] + counts[state.REJECTIONS])
+        return int(counts[STEPS] + counts[REJECTIONS])
 
     @property
     def statistics(self) -> dict[str, int]:
         """Counts of steps, rejected steps, right-hand sides and Jacobians, or of expansions."""
         counts = self.progress.counts
         if self.series is not None:
-            return {"steps": int(counts[state.STEPS]), "rejected": int(counts[state.REJECTIONS]),
-                    "expansions": int(counts[state.RATES])}
-        jacobians = int(counts[state.STEPS]) + 1
+            return {"steps": int(counts[STEPS]), "rejected": int(counts[REJECTIONS]),
+                    "expansions": int(counts[RATES])}
+        jacobians = int(counts[STEPS]) + 1
         if self.collocation is not None:
             jacobians = int(self.collocation.flags[JACOBIANS])
-        return {"steps": int(counts[state.STEPS]),
-                "rejected": int(counts[state.REJECTIONS]),
-                "right_hand_sides": int(counts[state.RATES]),
+        return {"steps": int(counts[STEPS]),
+                "rejected": int(counts[REJECTIONS]),
+                "right_hand_sides": int(counts[RATES]),
                 "jacobians": jacobians}
 
     @property
@@ -117,22 +118,24 @@ class Run:
     @cached_property
     def _advance(self) -> Callable[[int], int]:
         """What goes on by so many steps."""
+        data: Any
         if self.series is not None:
             # Compiled for runs that need it only.
-            from fecontact.integrate.series.small_systems import advance_for as advance_series
+            from fecontact.integrate.series import method, small_systems
 
-            expand = advance_series(self.problem)
-            return lambda steps: expand(self.problem, self.progress, self.output, self.watch,
-                                        self.series, steps)
-        if self.collocation is not None:
-            from fecontact.integrate.collocation.small_systems import advance_for as advance_by
+            data = method.Data(self.problem, self.progress, self.output, self.watch, self.series)
+            loop = small_systems.advance_for(self.problem)
+        elif self.collocation is not None:
+            from fecontact.integrate.collocation import method, small_systems
 
-            collocate = advance_by(self.problem)
-            return lambda steps: collocate(self.problem, self.progress, self.room, self.output,
-                                           self.collocation, self.variation, steps)
-        step = advance_for(self.problem, self.variation)
-        return lambda steps: step(self.problem, self.progress, self.room, self.output,
-                                  self.variation, self.watch, steps)
+            data = method.Data(self.problem, self.progress, self.room, self.output,
+                               self.collocation, self.variation)
+            loop = small_systems.advance_for(self.problem)
+        else:
+            data = Data(self.problem, self.progress, self.room, self.output, self.variation,
+                        self.watch)
+            loop = advance_for(self.problem, self.variation)
+        return partial(loop, data)
 
     def advance(self, steps: int) -> int:
         """So many steps more, those that fail included; returns the status."""

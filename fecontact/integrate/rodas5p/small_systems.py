@@ -14,8 +14,9 @@ import numpy as np
 
 from fecontact.core.constants import constants
 from fecontact.core.records import Size, shapes
-from fecontact.integrate.rodas5p import dynamics, stage_solver, state, step_loop
+from fecontact.integrate.rodas5p import dynamics, stage_solver, state
 from fecontact.integrate.rodas5p.blocks import Blocks, one_block
+from fecontact.integrate.rodas5p.method import advance
 from fecontact.integrate.rodas5p.variational import (
     DIRECTIONS,
     Variation,
@@ -31,13 +32,13 @@ USUAL = ((1, 1), (2, 1), (3, 1), (1, 2), (2, 2))
 
 
 def advance_for(problem: state.Problem, vary: Vary) -> Any:
-    """The step loop of a system: that of its size, or :func:`step_loop.advance`.
+    """The step loop of a system: that of its size, or that of all.
 
     Step loops of small systems are for plane ones of one block, with one motion of the ground,
     without internal variables and without derivatives.
     """
     if len(vary.variation.columns) or not _small(problem):
-        return step_loop.advance
+        return advance
     n, _, m = problem.system.rows.shape
     return _advance(m, n)
 
@@ -75,7 +76,7 @@ def not_small(system: SystemArrays) -> str | None:
 
 @cache
 def _advance(modes: int, nodes: int) -> Any:
-    return step_loop.advance.for_values(constants(fixed_values(modes, nodes)))
+    return advance.for_values(constants(fixed_values(modes, nodes)))
 
 
 @cache

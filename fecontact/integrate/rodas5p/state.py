@@ -10,7 +10,8 @@ from fecontact.integrate import bernstein, courses
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import Blocks, near_blocks
-from fecontact.integrate.rodas5p.step_length import LAST_ROOT, STEP, TIME
+from fecontact.integrate.rodas5p.step_length import LAST_ROOT
+from fecontact.integrate.step_loop import RATES, STEP, TIME
 from fecontact.system.nodes import (
     AXES,
     CONTACT_FIELDS,
@@ -26,12 +27,13 @@ from fecontact.system.powers import WORKS
 
 # Entries of Progress.numbers, after those of `step_length`. CAUTIOUS is the length of a step that
 # failed, while what made it fail may still lie ahead, else zero. ENERGY is the largest energy or
-# work so far.
-NUMBERS = 8
-SPEED_SCALE, CAUTIOUS, ENERGY = range(LAST_ROOT + 1, NUMBERS)
-# Entries of Progress.counts.
-COUNTS = 6
-STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, WORST_NODE = range(COUNTS)
+# work so far; UNFELT the number of attempts at a step that missed a force.
+NUMBERS = 9
+SPEED_SCALE, CAUTIOUS, ENERGY, UNFELT = range(LAST_ROOT + 1, NUMBERS)
+# Entries of Progress.counts after those of the step loop: the node at which the error is largest,
+# and switches at one time so far.
+COUNTS = 7
+WORST_NODE, SWITCHES = range(RATES + 1, COUNTS)
 
 
 class Control(NamedTuple):

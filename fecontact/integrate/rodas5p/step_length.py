@@ -8,10 +8,11 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.integrate.rodas5p.tableau import ORDER
+from fecontact.integrate.step_loop import STEP
 
-# First entries of the numbers that a run goes on from: time reached, length of the next step,
-# whether the last one was rejected, length and root of the last one that was accepted.
-TIME, STEP, REJECTED_LAST, LAST_STEP, LAST_ROOT = range(5)
+# Entries of the numbers that a run goes on from, after those of the step loop: whether the last
+# step was rejected, length and root of the last one that was accepted.
+REJECTED_LAST, LAST_STEP, LAST_ROOT = range(STEP + 1, STEP + 4)
 
 SMALLEST_FACTOR = 0.1
 _SAFETY, _LARGEST_FACTOR = 0.9, 8.0
@@ -60,3 +61,17 @@ def next_stop(t, breaks, end):
         if t < breaks[k, 1]:
             return breaks[k, 1], np.nextafter(breaks[k, 0], t), True
     return end, end, False
+
+
+@helper
+def target_of(t, h, exactly, stop):
+    """End of a step of about the length h, or ``exactly`` that, but not past ``stop``.
+
+    What would leave a short rest is as long as it takes, or half of that.
+    """
+    target = t + h
+    if exactly:
+        return min(target, stop)
+    if target + 0.01 * h >= stop:
+        return stop
+    return t + 0.5 * (stop - t) if target + h > stop else target

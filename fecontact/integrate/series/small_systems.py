@@ -12,8 +12,8 @@ from fecontact.core.constants import constants
 from fecontact.core.records import shapes
 from fecontact.integrate.rodas5p import small_systems
 from fecontact.integrate.rodas5p.state import Problem
-from fecontact.integrate.series.advance import advance
 from fecontact.integrate.series.branches import Series
+from fecontact.integrate.series.method import advance
 
 # Modes and nodes.
 SIZES = ((1, 1), (2, 1), (3, 1), (2, 2))

@@ -1,8 +1,10 @@
-"""The compiled time integrator: Rodas5P steps of variable size over given output times."""
+"""Steps of Rodas5P for contact systems."""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.compiled import helper, routine
 from fecontact.integrate.course_bounds import doubtful, restless
 from fecontact.integrate.courses import keep_ends, set_courses, set_ends
 from fecontact.integrate.near_nodes import choose_near, set_end
@@ -31,23 +33,14 @@ from fecontact.integrate.rodas5p.event_kernels import (
     note_events_at,
 )
 from fecontact.integrate.rodas5p.sliders import BEGIN, END, OUTPUT, SWITCH, attend_at
-from fecontact.integrate.rodas5p.state import (
-    CAUTIOUS,
-    OUTPUTS,
-    RATES,
-    REJECTIONS,
-    STARTED,
-    STEPS,
-    Step,
-)
+from fecontact.integrate.rodas5p.state import CAUTIOUS, UNFELT, Step
 from fecontact.integrate.rodas5p.step_length import (
     REJECTED_LAST,
-    STEP,
-    TIME,
     growth,
     next_length,
     next_stop,
     root_of,
+    target_of,
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
@@ -57,18 +50,46 @@ from fecontact.integrate.rodas5p.variational import (
     propagate_at,
     write_columns,
 )
+from fecontact.integrate.step_loop import (
+    ANEW,
+    BEYOND,
+    CUT,
+    FAILED,
+    NOT_A_NUMBER,
+    OUTPUTS,
+    RATES,
+    TAKEN,
+    Method,
+    step_loop,
+)
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
-
-RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
 
 # Attempts at a step that end where something was not felt.
 _MOST_AGAIN = 20
 
 
+class Data(NamedTuple):
+    """A run by Rodas5P.
+
+    If the columns of ``vary.variation`` are not empty, those that belong to each output time are
+    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
+    What is watched for is noted in ``watch``.
+    """
+
+    problem: state.Problem
+    progress: state.Progress
+    room: state.Room
+    output: state.Output
+    vary: Vary
+    watch: Watch
+
+
 @routine
-def _start(t, problem, progress, room, output, watch):
-    """Prepare the first step of a run, and write its first output."""
+def _begin(t, data):
+    """Prepare the first step of a run."""
+    problem, progress, room, output, watch = (data.problem, data.progress, data.room,
+                                              data.output, data.watch)
     s, control = problem.system, problem.control
     after = np.nextafter(t, output.times[-1])
     dynamics.set_given(after, s, room.given, room.load)
@@ -81,9 +102,21 @@ def _start(t, problem, progress, room, output, watch):
                    progress.power[POWER_COUNT:])
     if _watched(watch) or watch.counts[KINKS]:
         begin(t, progress.state, s, control.depth, watch, room.scratch)
-    for k in range(len(progress.state)):
-        output.states[0, k] = progress.state[k]
-    progress.counts[STARTED], progress.counts[OUTPUTS] = 1, 1
+
+
+@routine
+def _resume(t, data):
+    """Nodes and courses at the start of a step."""
+    problem, progress = data.problem, data.progress
+    set_ends(t, progress.state, problem.system, problem.blocks, problem.control.ground,
+             data.room.ends)
+    progress.numbers[UNFELT] = 0.0
+
+
+@helper
+def _full(data):
+    """Whether a step may have more events than there is room for."""
+    return _watched(data.watch) and full(data.watch)
 
 
 @helper
@@ -93,24 +126,29 @@ def _watched(watch):
 
 
 @routine
-def _aim(t, h, exactly, smallest, moved, end, problem, progress, room):
-    """The next step to try, of about the length h, or ``exactly`` that, but not past a break.
+def _aim(t, h, last, smallest, data):
+    """The next step to try, of about the length h, or exactly that if the last one was cut.
 
-    A step of which one has just failed ends at a kink of the forces that lies ahead.
+    It does not go past a break. After one that has failed it ends at a kink of the forces that
+    lies ahead.
     """
-    control, numbers = problem.control, progress.numbers
+    problem, progress, room = data.problem, data.progress, data.room
+    s, control, numbers = problem.system, problem.control, progress.numbers
+    end = data.output.times[-1]
+    after = np.nextafter(t, end)
+    if last <= ANEW:
+        # Rates just after t: they may jump at a break.
+        dynamics.set_given(after, s, room.given, room.load)
+        moved = dynamics.motion_given(room.given)
+        choose_near(h, problem, progress, room)
+    else:
+        moved = ground_motion(after, s)
     stop, latest, is_break = next_stop(t, control.breaks, end)
-    target = t + h
-    if exactly:
-        target = min(target, stop)
-    elif target + 0.01 * h >= stop:
-        target = stop
-    elif target + h > stop:
-        target = t + 0.5 * (stop - t)
+    target = target_of(t, h, last == CUT, stop)
     caution, limit = 0.0, numbers[CAUTIOUS]
     if limit > 0.0:
         reach = max(target - t, limit)
-        kink = dynamics.next_kink(progress.state, progress.rate, problem.system, problem.blocks,
+        kink = dynamics.next_kink(progress.state, progress.rate, s, problem.blocks,
                                   progress.gradients, control.depth, control.slow, moved,
                                   room.nodes, reach)
         # Nearer ones are left to the error control, lest steps shrink without end, and those that
@@ -173,7 +211,7 @@ def _stages(step, G, problem, progress, room):
 
 
 @routine
-def _attempt(step, G, new, end, problem, progress, room):
+def _solve(step, G, new, end, problem, progress, room):
     """Compute a step; ``new`` if it is the first attempt from where it begins.
 
     Returns True if a normal force has another sign at a stage than at the start.
@@ -218,9 +256,10 @@ def _switch_error(step, G, end, problem, progress, room):
 
 
 @routine
-def _unfelt_part(step, again, smallest, problem, progress, room):
+def _unfelt_part(step, smallest, problem, progress, room):
     """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
     s, blocks, control = problem.system, problem.blocks, problem.control
+    again = int(progress.numbers[UNFELT])
     if restless(step, problem, progress, room) and again < _MOST_AGAIN:
         set_courses(s, blocks, control.ground, progress.state, room.after, room)
         if doubtful(step.moved, step.h, s, control.ground, control.levels, control.slip_scale,
@@ -243,58 +282,115 @@ def _switch_part(step, smallest, problem, progress, room, watch):
 
 
 @helper
-def _reject(step, error, progress, room):
-    """Take note of a step whose error is too large."""
-    if not error < np.inf:
-        room.stages[:] = 0.0
-    progress.counts[REJECTIONS] += 1
+def _refused(step, error, progress, room):
+    """What became of a step whose error is too large, and the length of the next attempt."""
     progress.numbers[REJECTED_LAST] = 1.0
     progress.numbers[CAUTIOUS] = 0.0 if step.caution > 0.0 else step.h
+    if not error < np.inf:
+        room.stages[:] = 0.0
+    return FAILED if error < np.inf else NOT_A_NUMBER, step.h * growth(root_of(error))
 
 
 @routine
-def _find_events(step, problem, progress, room, watch):
-    """Note the events of an accepted step; the part of it after which the run ends, or 2."""
+def _attempt(step, last, smallest, data):
+    """Try a step; what became of it, and the length of the next one."""
+    problem, progress, room, vary, watch = (data.problem, data.progress, data.room, data.vary,
+                                            data.watch)
+    control, numbers, end = problem.control, progress.numbers, data.output.times[-1]
+    G = 1.0 / (step.h * tableau.GAMMA)
+    if last == TAKEN and control.sliders != 0:
+        attend_at(control.sliders)(BEGIN, step, problem, progress, room, vary, step.t, room.right)
+    switched = _solve(step, G, last <= ANEW, end, problem, progress, room)
+    error = _error_at_end(step, end, problem, progress, room)
+    if error <= 1.0:
+        tableau.dense_coefficients(room.stages, room.dense)
+        part = _unfelt_part(step, smallest, problem, progress, room)
+        if part < 1.0:
+            numbers[UNFELT] += 1.0
+            return CUT, step.h * part
+        if switched or switches(len(problem.system.gap), problem.blocks.nodes, room.nodes[2],
+                                progress.signs):
+            error = max(error, _switch_error(step, G, end, problem, progress, room))
+        if error <= 1.0 and control.work:
+            error = max(error, work_error(step, problem, progress, room))
+    if error <= 1.0:
+        part = 1.0
+        if control.sliders != 0:
+            part = attend_at(control.sliders)(SWITCH, step, problem, progress, room, vary, step.t,
+                                              room.right)
+            if part == 0.0:
+                return ANEW, step.h
+        if part == 1.0 and watch.counts[KINKS]:
+            part = _switch_part(step, smallest, problem, progress, room, watch)
+        if part < 1.0:
+            return CUT, step.h * part
+        if len(vary.variation.columns) > 0:
+            set_scale(control, progress, room)
+            error = max(error, propagate_at(vary.propagate)(step, problem, progress, room, vary)
+                        / vary.variation.tolerance)
+    if not error <= 1.0:
+        return _refused(step, error, progress, room)
+    h = next_length(step.h, root_of(error), control.longest, numbers)
+    numbers[UNFELT] = 0.0
+    if step.caution > 0.0:
+        numbers[CAUTIOUS] = step.caution
+    return TAKEN, h
+
+
+@routine
+def _find_end(step, data):
+    """Note the events of a step; the part of it after which the run ends."""
+    problem, progress, room, watch = data.problem, data.progress, data.room, data.watch
     s, control = problem.system, problem.control
     if _watched(watch):
         set_courses(s, problem.blocks, control.ground, progress.state, room.after, room)
         return note_events_at(watch.note)(step, problem, progress, room, watch)
     if watch.counts[KINKS]:
         begin(min(step.target, step.latest), room.after, s, control.depth, watch, room.scratch)
-    return 2.0
+    return BEYOND
 
 
 @routine
-def _write(step, reached, problem, progress, room, output, vary):
-    """Write the outputs up to the time ``reached`` within the step."""
-    row = progress.counts[OUTPUTS]
-    if output.times[row] > reached:
-        return
-    if len(vary.variation.columns):
-        write_columns(vary.variation, vary.transitions[row])
-        begin_anew(vary.variation)
-    while row < len(output.times) and output.times[row] <= reached:
-        part = (output.times[row] - step.t) / step.h
-        tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
-        if problem.control.sliders != 0:
-            attend_at(problem.control.sliders)(OUTPUT, step, problem, progress, room, vary,
-                                               min(output.times[row], step.latest),
-                                               output.states[row])
-        if problem.control.work:
-            work_until(part, step.h, progress.work, room, output.work[row])
-        row += 1
-    progress.counts[OUTPUTS] = row
+def _close(step, writes, data):
+    """Keep the columns of a step, and write them if an output is in it."""
+    problem, progress, room, vary = data.problem, data.progress, data.room, data.vary
+    control, variation = problem.control, vary.variation
+    if len(variation.columns) > 0:
+        keep(variation)
+        if writes and control.sliders != 0:
+            attend_at(control.sliders)(END, step, problem, progress, room, vary, step.t,
+                                       room.right)
+    if control.work:
+        set_creeps(step, problem, progress, room)
+    if writes and len(variation.columns) > 0:
+        write_columns(variation, vary.transitions[progress.counts[OUTPUTS]])
+        begin_anew(variation)
 
 
 @routine
-def _stop_at(part, step, problem, progress, room):
-    """End the run at a part of the step."""
+def _fill(row, step, data):
+    """Fill a row of the output."""
+    problem, progress, room, output, vary = (data.problem, data.progress, data.room,
+                                             data.output, data.vary)
+    time = output.times[row]
+    part = (time - step.t) / step.h
+    tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
+    if problem.control.sliders != 0:
+        attend_at(problem.control.sliders)(OUTPUT, step, problem, progress, room, vary,
+                                           min(time, step.latest), output.states[row])
     if problem.control.work:
+        work_until(part, step.h, progress.work, room, output.work[row])
+
+
+@routine
+def _stop_at(part, step, data):
+    """End the run at a part of the step."""
+    progress, room = data.progress, data.room
+    if data.problem.control.work:
         work_until(part, step.h, progress.work, room, progress.work)
     tableau.interpolated(part, progress.state, room.after, room.dense, room.right)
     for k in range(len(progress.state)):
         progress.state[k] = room.right[k]
-    progress.counts[STEPS] += 1
 
 
 @helper
@@ -309,8 +405,9 @@ def add_jump(step, state, problem, progress, output):
 
 
 @routine
-def _go_on(step, problem, progress, room, output):
+def _go_on(step, data):
     """Make the end of the step the state of the run."""
+    problem, progress, room, output = data.problem, data.progress, data.room, data.output
     if problem.control.work:
         work_until(1.0, step.h, progress.work, room, progress.work)
         if step.at_break:
@@ -329,105 +426,8 @@ def _go_on(step, problem, progress, room, output):
     # Those of the other nodes are zero.
     dynamics.copy_gradients(room.gradients_after, progress.gradients, room.near)
     keep_ends(n, room)
-    progress.counts[STEPS] += 1
 
 
-@kernel(nogil=True)
-def advance(
-    problem: state.Problem, progress: state.Progress, room: state.Room, output: state.Output,
-    vary: Vary, watch: Watch, most: int,
-) -> int:
-    """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
-
-    Fills the rows of ``output`` that belong to the output times passed. A run that is continued
-    gives the same numbers as one that was not interrupted.
-
-    If the columns of ``vary.variation`` are not empty, those that belong to each output time are
-    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
-    What is watched for is noted in ``watch``; when that is full, the call returns.
-    """
-    s, control, numbers, counts = (problem.system, problem.control, progress.numbers,
-                                   progress.counts)
-    n, blocks = len(s.gap), problem.blocks
-    t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
-    smallest = 1e-14 * max(abs(output.times[0]), abs(end))
-    varies = len(vary.variation.columns) > 0
-    if counts[STARTED] == 0:
-        _start(t, problem, progress, room, output, watch)
-    set_ends(t, progress.state, s, problem.blocks, control.ground, room.ends)
-    new, fresh, attempts, exactly, again = True, True, 0, False, 0
-    moved = ground_motion(t, s)
-    while counts[OUTPUTS] < len(output.times):
-        # A step that failed is repeated before the call returns: derivatives are not kept.
-        if fresh and (attempts >= most or (_watched(watch) and full(watch))):
-            break
-        attempts += 1
-        if new:
-            # Rates just after t: they may jump at a break.
-            dynamics.set_given(np.nextafter(t, end), s, room.given, room.load)
-            moved = dynamics.motion_given(room.given)
-            choose_near(h, problem, progress, room)
-        step = _aim(t, h, exactly, smallest, moved, end, problem, progress, room)
-        G = 1.0 / (step.h * tableau.GAMMA)
-        if fresh and control.sliders != 0:
-            attend_at(control.sliders)(BEGIN, step, problem, progress, room, vary, t, room.right)
-        switched = _attempt(step, G, new, end, problem, progress, room)
-        new = fresh = False
-
-        error, part = _error_at_end(step, end, problem, progress, room), 1.0
-        if error <= 1.0:
-            tableau.dense_coefficients(room.stages, room.dense)
-            part = _unfelt_part(step, again, smallest, problem, progress, room)
-            if part < 1.0:
-                again += 1
-            elif switched or switches(n, blocks.nodes, room.nodes[2], progress.signs):
-                error = max(error, _switch_error(step, G, end, problem, progress, room))
-            if part == 1.0 and error <= 1.0 and control.work:
-                error = max(error, work_error(step, problem, progress, room))
-        if error <= 1.0 and part == 1.0 and control.sliders != 0:
-            part = attend_at(control.sliders)(SWITCH, step, problem, progress, room, vary, t,
-                                              room.right)
-            if part == 0.0:
-                counts[REJECTIONS] += 1
-                h, new, exactly = step.h, True, False
-                continue
-        if error <= 1.0 and part == 1.0 and watch.counts[KINKS]:
-            part = _switch_part(step, smallest, problem, progress, room, watch)
-        exactly = part < 1.0
-        if exactly:
-            counts[REJECTIONS] += 1
-            h = step.h * part
-            continue
-        if error <= 1.0 and varies:
-            set_scale(control, progress, room)
-            error = max(error, propagate_at(vary.propagate)(step, problem, progress, room, vary)
-                        / vary.variation.tolerance)
-        root = root_of(error)
-        if not error <= 1.0:
-            _reject(step, error, progress, room)
-            h = step.h * growth(root)
-            if not h >= smallest:
-                numbers[TIME], numbers[STEP] = t, h
-                return MINIMUM_STEP if error < np.inf else NOT_FINITE
-            continue
-
-        ends = _find_events(step, problem, progress, room, watch)
-        reached = step.target if ends > 1.0 else t + ends * step.h
-        if varies:
-            keep(vary.variation)
-            if control.sliders != 0 and output.times[counts[OUTPUTS]] <= reached:
-                attend_at(control.sliders)(END, step, problem, progress, room, vary, t, room.right)
-        if control.work:
-            set_creeps(step, problem, progress, room)
-        _write(step, reached, problem, progress, room, output, vary)
-        if ends <= 1.0:
-            _stop_at(ends, step, problem, progress, room)
-            numbers[TIME], numbers[STEP] = reached, step.h
-            return STOPPED
-        _go_on(step, problem, progress, room, output)
-        t, new, fresh, again = step.target, True, True, 0
-        h = next_length(step.h, root, control.longest, numbers)
-        if step.caution > 0.0:
-            numbers[CAUTIOUS] = step.caution
-    numbers[TIME], numbers[STEP] = t, h
-    return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
+METHOD = Method("rodas5p", Data, _aim, _attempt, _fill, _go_on, _begin, _resume, _close, _full,
+                _find_end, _stop_at)
+advance = step_loop(METHOD)

@@ -1,4 +1,4 @@
-"""The compiled integrator of vector fields: Rodas5P steps of variable size over output times.
+"""Steps of Rodas5P for vector fields.
 
 The Jacobian J = df/dx of each step is the field's own; df/dt is a one-sided difference of second
 order over a ten thousandth of the step.
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import kernel, routine
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
@@ -25,24 +25,24 @@ from fecontact.integrate.rodas5p.event_kernels import (
 )
 from fecontact.integrate.rodas5p.step_length import (
     REJECTED_LAST,
-    SMALLEST_FACTOR,
-    STEP,
-    TIME,
     growth,
     next_length,
     root_of,
+    target_of,
 )
-from fecontact.integrate.rodas5p.step_loop import (
-    FINISHED,
-    MINIMUM_STEP,
-    NOT_FINITE,
-    RUNNING,
-    STOPPED,
+from fecontact.integrate.step_loop import (
+    BEYOND,
+    CUT,
+    FAILED,
+    NOT_A_NUMBER,
+    OUTPUTS,
+    RATES,
+    STEP,
+    TAKEN,
+    Method,
+    step_loop,
 )
 from fecontact.system.fields.one_place import FieldKernel, derive_at, evaluate_at
-
-# Entries of Progress.counts; those of Progress.numbers are those of `step_length`.
-OUTPUTS, STEPS, REJECTIONS, RATES, STARTED = range(5)
 
 _LOOKS = 16
 
@@ -115,15 +115,30 @@ class _View(NamedTuple):
     y: Array
 
 
+class Data(NamedTuple):
+    """A run of a vector field.
+
+    If there are columns in ``varied``, steps end at output times, where the columns are stored and
+    begin anew. Events are noted in ``watch``.
+    """
+
+    field: FieldKernel
+    progress: Progress
+    room: Room
+    output: Output
+    varied: Varied
+    watch: Watch
+
+
 @routine
-def _start(t, field, progress, room, output, watch):
-    """Prepare the first step of a run, and write its first output."""
+def _begin(t, data):
+    """Prepare the first step of a run."""
+    field, progress, watch = data.field, data.progress, data.watch
     numbers, size = progress.numbers, 0.0
     derive_at(field.derive)(t, progress.state, field, progress.rate, progress.J)
     for k in range(len(progress.state)):
         progress.sizes[k] = max(progress.sizes[k], abs(progress.state[k]))
         size = max(size, abs(progress.rate[k]) / progress.sizes[k])
-        output.states[0, k] = progress.state[k]
     if size > 0.0:
         numbers[STEP] = min(numbers[STEP], 0.01 / size)
     # What is at rest may not stay there: the first step does not depend on the end of the run.
@@ -132,7 +147,21 @@ def _start(t, field, progress, room, output, watch):
         numbers[STEP] = min(numbers[STEP], 0.1 / steep)
     for k in range(len(watch.own)):
         watch.own_values[k] = event_at(watch.own[k])(t, progress.state, watch.own_parameters[k])
-    progress.counts[STARTED], progress.counts[OUTPUTS] = 1, 1
+
+
+@helper
+def _full(data):
+    """Whether a step may have more events than there is room for."""
+    return len(data.watch.own) > 0 and full(data.watch)
+
+
+@routine
+def _aim(t, h, last, smallest, data):
+    """The next step to try, of about the length h."""
+    times = data.output.times
+    stop = times[data.progress.counts[OUTPUTS]] if len(data.varied.columns) else times[-1]
+    target = target_of(t, h, last == CUT, stop)
+    return Step(t, target - t, target, target)
 
 
 @routine
@@ -198,10 +227,28 @@ def _error(step, field, progress, room, rtol):
 
 
 @routine
-def _find_events(step, progress, room, watch):
-    """Note the events of an accepted step; the part of it after which the run ends, or 2."""
+def _attempt(step, last, smallest, data):
+    """Try a step; what became of it, and the length of the next one."""
+    field, progress, room, output = data.field, data.progress, data.room, data.output
+    if last == TAKEN:
+        _set_time_rate(step, field, progress, room)
+    _take(step, field, progress, room)
+    error = _error(step, field, progress, room, output.rtol)
+    if not error <= 1.0:
+        progress.numbers[REJECTED_LAST] = 1.0
+        if not error < np.inf:
+            room.stages[:] = 0.0
+        return FAILED if error < np.inf else NOT_A_NUMBER, step.h * growth(root_of(error))
+    tableau.dense_coefficients(room.stages, room.dense)
+    return TAKEN, next_length(step.h, root_of(error), output.longest, progress.numbers)
+
+
+@routine
+def _find_end(step, data):
+    """Note the events of a step; the part of it after which the run ends."""
+    progress, room, watch = data.progress, data.room, data.watch
     if len(watch.own) == 0:
-        return 2.0
+        return BEYOND
     tableau.inner_coefficients(progress.state, room.after, room.dense, room.inner)
     set_own_places(progress.state, room, watch)
     view = _View(step, progress.state, room.after, room.dense, room.right)
@@ -213,96 +260,49 @@ def _find_events(step, progress, room, watch):
 
 
 @routine
-def _write(step, reached, progress, room, output, varied):
-    """Write the outputs up to the time ``reached`` within the step."""
-    row = progress.counts[OUTPUTS]
-    while row < len(output.times) and output.times[row] <= reached:
-        if output.times[row] == step.target:
-            for k in range(len(room.after)):
-                output.states[row, k] = room.after[k]
-        else:
-            part = (output.times[row] - step.t) / step.h
-            tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
-        if len(varied.columns):
-            for i in range(len(varied.columns)):
-                for k in range(len(varied.columns)):
-                    varied.transitions[row, i, k] = varied.columns[i, k]
-                    varied.columns[i, k] = 1.0 if i == k else 0.0
-        row += 1
-    progress.counts[OUTPUTS] = row
+def _close(step, writes, data):
+    """Carry the columns over a step."""
+    if len(data.varied.columns):
+        propagate(step, data.field, data.progress, data.room, data.varied)
 
 
 @routine
-def _go_on(step, progress, room):
+def _fill(row, step, data):
+    """Fill a row of the output; the columns begin anew there."""
+    progress, room, output, varied = data.progress, data.room, data.output, data.varied
+    if output.times[row] == step.target:
+        for k in range(len(room.after)):
+            output.states[row, k] = room.after[k]
+    else:
+        part = (output.times[row] - step.t) / step.h
+        tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
+    for i in range(len(varied.columns)):
+        for k in range(len(varied.columns)):
+            varied.transitions[row, i, k] = varied.columns[i, k]
+            varied.columns[i, k] = 1.0 if i == k else 0.0
+
+
+@routine
+def _stop_at(part, step, data):
+    """End the run at a part of the step."""
+    progress, room = data.progress, data.room
+    tableau.interpolated(part, progress.state, room.after, room.dense, room.right)
+    for k in range(len(progress.state)):
+        progress.state[k] = room.right[k]
+
+
+@routine
+def _go_on(step, data):
     """Make the end of the step the state of the run."""
+    progress, room = data.progress, data.room
     d = len(progress.state)
     for i in range(d):
         progress.state[i], progress.rate[i] = room.after[i], room.rate_after[i]
         progress.sizes[i] = max(progress.sizes[i], abs(room.after[i]))
         for k in range(d):
             progress.J[i, k] = room.J_after[i, k]
-    progress.counts[STEPS] += 1
 
 
-@kernel(nogil=True)
-def advance(
-    field: FieldKernel, progress: Progress, room: Room, output: Output, varied: Varied,
-    watch: Watch, most: int,
-) -> int:
-    """Go on until ``most`` steps have been tried and one accepted; returns how it ended.
-
-    Fills the states of the output times passed, and notes events in ``watch``; when that is full
-    the call returns. If there are columns in ``varied``, steps end at output times, where the
-    columns are stored and begin anew.
-    """
-    numbers, counts, times = progress.numbers, progress.counts, output.times
-    t, h, end = numbers[TIME], numbers[STEP], times[-1]
-    smallest = 1e-14 * max(abs(times[0]), abs(end))
-    if counts[STARTED] == 0:
-        _start(t, field, progress, room, output, watch)
-        h = numbers[STEP]
-    new, attempts = True, 0
-    while counts[OUTPUTS] < len(times):
-        # A step that failed is repeated before the call returns.
-        if new and (attempts >= most or (len(watch.own) > 0 and full(watch))):
-            break
-        attempts += 1
-        stop = times[counts[OUTPUTS]] if len(varied.columns) else end
-        target = t + h
-        if target + 0.01 * h >= stop:
-            target = stop
-        elif target + h > stop:
-            target = t + 0.5 * (stop - t)
-        step = Step(t, target - t, target, target)
-        if new:
-            _set_time_rate(step, field, progress, room)
-        _take(step, field, progress, room)
-        error = _error(step, field, progress, room, output.rtol)
-        new = error <= 1.0
-        if not new:
-            counts[REJECTIONS] += 1
-            numbers[REJECTED_LAST] = 1.0
-            h = step.h * (growth(root_of(error)) if error < np.inf else SMALLEST_FACTOR)
-            if not error < np.inf:
-                room.stages[:] = 0.0
-            if not h >= smallest:
-                numbers[TIME], numbers[STEP] = t, h
-                return MINIMUM_STEP if error < np.inf else NOT_FINITE
-            continue
-        tableau.dense_coefficients(room.stages, room.dense)
-        ends = _find_events(step, progress, room, watch)
-        reached = step.target if ends > 1.0 else t + ends * step.h
-        if len(varied.columns):
-            propagate(step, field, progress, room, varied)
-        _write(step, reached, progress, room, output, varied)
-        if ends <= 1.0:
-            tableau.interpolated(ends, progress.state, room.after, room.dense, room.right)
-            for k in range(len(progress.state)):
-                progress.state[k] = room.right[k]
-            counts[STEPS] += 1
-            numbers[TIME], numbers[STEP] = reached, step.h
-            return STOPPED
-        _go_on(step, progress, room)
-        t, h = step.target, next_length(step.h, root_of(error), output.longest, numbers)
-    numbers[TIME], numbers[STEP] = t, h
-    return FINISHED if counts[OUTPUTS] == len(times) else RUNNING
+METHOD = Method("field", Data, _aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,
+                find_end=_find_end, stop_at=_stop_at)
+advance = step_loop(METHOD)

@@ -8,10 +8,11 @@ falls to zero.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.compiled import helper, routine
 from fecontact.integrate.rodas5p import state
 from fecontact.integrate.rodas5p.error_control import take_scales
 from fecontact.integrate.rodas5p.event_kernels import (
@@ -22,24 +23,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
     TOUCH_DOWN,
     Watch,
 )
-from fecontact.integrate.rodas5p.state import (
-    ENERGY,
-    OUTPUTS,
-    RATES,
-    REJECTIONS,
-    SPEED_SCALE,
-    STARTED,
-    STEPS,
-    WORST_NODE,
-)
-from fecontact.integrate.rodas5p.step_length import STEP, TIME
-from fecontact.integrate.rodas5p.step_loop import (
-    FINISHED,
-    MINIMUM_STEP,
-    NOT_FINITE,
-    RUNNING,
-    STOPPED,
-)
+from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, SWITCHES, WORST_NODE
 from fecontact.integrate.series.branches import (
     ACTS,
     MET,
@@ -57,6 +41,15 @@ from fecontact.integrate.series.expansion import (
     set_forcing,
 )
 from fecontact.integrate.series.polynomials import COEFFICIENTS, DEGREE, first_zero, value_at
+from fecontact.integrate.step_loop import (
+    BEYOND,
+    FAILED,
+    NOT_A_NUMBER,
+    RATES,
+    TAKEN,
+    Method,
+    step_loop,
+)
 from fecontact.laws.pieces import LOWER, RELEASE, UPPER
 from fecontact.system.powers import (
     CONTACT_DAMPING,
@@ -73,6 +66,47 @@ _WORKS = np.array([DRIVE, LOAD, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING])
 _LARGEST_GROWTH = 50.0
 # Switches at one time, per node, beyond which time goes on regardless.
 _MOST_SWITCHES = 8
+
+
+class Data(NamedTuple):
+    """A run by power series; ``series`` has the state of its contacts."""
+
+    problem: state.Problem
+    progress: state.Progress
+    output: state.Output
+    watch: Watch
+    series: Series
+
+
+class Step(NamedTuple):
+    """A step that is tried.
+
+    Attributes
+    ----------
+    t, h, target : float
+        Its begin, its length, and the time at its end.
+    unit : float
+        The length over which the motion is expanded.
+    part : float
+        Its length in these.
+    node, meets : int
+        Which node leaves its piece at its end, -1 if none does, and what it meets.
+    error : float
+        0; 2 if the motion cannot be expanded over a step that the time tells from none; infinite
+        if it is not finite.
+    next : float
+        Length of the next step.
+    """
+
+    t: float
+    h: float
+    target: float
+    unit: float
+    part: float
+    node: int
+    meets: int
+    error: float
+    next: float
 
 
 @helper
@@ -196,43 +230,34 @@ def _set_speeds(x, h, series):
         series.line[1, j] = total / h
 
 
-@routine
-def _write(t, h, reached, problem, progress, output, series):
-    """Write the outputs up to the time ``reached`` within the step."""
-    row, m = progress.counts[OUTPUTS], len(series.q)
-    while row < len(output.times) and output.times[row] <= reached:
-        x = (output.times[row] - t) / h
-        for i in range(m):
-            output.states[row, i] = value_at(series.q[i], x)
-            output.states[row, m + i] = value_at(series.v[i], x)
-        if problem.control.work:
-            for k in range(len(progress.work)):
-                output.work[row, k] = progress.work[k]
-            for k in range(len(_WORKS)):
-                output.work[row, _WORKS[k]] += value_at(series.powers[k], x)
-        row += 1
-    progress.counts[OUTPUTS] = row
+@helper
+def _set_state(step, series, state):
+    """Put the state at the end of the step into ``state``."""
+    m = len(series.q)
+    for i in range(m):
+        state[i] = value_at(series.q[i], step.part)
+        state[m + i] = value_at(series.v[i], step.part)
 
 
 @helper
-def _note(t, kind, node, progress, watch):
+def _note(kind, step, series, watch):
     row = watch.counts[FOUND]
-    watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
-    for k in range(len(progress.state)):
-        watch.states[row, k] = progress.state[k]
+    watch.found[row, 0], watch.found[row, 1] = step.target, kind
+    watch.found[row, 2] = step.node
+    _set_state(step, series, watch.states[row])
     watch.counts[FOUND] = row + 1
 
 
 @helper
-def _note_change(t, change, j, progress, watch):
-    """Note that the force of node j begins or ends; whether the run stops there."""
+def _note_change(change, step, series, watch):
+    """Note that the force of the node begins or ends; whether the run stops there."""
     stops = False
     if change > 0:
-        _note(t, TOUCH_DOWN, j, progress, watch)
-        _note(t, STICK, j, progress, watch)
+        _note(TOUCH_DOWN, step, series, watch)
+        _note(STICK, step, series, watch)
         stops = watch.stops[TOUCH_DOWN] != 0 or watch.stops[STICK] != 0
     elif change < 0:
-        _note(t, LIFT_OFF, j, progress, watch)
+        _note(LIFT_OFF, step, series, watch)
         stops = watch.stops[LIFT_OFF] != 0
     return stops
 
@@ -251,80 +276,102 @@ def _expanded(t, h, problem, progress, series):
     return part
 
 
-@kernel(nogil=True)
-def advance(
-    problem: state.Problem, progress: state.Progress, output: state.Output, watch: Watch,
-    series: Series, most: int,
-) -> int:
-    """Go on by up to ``most`` steps; returns how it ended, as ``step_loop.advance`` does."""
-    numbers, counts, control = progress.numbers, progress.counts, problem.control
-    m, n = len(series.q), len(series.states)
-    t, h, end = numbers[TIME], numbers[STEP], output.times[-1]
-    smallest = 1e-14 * max(abs(output.times[0]), abs(end))
-    watched = watch.counts[NODES] != 0
-    if counts[STARTED] == 0:
-        for k in range(2 * m):
-            output.states[0, k] = progress.state[k]
-        counts[STARTED], counts[OUTPUTS] = 1, 1
-    attempts, switches = 0, 0
-    while counts[OUTPUTS] < len(output.times):
-        if switches == 0 and (attempts >= most or (
-                watched and watch.counts[FOUND] + 4 * _MOST_SWITCHES * n > len(watch.found))):
-            break
-        attempts += 1
-        take_scales(control, progress)
-        part = _expanded(t, h, problem, progress, series)
-        if part < 0.0:
-            numbers[TIME], numbers[STEP] = t, h
-            return NOT_FINITE
-        # A short first step is only the first; NaN fails.
-        if not (part * h >= smallest or part >= _LARGEST_GROWTH):
-            counts[WORST_NODE] = 0
-            counts[REJECTIONS] += 1
-            numbers[TIME], numbers[STEP] = t, part * h
-            return MINIMUM_STEP
-        part = min(part, series.longest / h)
-        whole = part * h
-        at_end = t + 1.01 * whole >= end
-        if at_end:
-            part = (end - t) / h
-        first, node, meets = _first_switch(part, h, series)
-        change = 0
-        switched = node >= 0
-        if switched and first * h <= smallest:
-            switches += 1
-            if switches > _MOST_SWITCHES * n:
-                # What happens at one time without end: a little later it is another place.
-                switched, first = False, min(part, 1e3 * smallest / h)
-        elif switched:
-            switches = 0
-        if not switched:
-            first = min(first, part)
-            switches = 0
-        reached = end if at_end and first >= part else t + first * h
-        if control.work:
-            integrate_powers(h, series)
-        _write(t, h, reached, problem, progress, output, series)
-        for i in range(m):
-            progress.state[i] = value_at(series.q[i], first)
-            progress.state[m + i] = value_at(series.v[i], first)
-        if control.work:
-            for k in range(len(_WORKS)):
-                progress.work[_WORKS[k]] += value_at(series.powers[k], first)
-        if first * h > smallest:
-            for j in range(n):
-                series.states[j, MET] = MET_NOTHING
-        counts[STEPS] += 1
-        stops = False
-        if switched:
-            if meets != MET_RELEASE:
-                _set_speeds(first, h, series)
-            change = _switch(node, meets, h, series)
-            if watched and change != 0:
-                stops = _note_change(reached, change, node, progress, watch)
-        t, h = reached, whole
-        if stops:
-            numbers[TIME], numbers[STEP] = t, h
-            return STOPPED
-    numbers[TIME], numbers[STEP] = t, h
-    return FINISHED if counts[OUTPUTS] == len(output.times) else RUNNING
+@helper
+def _full(data):
+    """Whether a step may have more events than there is room for."""
+    watch = data.watch
+    most = 4 * _MOST_SWITCHES * len(data.series.states)
+    return watch.counts[NODES] != 0 and watch.counts[FOUND] + most > len(watch.found)
+
+
+@routine
+def _aim(t, h, last, smallest, data):
+    """The next step, expanded over the length h: as far as that holds, or to the next switch."""
+    problem, progress, series = data.problem, data.progress, data.series
+    end, counts = data.output.times[-1], progress.counts
+    take_scales(problem.control, progress)
+    part = _expanded(t, h, problem, progress, series)
+    if part < 0.0:
+        return Step(t, h, t, h, 0.0, -1, MET_NOTHING, np.inf, 0.0)
+    # A short first step is only the first; NaN fails.
+    if not (part * h >= smallest or part >= _LARGEST_GROWTH):
+        return Step(t, h, t, h, 0.0, -1, MET_NOTHING, 2.0, part * h)
+    part = min(part, series.longest / h)
+    whole = part * h
+    at_end = t + 1.01 * whole >= end
+    if at_end:
+        part = (end - t) / h
+    first, node, meets = _first_switch(part, h, series)
+    counts[SWITCHES] = counts[SWITCHES] + 1 if node >= 0 and first * h <= smallest else 0
+    if counts[SWITCHES] > _MOST_SWITCHES * len(series.states):
+        # What happens at one time without end: a little later it is another place.
+        counts[SWITCHES] = 0
+        first, node = min(part, 1e3 * smallest / h), -1
+    if node < 0:
+        first = min(first, part)
+    if first * h > smallest:
+        for j in range(len(series.states)):
+            series.states[j, MET] = MET_NOTHING
+    target = end if at_end and first >= part else t + first * h
+    return Step(t, target - t, target, h, first, node, meets, 0.0, whole)
+
+
+@routine
+def _attempt(step, last, smallest, data):
+    """Whether the step can be taken, and the length of the next one."""
+    if step.error > 0.0:
+        data.progress.counts[WORST_NODE] = 0
+        return FAILED if step.error < np.inf else NOT_A_NUMBER, step.next
+    if data.problem.control.work:
+        integrate_powers(step.unit, data.series)
+    return TAKEN, step.next
+
+
+@routine
+def _fill(row, step, data):
+    """Fill a row of the output."""
+    progress, output, series = data.progress, data.output, data.series
+    m = len(series.q)
+    x = (output.times[row] - step.t) / step.unit
+    for i in range(m):
+        output.states[row, i] = value_at(series.q[i], x)
+        output.states[row, m + i] = value_at(series.v[i], x)
+    if data.problem.control.work:
+        for k in range(len(progress.work)):
+            output.work[row, k] = progress.work[k]
+        for k in range(len(_WORKS)):
+            output.work[row, _WORKS[k]] += value_at(series.powers[k], x)
+
+
+@routine
+def _find_end(step, data):
+    """Let the node that leaves its piece go on to the next; the part after which the run ends."""
+    watch, series = data.watch, data.series
+    if step.node < 0:
+        return BEYOND
+    if step.meets != MET_RELEASE:
+        _set_speeds(step.part, step.unit, series)
+    change = _switch(step.node, step.meets, step.unit, series)
+    stops = watch.counts[NODES] != 0 and _note_change(change, step, series, watch)
+    return 1.0 if stops else BEYOND
+
+
+@routine
+def _go_on(step, data):
+    """Make the end of the step the state of the run."""
+    progress, series = data.progress, data.series
+    _set_state(step, series, progress.state)
+    if data.problem.control.work:
+        for k in range(len(_WORKS)):
+            progress.work[_WORKS[k]] += value_at(series.powers[k], step.part)
+
+
+@helper
+def _stop_at(part, step, data):
+    """The same: runs end at ends of steps."""
+    _go_on(step, data)
+
+
+METHOD = Method("series", Data, _aim, _attempt, _fill, _go_on, full=_full, find_end=_find_end,
+                stop_at=_stop_at)
+advance = step_loop(METHOD)

@@ -1,0 +1,290 @@
+"""Steps by collocation: few long ones, each of which ends where forces switch."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fecontact.core.compiled import helper, routine
+from fecontact.integrate.collocation.columns import propagate_at
+from fecontact.integrate.collocation.courses import (
+    first_switch,
+    keep_rates,
+    powers_at,
+    set_courses,
+    step_error,
+    value_at,
+    work_error,
+)
+from fecontact.integrate.collocation.room import (
+    AGAIN,
+    BEGINS,
+    ITERATIONS,
+    PAST,
+    WHOLE,
+    Collocation,
+)
+from fecontact.integrate.collocation.stages import foretell, solve_stages
+from fecontact.integrate.collocation.tableau import (
+    ERROR_POWER,
+    POINTS,
+    SPEED_TERMS,
+    STAGES,
+)
+from fecontact.integrate.rodas5p import dynamics, state
+from fecontact.integrate.rodas5p.error_control import take_scales
+from fecontact.integrate.rodas5p.method import add_jump
+from fecontact.integrate.rodas5p.step_length import (
+    LAST_ROOT,
+    LAST_STEP,
+    REJECTED_LAST,
+    next_stop,
+    target_of,
+)
+from fecontact.integrate.rodas5p.variational import Vary, begin_anew, keep, write_columns
+from fecontact.integrate.step_loop import (
+    CUT,
+    FAILED,
+    NOT_A_NUMBER,
+    OUTPUTS,
+    RATES,
+    SHORTER,
+    TAKEN,
+    Method,
+    step_loop,
+)
+from fecontact.system.nodes import ground_motion
+
+_SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.85, 0.1, 2.0
+_POWER = -1.0 / ERROR_POWER
+# Growth of a step by the iterations that the one before took: a longer one takes more.
+_EASY, _HARD = (3, 5), 1.5
+# Length of a step after one whose stages could not be solved.
+_UNSOLVED = 0.3
+# Parts of a step after a switch that are left in it, if its error allows.
+_AT_END = 1e-3
+# Accuracy of the place of a switch in a step, and how far beyond it the step ends.
+_LOCATED, _PAST = 1e-9, 1e-11
+# Parts of the time that rounding does not blur.
+_TIME = 1e-12
+# Where a switch is foretold steps end by this part before it, unless it is so near, in parts of the
+# step before, that it is known exactly.
+_SHORT, _NEXT = 1e-4, 1e-2
+# Attempts at a step that end at a switch.
+_MOST_AGAIN = 6
+
+
+class Data(NamedTuple):
+    """A run by collocation; ``vary`` as in :class:`fecontact.integrate.rodas5p.method.Data`."""
+
+    problem: state.Problem
+    progress: state.Progress
+    room: state.Room
+    output: state.Output
+    collocation: Collocation
+    vary: Vary
+
+
+class Step(NamedTuple):
+    """A step that is tried, as :class:`fecontact.integrate.rodas5p.state.Step`.
+
+    ``wanted`` is the length that it should have had.
+    """
+
+    t: float
+    h: float
+    target: float
+    latest: float
+    at_break: bool
+    wanted: float
+
+
+@routine
+def _set_begin(t, end, problem, progress, room, c):
+    """Accelerations, and powers, just after t, where the equations may have changed."""
+    s, control = problem.system, problem.control
+    after = np.nextafter(t, end)
+    dynamics.set_given(after, s, room.given, room.load)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
+                                    room.nodes, room.scratch, c.rate)
+    for k in range(c.accelerations.shape[1]):
+        c.accelerations[0, k] = c.rate[len(c.rate) // 2 + k]
+    if control.work:
+        powers_at(after, progress.state, problem, room, progress.power)
+    progress.counts[RATES] += 1
+
+
+@routine
+def _set_given(step, after, s, c):
+    """What is given in time at the stages, and the speed of the ground just ``after`` the begin."""
+    for i in range(STAGES):
+        dynamics.set_given(min(step.t + POINTS[i] * step.h, step.latest), s, c.given[i], c.load[i])
+        c.speeds[i + 1] = c.given[i, dynamics.SPEED]
+    c.speeds[0] = ground_motion(after, s).speed
+
+
+@helper
+def _set_work(x, c, out):
+    """Fill ``out`` (P,) with the works at x = 2 s - 1."""
+    for k in range(len(out)):
+        out[k] = 0.0
+    for power in range(SPEED_TERMS - 1, -1, -1):
+        for k in range(len(out)):
+            out[k] = out[k] * x + c.work[power, k]
+
+
+@routine
+def _aim(t, h, last, smallest, data):
+    """The next step to try, of about the length h, or exactly that if the last one was cut."""
+    problem, progress, room, output, c = (data.problem, data.progress, data.room,
+                                          data.output, data.collocation)
+    end = output.times[-1]
+    if last == TAKEN:
+        # What is predicted may be too short to move the time.
+        if not t + h > t:
+            h = smallest
+        if c.flags[BEGINS] != 0:
+            _set_begin(t, end, problem, progress, room, c)
+        take_scales(problem.control, progress)
+        c.cuts[:] = 0.0
+    stop, latest, is_break = next_stop(t, problem.control.breaks, end)
+    target = target_of(t, h, last == CUT, stop)
+    return Step(t, target - t, target, latest, is_break and target == stop, h)
+
+
+@routine
+def _close(step, writes, data):
+    """Keep the columns of a step, and write them if an output is in it."""
+    variation = data.vary.variation
+    if len(variation.columns) > 0:
+        keep(variation)
+        if writes:
+            write_columns(variation, data.vary.transitions[data.progress.counts[OUTPUTS]])
+            begin_anew(variation)
+
+
+@routine
+def _fill(row, step, data):
+    """Fill a row of the output."""
+    output, c = data.output, data.collocation
+    m = c.accelerations.shape[1]
+    x = 2.0 * (output.times[row] - step.t) / step.h - 1.0
+    for k in range(m):
+        output.states[row, k] = value_at(c.places, k, x)
+        output.states[row, m + k] = value_at(c.rates, k, x)
+    if data.problem.control.work:
+        _set_work(x, c, output.work[row])
+
+
+@routine
+def _go_on(step, data):
+    """Make the end of the step the state of the run."""
+    problem, progress, output, c = data.problem, data.progress, data.output, data.collocation
+    for k in range(len(progress.state)):
+        progress.state[k] = c.after[k]
+    if problem.control.work:
+        for k in range(len(progress.work)):
+            progress.power[k] = c.powers[STAGES, k]
+        _set_work(1.0, c, progress.work)
+        if step.at_break:
+            add_jump(step, c.after, problem, progress, output)
+    keep_rates(c)
+
+
+@helper
+def _growth(error):
+    """Factor of the length of the next step, by the error of this one."""
+    return min(_LARGEST_FACTOR, max(_SMALLEST_FACTOR, _SAFETY * max(error, 1e-12)**_POWER))
+
+
+@helper
+def _next_length(h, error, numbers, iterations):
+    """Length of the step after an accepted one."""
+    factor = _growth(error)
+    if iterations >= _EASY[0]:
+        factor = min(factor, _HARD if iterations < _EASY[1] else 1.0)
+    if numbers[LAST_STEP] > 0.0:
+        # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
+        factor = max(_SMALLEST_FACTOR, min(factor, factor * (h / numbers[LAST_STEP]) * (
+            max(error, 1e-6) ** _POWER / numbers[LAST_ROOT])))
+    if numbers[REJECTED_LAST] != 0.0:
+        factor = min(factor, 1.0)
+    numbers[LAST_STEP], numbers[LAST_ROOT] = h, max(error, 1e-2) ** _POWER
+    numbers[REJECTED_LAST] = 0.0
+    return h * factor
+
+
+@helper
+def _switch(h, near, solved, error, problem, progress, c):
+    """First part of a step at which forces switch, as far as it is known, 2 if none.
+
+    If the step has failed, that may have been why: its course is wrong then, and the switch is
+    where the motion before would meet it. Unless that is not known either. Also whether it is
+    known only about, as it is too far ahead.
+    """
+    foretold = error > 1.0 and c.flags[BEGINS] == 0
+    if foretold:
+        foretell(h, progress, c)
+        set_courses(h, progress, c)
+    elif not solved:
+        return 2.0, False
+    part = first_switch(near, problem, c)
+    return part, foretold and part * h > _NEXT * progress.numbers[LAST_STEP]
+
+
+@routine
+def _attempt(step, last, smallest, data):
+    """Try a step; what became of it, and the length of the next one."""
+    problem, progress, room, output, c, vary = (data.problem, data.progress, data.room, data.output,
+                                                data.collocation, data.vary)
+    control, numbers, t = problem.control, progress.numbers, step.t
+    # The derivatives of forces jump where these switch: steps with columns end there exactly.
+    varies = len(vary.variation.columns) > 0
+    at_end = 0.0 if varies else _AT_END
+    exactly = last == CUT
+    _set_given(step, np.nextafter(t, output.times[-1]), problem.system, c)
+    foretell(step.h, progress, c)
+    before = 2.0 * c.cuts[PAST] if exactly else 0.0
+    solved = solve_stages(step.h, before, problem, progress, room, c)
+    error = moved = np.inf
+    if solved:
+        set_courses(step.h, progress, c)
+        error = moved = step_error(step, problem, progress, room, c)
+        if error <= 1.0 and control.work:
+            error = max(error, work_error(step, before, problem, progress, room, c))
+    # A switch nearer to an end is there, as far as the time can tell; that at which the step
+    # before ended is passed.
+    near, part, roughly = max(_TIME * abs(t), smallest), 2.0, False
+    if c.flags[BEGINS] != 0:
+        near = max(near, _LOCATED * numbers[LAST_STEP])
+    near = max(_LOCATED, near / step.h)
+    if c.cuts[AGAIN] < _MOST_AGAIN:
+        part, roughly = _switch(step.h, near, solved, moved, problem, progress, c)
+    if part < 1.0 - max(near, at_end if error <= 1.0 else 0.0):
+        c.cuts[WHOLE] = max(c.cuts[WHOLE], step.h)
+        c.cuts[AGAIN] += 1.0
+        h = step.h * part
+        if roughly:
+            # From just before it the switch is found exactly.
+            return SHORTER, h * (1.0 - _SHORT)
+        c.cuts[PAST] = max(_PAST, 1e-3 * _TIME * abs(t) / h)
+        return CUT, h * (1.0 + c.cuts[PAST])
+    if error <= 1.0 and varies:
+        error = max(error, propagate_at(vary.propagate)(
+            t, step.h, step.latest, before, near, problem, progress, room, c, vary)
+            / vary.variation.tolerance)
+    if not error <= 1.0:
+        numbers[REJECTED_LAST] = 1.0
+        if error < np.inf:
+            return FAILED, step.h * _growth(error)
+        return NOT_A_NUMBER, step.h * _UNSOLVED
+    h = _next_length(step.h, error, numbers, c.flags[ITERATIONS])
+    # A step cut short, at a switch or a break, says little of the length of the next one.
+    whole = max(c.cuts[WHOLE], step.wanted) if step.at_break else c.cuts[WHOLE]
+    c.flags[BEGINS] = 1 if exactly or step.at_break else 0
+    if c.flags[BEGINS] != 0:
+        h = max(h, min(whole, whole * _growth(error)))
+    return TAKEN, min(h, control.longest)
+
+
+METHOD = Method("collocation", Data, _aim, _attempt, _fill, _go_on, close=_close)
+advance = step_loop(METHOD)

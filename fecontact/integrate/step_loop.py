@@ -1,0 +1,156 @@
+"""The loop over the steps of a run, the same for all methods that go on by steps they may refuse.
+
+A method is a list of compiled functions of its own data. The loop is compiled for each of them.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from fecontact.core.compiled import helper, kernel
+
+# How a call of the loop ended.
+RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
+# First entries of ``progress.numbers``: the time reached, and the length of the next step; and of
+# ``progress.counts``.
+TIME, STEP = range(2)
+STARTED, OUTPUTS, STEPS, REJECTIONS, RATES = range(5)
+# What became of an attempt at a step: it was taken; it is made anew, as what it starts from has
+# changed; it is made again with exactly the length that is returned, with about that length, or
+# with a shorter one, as its error was too large or not finite.
+TAKEN, ANEW, CUT, SHORTER, FAILED, NOT_A_NUMBER = range(6)
+# The part of a step after which a run ends that goes on.
+BEYOND = 2.0
+
+
+@helper
+def _nothing(t, data):
+    """Nothing."""
+
+
+@helper
+def _no_events(data):
+    """False: none are noted."""
+    return False
+
+
+@helper
+def _no_end(step, data):
+    """Beyond the step."""
+    return BEYOND
+
+
+@helper
+def _keep_nothing(step, writes, data):
+    """Nothing."""
+
+
+@helper
+def _never(part, step, data):
+    """Nothing: runs do not end within steps."""
+
+
+class Method(NamedTuple):
+    """What a method does in the loop, as compiled functions of its ``data``, a record.
+
+    That has ``progress`` with ``state``, ``numbers`` and ``counts``, and ``output`` with ``times``
+    and ``states``. A step has its begin ``t``, its length ``h`` and the time ``target`` at its end.
+
+    Attributes
+    ----------
+    name : str
+    data : type
+        The record.
+    aim(t, h, last, smallest, data)
+        The step to try, of about the length h; ``last`` is what became of the attempt before.
+    attempt(step, last, smallest, data)
+        Try it; what became of it, and the length of the next one.
+    fill(row, step, data)
+        Fill a row of the output, whose time is in the step.
+    go_on(step, data)
+        Make the state at the end of the step the state of the run.
+    begin(t, data)
+        Prepare the first step of a run.
+    resume(t, data)
+        Set what is not kept between calls.
+    close(step, writes, data)
+        What a step leaves behind, before its outputs are written, if it ``writes`` any.
+    full(data)
+        Whether there is no room left for the events of a step.
+    find_end(step, data)
+        Note the events of a step; the part of it after which the run ends.
+    stop_at(part, step, data)
+        Make the state at that part the state of the run.
+    """
+
+    name: str
+    data: type
+    aim: Callable[..., Any]
+    attempt: Callable[..., Any]
+    fill: Callable[..., Any]
+    go_on: Callable[..., Any]
+    begin: Callable[..., Any] = _nothing
+    resume: Callable[..., Any] = _nothing
+    close: Callable[..., Any] = _keep_nothing
+    full: Callable[..., Any] = _no_events
+    find_end: Callable[..., Any] = _no_end
+    stop_at: Callable[..., Any] = _never
+
+
+def step_loop(method: Method) -> Any:
+    """The compiled loop ``advance(data, most)`` of a method.
+
+    It goes on until ``most`` steps have been tried and one was taken, and returns how it ended.
+    Rows of the output are filled that belong to the times passed. A run that is continued gives
+    the same numbers as one that was not interrupted. Where events find no room the call returns.
+    """
+    aim, attempt, fill, go_on, begin, resume, close, full, find_end, stop_at = method[2:]
+
+    def advance(data, most):  # type: ignore[no-untyped-def]
+        progress, output = data.progress, data.output
+        numbers, counts, times = progress.numbers, progress.counts, output.times
+        smallest = 1e-14 * max(abs(times[0]), abs(times[-1]))
+        if counts[STARTED] == 0:
+            begin(numbers[TIME], data)
+            for k in range(len(progress.state)):
+                output.states[0, k] = progress.state[k]
+            counts[STARTED], counts[OUTPUTS] = 1, 1
+        t, h = numbers[TIME], numbers[STEP]
+        resume(t, data)
+        last, attempts = TAKEN, 0
+        while counts[OUTPUTS] < len(times):
+            # A step that failed is repeated before the call returns: derivatives are not kept.
+            if last == TAKEN and (attempts >= most or full(data)):
+                break
+            attempts += 1
+            step = aim(t, h, last, smallest, data)
+            last, h = attempt(step, last, smallest, data)
+            if last != TAKEN:
+                counts[REJECTIONS] += 1
+                if last >= FAILED and not h >= smallest:
+                    numbers[TIME], numbers[STEP] = t, h
+                    return MINIMUM_STEP if last == FAILED else NOT_FINITE
+                continue
+
+            part = find_end(step, data)
+            ends = part <= 1.0
+            reached = step.t + part * step.h if part < 1.0 else step.target
+            row = counts[OUTPUTS]
+            close(step, times[row] <= reached, data)
+            while row < len(times) and times[row] <= reached:
+                fill(row, step, data)
+                row += 1
+            counts[OUTPUTS] = row
+            counts[STEPS] += 1
+            if ends:
+                stop_at(part, step, data)
+                numbers[TIME], numbers[STEP] = reached, step.h
+                return STOPPED
+            go_on(step, data)
+            t = step.target
+        numbers[TIME], numbers[STEP] = t, h
+        return FINISHED if counts[OUTPUTS] == len(times) else RUNNING
+
+    advance.__qualname__ = f"advance_{method.name}"
+    advance.__annotations__ = {"data": method.data, "most": int, "return": int}
+    return kernel(advance, nogil=True)
+
