@@ -15,8 +15,8 @@ from fecontact.core.records import Matrix, Vector
 from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.series import polynomials, small_systems
-from fecontact.integrate.series.method import Data, advance
 from fecontact.integrate.series.branches import MOST_MODES
+from fecontact.integrate.series.method import Data, advance
 from fecontact.laws import (
     ConstantFriction,
     Harmonics,
