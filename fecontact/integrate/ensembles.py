@@ -29,8 +29,9 @@ from fecontact.integrate.events import AnyEvent, Events, as_events
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.lanes.driver import SideBySide, side_by_side
-from fecontact.integrate.rodas5p.driver import ENDS, again
+from fecontact.integrate.rodas5p.driver import again
 from fecontact.integrate.rodas5p.run import Run
+from fecontact.integrate.run_to_end import ENDS
 from fecontact.integrate.simulate import (
     require_max_step,
     require_resolved_span,

@@ -19,8 +19,9 @@ from fecontact.integrate.derivative_check import doubts
 from fecontact.integrate.ensembles import Ensemble, ensemble
 from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages
 from fecontact.integrate.initial_state import Initial, initial_state
-from fecontact.integrate.rodas5p.driver import ENDS, finish, start
+from fecontact.integrate.rodas5p.driver import start
 from fecontact.integrate.rodas5p.variational import MOVE
+from fecontact.integrate.run_to_end import ENDS, finish
 from fecontact.integrate.simulate import output_times, require_max_step
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, require_solver
 from fecontact.integrate.trajectory import Status

@@ -9,15 +9,16 @@ from typing import Any, NamedTuple
 from fecontact.core.compiled import helper, kernel
 
 # How a call of the loop ended.
-RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED = range(5)
+(RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED, NO_ACCELERATIONS,
+ NO_IMPULSES) = range(7)
 # First entries of ``progress.numbers``: the time reached, and the length of the next step; and of
 # ``progress.counts``.
 TIME, STEP = range(2)
 STARTED, OUTPUTS, STEPS, REJECTIONS, RATES = range(5)
 # What became of an attempt at a step: it was taken; it is made anew, as what it starts from has
 # changed; it is made again with exactly the length that is returned, with about that length, or
-# with a shorter one, as its error was too large or not finite.
-TAKEN, ANEW, CUT, SHORTER, FAILED, NOT_A_NUMBER = range(6)
+# with a shorter one, as its error was too large or not finite, or its impulses were not found.
+TAKEN, ANEW, CUT, SHORTER, FAILED, NOT_A_NUMBER, NOT_SOLVED = range(7)
 # The part of a step after which a run ends that goes on.
 BEYOND = 2.0
 
@@ -25,6 +26,7 @@ BEYOND = 2.0
 @helper
 def _nothing(t, data):
     """Nothing."""
+    return RUNNING
 
 
 @helper
@@ -66,10 +68,12 @@ class Method(NamedTuple):
         Try it; what became of it, and the length of the next one.
     fill(row, step, data)
         Fill a row of the output, whose time is in the step.
-    go_on(step, data)
-        Make the state at the end of the step the state of the run.
+    go_on(step, h, data)
+        Make the state at the end of the step the state of the run; how the run stands, and the
+        length of the next step, which is h but for what happens there.
     begin(t, data)
-        Prepare the first step of a run.
+        Prepare the first step of a run; how it stands. The first row of the states is filled;
+        ``counts[OUTPUTS] = 0`` leaves it to the first step.
     resume(t, data)
         Set what is not kept between calls.
     close(step, writes, data)
@@ -110,10 +114,12 @@ def step_loop(method: Method) -> Any:
         numbers, counts, times = progress.numbers, progress.counts, output.times
         smallest = 1e-14 * max(abs(times[0]), abs(times[-1]))
         if counts[STARTED] == 0:
-            begin(numbers[TIME], data)
             for k in range(len(progress.state)):
                 output.states[0, k] = progress.state[k]
             counts[STARTED], counts[OUTPUTS] = 1, 1
+            status = begin(numbers[TIME], data)
+            if status != RUNNING:
+                return status
         t, h = numbers[TIME], numbers[STEP]
         resume(t, data)
         last, attempts = TAKEN, 0
@@ -128,7 +134,9 @@ def step_loop(method: Method) -> Any:
                 counts[REJECTIONS] += 1
                 if last >= FAILED and not h >= smallest:
                     numbers[TIME], numbers[STEP] = t, h
-                    return MINIMUM_STEP if last == FAILED else NOT_FINITE
+                    if last == FAILED:
+                        return MINIMUM_STEP
+                    return NOT_FINITE if last == NOT_A_NUMBER else NO_IMPULSES
                 continue
 
             part = find_end(step, data)
@@ -145,8 +153,11 @@ def step_loop(method: Method) -> Any:
                 stop_at(part, step, data)
                 numbers[TIME], numbers[STEP] = reached, step.h
                 return STOPPED
-            go_on(step, data)
+            status, h = go_on(step, h, data)
             t = step.target
+            if status != RUNNING:
+                numbers[TIME], numbers[STEP] = t, h
+                return status
         numbers[TIME], numbers[STEP] = t, h
         return FINISHED if counts[OUTPUTS] == len(times) else RUNNING
 

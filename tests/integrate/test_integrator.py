@@ -20,6 +20,7 @@ from fecontact import (
 )
 from fecontact.integrate import step_loop
 from fecontact.integrate.rodas5p import driver as control
+from fecontact.integrate.run_to_end import finish
 from fecontact.laws import (
     ExponentialFriction,
     Harmonic,
@@ -35,7 +36,7 @@ from fecontact.system.powers import FRICTION, POWERS
 
 def run_of(system, state, times, rtol=1e-7, work=True):
     run = control.start(system, np.array(state), np.array(times), rtol=rtol, work=work)
-    assert control.finish(run) == step_loop.FINISHED
+    assert finish(run) == step_loop.FINISHED
     return run
 
 
@@ -200,7 +201,7 @@ def test_motion_that_grows_beyond_all_numbers_ends_the_run():
     state = np.zeros(system.size)
     state[0] = 1e305
     run = control.start(system, state, np.array([0.0, 0.1]), rtol=1e-6)
-    assert control.finish(run) == step_loop.NOT_FINITE
+    assert finish(run) == step_loop.NOT_FINITE
     assert run.time == 0.0
 
 

@@ -10,7 +10,8 @@ from fecontact import Status
 from fecontact.bifurcation import Axis, basins
 from fecontact.integrate import ContactEvents, Crossing, SetValued, strobe
 from fecontact.integrate.nonsmooth import driver
-from fecontact.integrate.nonsmooth.problem import EVENTS, GOING_ON
+from fecontact.integrate.nonsmooth.problem import AT_EVENT, IDLE
+from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, RUNNING, STEP
 from fecontact.laws import ConstantFriction, LinearContact, RoughSurface
 
 UPWARDS = [[0.0], [1.0], [0.0]]
@@ -156,24 +157,29 @@ def test_basins_of_stick_slip_and_steady_sliding():
     assert labels[0, 0] == labels[1, 1] != labels[2, 0] == labels[2, 1]
 
 
-def test_a_run_that_does_not_go_on_ends_though_its_events_fill_their_table(monkeypatch):
-    """Every call ends with a full table, at the same moment: no single one sees too many."""
-    begun, calls = driver.start, []
+@pytest.mark.parametrize(("system", "end", "options"), [
+    (belt(), 30.0, {"scheme": "events"}), (belt(), 30.0, {"scheme": "stepping"}),
+    (ball(), 3.0, {"restitution": 0.6}),
+])
+def test_runs_in_pieces_are_the_same_to_the_last_bit(system, end, options):
+    times = np.linspace(0.0, end, 301)
+    found = []
+    for piece in (1, 7, 10**6):
+        run = driver.start(system, np.array([0.5, 0.2]), times, rtol=1e-6, **options)
+        while (status := run.advance(piece)) == RUNNING:
+            pass
+        assert status == FINISHED
+        found.append((run.output.states, run.output.friction, run.course.numbers,
+                      run.course.counts))
+    for other in found[:2]:
+        for one, whole in zip(other, found[2], strict=True):
+            np.testing.assert_array_equal(one, whole)
 
-    def start(*given, **options):
-        run = begun(*given, **options)
 
-        def go(most):
-            calls.append(most)
-            assert len(calls) < 100
-            outcome = run.go(1) if len(calls) < 10 else GOING_ON
-            run.course.counts[EVENTS] += 70
-            return outcome
-
-        return run._replace(go=go)
-
-    monkeypatch.setattr(driver, "start", start)
-    run = fc.simulate(belt(), 30.0, initial=[0.5, 0.2], solver=STATIC, events=ContactEvents())
-    assert run.status is Status.MINIMUM_STEP
-    # Nine of them go on.
-    assert len(calls) == 12
+def test_a_run_without_time_between_its_events_ends_whatever_its_pieces():
+    run = driver.start(belt(), np.array([0.5, 0.2]), np.linspace(0.0, 30.0, 301), rtol=1e-6)
+    run.advance(5)
+    # As if no time had passed between many changes of contact, in calls before.
+    run.course.counts[[IDLE, AT_EVENT]] = 200, 1
+    run.course.numbers[STEP] = 0.0
+    assert run.advance(1) == MINIMUM_STEP

@@ -10,8 +10,9 @@ from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate.bernstein import of_nested
 from fecontact.integrate.nonsmooth import driver
 from fecontact.integrate.nonsmooth.event_driven import run_events
-from fecontact.integrate.nonsmooth.problem import EVENTS, GOING_ON, REJECTED, STEPS
+from fecontact.integrate.nonsmooth.problem import EVENTS
 from fecontact.integrate.nonsmooth.steps import small_systems
+from fecontact.integrate.step_loop import REJECTIONS, RUNNING
 from fecontact.laws import ExponentialFriction, PrescribedForce, RoughSurface
 
 FRICTION = ExponentialFriction(0.8, 0.55, 1000.0, 1e6)
@@ -43,7 +44,7 @@ def run_of(system, end=2.0, **options):
 
 
 def finished(go):
-    while go(2000) == GOING_ON:
+    while go(2000) == RUNNING:
         pass
 
 
@@ -51,7 +52,7 @@ def finished(go):
 def test_what_runs_of_small_systems_take_for_granted(modes, nodes):
     said, found = small_systems.fixed_values(modes, nodes), 0
     given = run_of(system(modes, nodes)).go.args
-    for values in (*given, given[0].system):
+    for values in (*given[0], given[0].problem.system):
         for field, expected in said.get(type(values), {}).items():
             value = getattr(values, field)
             if isinstance(expected, tuple):
@@ -92,7 +93,7 @@ def test_steps_at_the_limit_of_stability_seldom_fail():
     # The load comes all at once: the normal contact rings at 150 Hz for some seconds.
     run = run_of(system(3, 1), end=9.0, rtol=1e-6)
     finished(run.go)
-    assert run.course.counts[REJECTED] < 0.22 * run.course.counts[STEPS]
+    assert run.course.counts[REJECTIONS] < 0.22 * run.attempts
 
 
 def test_bernstein_coefficients_of_nested_products():

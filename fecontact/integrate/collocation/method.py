@@ -47,6 +47,7 @@ from fecontact.integrate.step_loop import (
     NOT_A_NUMBER,
     OUTPUTS,
     RATES,
+    RUNNING,
     SHORTER,
     TAKEN,
     Method,
@@ -176,7 +177,7 @@ def _fill(row, step, data):
 
 
 @routine
-def _go_on(step, data):
+def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     problem, progress, output, c = data.problem, data.progress, data.output, data.collocation
     for k in range(len(progress.state)):
@@ -188,6 +189,7 @@ def _go_on(step, data):
         if step.at_break:
             add_jump(step, c.after, problem, progress, output)
     keep_rates(c)
+    return RUNNING, h
 
 
 @helper

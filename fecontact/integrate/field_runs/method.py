@@ -37,6 +37,7 @@ from fecontact.integrate.step_loop import (
     NOT_A_NUMBER,
     OUTPUTS,
     RATES,
+    RUNNING,
     STEP,
     TAKEN,
     Method,
@@ -147,6 +148,7 @@ def _begin(t, data):
         numbers[STEP] = min(numbers[STEP], 0.1 / steep)
     for k in range(len(watch.own)):
         watch.own_values[k] = event_at(watch.own[k])(t, progress.state, watch.own_parameters[k])
+    return RUNNING
 
 
 @helper
@@ -292,7 +294,7 @@ def _stop_at(part, step, data):
 
 
 @routine
-def _go_on(step, data):
+def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     progress, room = data.progress, data.room
     d = len(progress.state)
@@ -301,6 +303,7 @@ def _go_on(step, data):
         progress.sizes[i] = max(progress.sizes[i], abs(room.after[i]))
         for k in range(d):
             progress.J[i, k] = room.J_after[i, k]
+    return RUNNING, h
 
 
 METHOD = Method("field", Data, _aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,

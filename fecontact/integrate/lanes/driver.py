@@ -23,8 +23,9 @@ from fecontact.integrate.lanes.arrays import (
 )
 from fecontact.integrate.lanes.small_systems import USUAL, advance_for
 from fecontact.integrate.rodas5p.blocks import one_block
-from fecontact.integrate.rodas5p.driver import ENDS, control_for, start
+from fecontact.integrate.rodas5p.driver import control_for, start
 from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
+from fecontact.integrate.run_to_end import ENDS
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.step_loop import FINISHED, RUNNING
 from fecontact.integrate.trajectory import Status

@@ -21,6 +21,8 @@ from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between_events, stops_of
 from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_kernels import FOUND
+from fecontact.integrate.run_to_end import ENDS, finish
+from fecontact.integrate.step_loop import OUTPUTS, REJECTIONS, STEPS, TIME
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction.stribeck import Frictionless
@@ -29,20 +31,6 @@ from fecontact.system.powers import POWER_COUNT
 
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
-_STEPS_PER_CALL = 2000
-# Changes of contact in a row without any time between them after which a run is stuck, and the time
-# that rounding adds to each, in parts of the times of the run.
-_MOST_AT_ONCE, _ROUNDING = 200, 1e-14
-# A run is stuck that advances by less than this part of its span in so many steps.
-_MANY_STEPS, _LEAST_PART = 20_000, 1e-8
-# Where implicit steps are shorter on average than this part of the longest and half are rejected,
-# so many are followed by a longest one: stages may fail in a range of lengths that steps from below
-# do not get past.
-_SHORT, _STEPS_BETWEEN = 1e-3, 100
-# How runs end before their last output time.
-_EARLY = {kinds.STUCK: Status.MINIMUM_STEP, kinds.DIVERGED: Status.NOT_FINITE,
-          kinds.PARADOX: Status.PARADOX, kinds.UNSOLVED: Status.IMPACT_UNSOLVED,
-          kinds.STOPPED: Status.EVENT}
 
 
 def integrate_set_valued(
@@ -129,49 +117,23 @@ def integrate_set_valued(
                 impact_law=impact_law, tangential_restitution=tangential_restitution,
                 static_coefficient=static_coefficient, longest=longest, max_step=max_step,
                 events=events)
-    course, output, found = run.course, run.output, run.found
-    counts, reached, times = course.counts, course.clock, output.times
+    course, output, times = run.course, run.output, run.output.times
+    counts = course.counts
     n, m, solid = system.basis.contact_nodes, system.basis.modes, system.basis.dimension == 3
-    outcome, ended = kinds.GOING_ON, Status.FINISHED
-    since, before = float(times[0]), 0
-    still = _ROUNDING * max(abs(float(times[0])), abs(float(times[-1])))
-    mark, steps, most = since, 0, _STEPS_PER_CALL
     try:
-        while outcome == kinds.GOING_ON:
-            begun, failed = float(reached[kinds.TIME]), int(counts[kinds.REJECTED])
-            outcome = run.go(most)
-            found.empty()
-            caught = (run.scheme == "stepping"
-                      and reached[kinds.TIME] - begun < _SHORT * most * run.longest
-                      and counts[kinds.REJECTED] - failed >= most // 2)
-            if caught:
-                reached[kinds.LENGTH] = run.longest
-            most = _STEPS_BETWEEN if caught else _STEPS_PER_CALL
-            if counts[kinds.STEPS] - steps >= _MANY_STEPS:
-                if outcome == kinds.GOING_ON and (
-                        reached[kinds.TIME] - mark < _LEAST_PART * (times[-1] - times[0])):
-                    outcome = kinds.STUCK
-                mark, steps = float(reached[kinds.TIME]), int(counts[kinds.STEPS])
-            # A call that ends as the table of events is full does not know of those before.
-            if reached[kinds.TIME] - since > _MOST_AT_ONCE * still:
-                since, before = float(reached[kinds.TIME]), int(counts[kinds.EVENTS])
-            elif outcome == kinds.GOING_ON and counts[kinds.EVENTS] - before > _MOST_AT_ONCE:
-                outcome = kinds.STUCK
-            if progress is not None:
-                progress(float(reached[kinds.TIME]))
+        ended = ENDS[finish(run, progress)]
     except KeyboardInterrupt:
-        if not counts[kinds.OUTPUTS]:  # nothing was computed that could be kept
+        if not counts[OUTPUTS]:  # nothing was computed that could be kept
             raise
         ended = Status.INTERRUPTED
     statistics: dict[str, Any] = {
-        "scheme": run.scheme, "steps": int(counts[kinds.STEPS]),
-        "rejected": int(counts[kinds.REJECTED]), "events": int(counts[kinds.EVENTS]),
+        "scheme": run.scheme, "steps": int(counts[STEPS]),
+        "rejected": int(counts[REJECTIONS]), "events": int(counts[kinds.EVENTS]),
         "impacts": int(counts[kinds.IMPACTS]),
         "seconds": clock.perf_counter() - begin}
-    ended = _EARLY.get(outcome, ended)
     if ended is Status.FINISHED and counts[kinds.GAINED]:
         ended = Status.IMPACT_GAINED
-    done, Y, last = int(counts[kinds.OUTPUTS]), course.state, float(reached[kinds.TIME])
+    done, Y, last = int(counts[OUTPUTS]), course.state, run.time
     time, states = times[:done], output.states[:done]
     friction, normal = output.friction[:done], output.normal[:done]
     if done < len(times) and done and last > time[-1] and np.isfinite(Y).all():
@@ -183,7 +145,7 @@ def integrate_set_valued(
     end = 2 * m + POWER_COUNT
     return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
                     statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
-                    friction_force=friction, events=found.events)
+                    friction_force=friction, events=run.found.events)
 
 
 class Run(NamedTuple):
@@ -194,7 +156,23 @@ class Run(NamedTuple):
     output: kinds.Output
     found: "_Found"
     scheme: str
-    longest: float
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return float(self.course.numbers[TIME])
+
+    @property
+    def attempts(self) -> int:
+        """Steps so far, those that failed included."""
+        return int(self.course.counts[STEPS] + self.course.counts[REJECTIONS])
+
+    def advance(self, most: int) -> int:
+        """Try so many steps; how the run stands."""
+        try:
+            return int(self.go(most))
+        finally:
+            self.found.empty()
 
 
 def start(
@@ -232,28 +210,28 @@ def start(
                           np.empty((len(times), len(course.carried))),
                           np.empty((len(times), system.basis.contact_nodes)))
     workspace = kinds.workspace_for(problem)
-    run: Callable[..., int]
-    found = _Found(system, events)
+    loop: Callable[..., int]
+    found, data = _Found(system, events), (problem, limits, course, output)
     if solid and restitution is not None:
-        from fecontact.integrate.nonsmooth.impact_steps import run_impact_steps
+        from fecontact.integrate.nonsmooth import impact_steps
         from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
         _require_no_events(events)
-        run = partial(run_impact_steps, problem, limits, course, output,
-                      impact_room_for(problem))
+        loop = partial(impact_steps.run_impact_steps,
+                       impact_steps.Data(*data, impact_room_for(problem)))
     elif scheme == "events":
+        from fecontact.integrate.nonsmooth.event_driven import Data
         from fecontact.integrate.nonsmooth.event_search import room_for
         from fecontact.integrate.nonsmooth.steps.small_systems import run_for
-        run = partial(run_for(problem), problem, limits, course, output, workspace,
-                      room_for(problem), found.watch)
+        loop = partial(run_for(problem), Data(*data, workspace, room_for(problem), found.watch))
     else:
+        from fecontact.integrate.nonsmooth import time_stepping
         from fecontact.integrate.nonsmooth.space_contact import in_space
         from fecontact.integrate.nonsmooth.stepping_room import IN_PLANE
         from fecontact.integrate.nonsmooth.stepping_room import room_for as stepping_room
-        from fecontact.integrate.nonsmooth.time_stepping import run_steps
         _require_no_events(events)
-        run = partial(run_steps, problem, limits, course, output, workspace,
-                      stepping_room(problem, in_space() if solid else IN_PLANE))
-    return Run(run, course, output, found, scheme, limits.longest)
+        loop = partial(time_stepping.run_steps, time_stepping.Data(
+            *data, workspace, stepping_room(problem, in_space() if solid else IN_PLANE)))
+    return Run(loop, course, output, found, scheme)
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:

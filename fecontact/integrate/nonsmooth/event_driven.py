@@ -6,52 +6,42 @@ step's interpolation to the last digits, and repeated with the shorter length.
 """
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import helper, routine
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative, place_size
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, Room, first_changes, least_depth
 from fecontact.integrate.nonsmooth.problem import (
+    AT_EVENT,
     DEPTH_SIZE,
-    DIVERGED,
     EVENTS,
-    FINISHED,
     FORCE,
-    GOING_ON,
     HELD,
+    IDLE,
+    KNOWN,
     LAST_ERROR,
-    LENGTH,
     OPEN,
-    OUTPUTS,
-    PARADOX,
     PENETRATION,
     RATE,
     RATE_SIZE,
-    REJECTED,
     REPEATED,
     SLIP_SIZE,
-    STARTED,
-    STEPS,
     STICK,
-    STOPPED,
-    STUCK,
-    TIME,
-    UNSOLVED,
+    UNCUT,
     Limits,
     NonsmoothProblem,
     Output,
     Progress,
-    Step,
     Workspace,
-    aimed,
+    aim,
+    pass_break,
 )
 from fecontact.integrate.nonsmooth.rigid_stops import (
     NO_ACCELERATION,
-    NO_IMPULSES,
     RATE_ROUNDING,
+    UNSOLVED,
     change_contacts_at,
     settle,
 )
@@ -60,7 +50,21 @@ from fecontact.integrate.nonsmooth.steps.rates import set_rates, set_slips, shar
 from fecontact.integrate.nonsmooth.steps.releases import holding, set_left
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
 from fecontact.integrate.rodas5p.event_kernels import Watch
-from fecontact.system.powers import DRIVE, drive_jump
+from fecontact.integrate.step_loop import (
+    BEYOND,
+    CUT,
+    FAILED,
+    MINIMUM_STEP,
+    NO_ACCELERATIONS,
+    NO_IMPULSES,
+    NOT_A_NUMBER,
+    OUTPUTS,
+    RUNNING,
+    STOPPED,
+    TAKEN,
+    Method,
+    step_loop,
+)
 
 # What has just begun to move and turns back in this part of a step is looked at more closely.
 EARLY = 0.25
@@ -75,11 +79,23 @@ _SLOW = 1e-9
 _MOST_HELD = 3
 
 
+class Data(NamedTuple):
+    """A run from event to event; what is watched for is noted in ``watch``."""
+
+    problem: NonsmoothProblem
+    limits: Limits
+    progress: Progress
+    output: Output
+    workspace: Workspace
+    room: Room
+    watch: Watch
+
+
 @helper
 def _outcome(flight):
     """Whether a run goes on after a change of contact."""
-    return PARADOX if flight == NO_ACCELERATION else (
-        UNSOLVED if flight == NO_IMPULSES else GOING_ON)
+    return NO_ACCELERATIONS if flight == NO_ACCELERATION else (
+        NO_IMPULSES if flight == UNSOLVED else RUNNING)
 
 
 @helper
@@ -125,35 +141,30 @@ def _start(t, p, limits, progress, w, room):
         progress.counts[EVENTS] += 1 if room.touched.any() else 0
         return _outcome(flight)
     decide_clusters(t, p, progress, room, 1e-12 * largest[SLIP_SIZE], w, room.rate)
-    return GOING_ON
+    return RUNNING
 
 
 @helper
-def _write_at(t, progress, output, w):
-    """Write the outputs up to the moment t, at which w tells what acts."""
-    counts = progress.counts
-    while counts[OUTPUTS] < len(output.times) and output.times[counts[OUTPUTS]] <= t:
-        row = counts[OUTPUTS]
+def _show(t, progress, output, w):
+    """Let the outputs at the time t that are filled show what comes after, of which w knows."""
+    row = progress.counts[OUTPUTS] - 1
+    while row >= 0 and output.times[row] >= t:
         output.states[row], output.friction[row] = progress.state, w.friction
         output.normal[row] = w.nodes[:, FORCE]
-        counts[OUTPUTS] += 1
+        row -= 1
 
 
-@helper
-def _write_within(step, reached, with_end, p, progress, output, w, room):
-    """Write the outputs of a step up to the time ``reached``, at that too if ``with_end``."""
-    counts, times = progress.counts, output.times
-    while counts[OUTPUTS] < len(times) and (
-            times[counts[OUTPUTS]] < reached
-            or (with_end and times[counts[OUTPUTS]] == reached)):
-        row = counts[OUTPUTS]
-        state = output.states[row]
-        interpolate((times[row] - step.t) / step.h, progress.state, room.parts, state)
-        set_rates(times[row], state, p, progress, w, room, room.rate)
-        share(p, progress.status, w)
-        for j in range(len(w.friction)):
-            output.friction[row, j], output.normal[row, j] = w.friction[j], w.nodes[j, FORCE]
-        counts[OUTPUTS] += 1
+@routine
+def _fill(row, step, data):
+    """Fill a row of the output."""
+    p, progress, output, w, room = (data.problem, data.progress, data.output, data.workspace,
+                                    data.room)
+    time, state = output.times[row], output.states[row]
+    interpolate((time - step.t) / step.h, progress.state, room.parts, state)
+    set_rates(time, state, p, progress, w, room, room.rate)
+    share(p, progress.status, w)
+    for j in range(len(w.friction)):
+        output.friction[row, j], output.normal[row, j] = w.friction[j], w.nodes[j, FORCE]
 
 
 @helper
@@ -177,18 +188,18 @@ def _shortened(length, size_of_error):
 
 
 @helper
-def _lengthened(length, size_of_error, clock):
+def _lengthened(length, size_of_error, numbers):
     """Length of the step after an accepted one.
 
     By its error and a little of the one before (PI control), so that steps at the limit of
     stability do not fail by turns; after a step that failed not longer.
     """
     size = max(size_of_error, _SMALLEST_ERROR)
-    last = clock[LAST_ERROR] if clock[LAST_ERROR] > 0.0 else size
+    last = numbers[LAST_ERROR] if numbers[LAST_ERROR] > 0.0 else size
     factor = min(5.0, max(0.5, 0.9 * size ** (0.75 * _DAMPED - 0.125) * last**_DAMPED))
-    if clock[REPEATED] != 0.0:
+    if numbers[REPEATED] != 0.0:
         factor = min(factor, 1.0)
-    clock[LAST_ERROR], clock[REPEATED] = size, 0.0
+    numbers[LAST_ERROR], numbers[REPEATED] = size, 0.0
     return length if 1.0 < factor < 1.1 else length * factor
 
 
@@ -213,19 +224,14 @@ def _mark_past(high, found, room):
 
 
 @helper
-def _accept(step, t, passing, p, progress, output, w, room):
-    """Go on to the end t of a step without events; ``passing`` a break of what is given."""
-    Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
-    m = p.rows.shape[1]
+def _accept(step, p, progress, output, w, room):
+    """Go on to the end of a step without events."""
+    Y, status, closed, t = progress.state, progress.status, progress.closed, step.target
     for i in range(len(Y)):
         Y[i] = room.new[i]
         room.slopes[0, i] = room.slopes[STAGES, i]
-    if passing:
-        work = drive_jump(step.latest, t, Y, p.system)
-        Y[2 * m + DRIVE] += work
-        last = counts[OUTPUTS] - 1
-        if last >= 0 and output.times[last] == t:
-            output.states[last, 2 * m + DRIVE] += work
+    if step.at_break:
+        pass_break(step, p, progress, output)
     for c in range(len(status)):
         room.fresh[c] = False
     for j in range(len(closed)):
@@ -239,7 +245,7 @@ def _accept(step, t, passing, p, progress, output, w, room):
     elif any_held:
         set_slips(t, Y, p, w)
         hold_velocity(p, room.held, w, Y)
-    if passing:
+    if step.at_break:
         derivative(t, Y, p, status, closed, w, room.slopes[0])
 
 
@@ -307,142 +313,165 @@ def _change_clusters(t, again, p, progress, w, room):
     decide_clusters(t, p, progress, room, 1e-9 * progress.largest[SLIP_SIZE], w, room.slopes[0])
 
 
-@helper
-def _stop_within(step, part, p, progress, output, w, room):
-    """End the run at a part of a step."""
-    reached = step.t + part * step.h
-    _write_within(step, reached, True, p, progress, output, w, room)
-    interpolate(part, progress.state, room.parts, room.state)
-    progress.state[:] = room.state
-    progress.clock[TIME] = reached
-
-
-@kernel(nogil=True)
-def run_events(
-    p: NonsmoothProblem, limits: Limits, progress: Progress, output: Output,
-    w: Workspace, room: Room, watch: Watch, most: int,
-) -> int:
-    """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
-
-    The rows of ``output`` are filled as ``progress.counts`` says. Ends early where the table of
-    events is full.
-    """
-    Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
-    clock, largest, longest = progress.clock, progress.largest, limits.longest
-    t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
-    tiny = 1e-14 * max(abs(output.times[0]), abs(end), longest)
-    stop, idle, ends_known = 0, 0, False
-    while stop < len(limits.stops) and limits.stops[stop] <= t:
-        stop += 1
+@routine
+def _begin(t, data):
+    """Decide what sticks and what is closed at the start of a run."""
+    p, progress, w, room, watch = (data.problem, data.progress, data.workspace, data.room,
+                                   data.watch)
     room.fresh[:] = False
-    if counts[STARTED] == 0:
-        counts[STARTED] = 1
-        outcome = _start(t, p, limits, progress, w, room)
-        if outcome != GOING_ON:
-            # The state at the start is the only output.
-            _write_at(t, progress, output, w)
-            return outcome
+    outcome = _start(t, p, data.limits, progress, w, room)
+    if outcome == RUNNING:
+        derivative(t, progress.state, p, progress.status, progress.closed, w, room.slopes[0])
         if watch.note != 0:
-            derivative(t, Y, p, status, closed, w, room.slopes[0])
-            note_at(watch.note)(Step(t, 0.0, t), 0.0, BEGIN, p, progress, w, room, watch)
-    derivative(t, Y, p, status, closed, w, room.slopes[0])
-    _write_at(t, progress, output, w)
-    for _ in range(most):
-        if t >= end or (watch.note != 0 and full(watch)):
-            break
-        goal, length, reaching = aimed(t, h, end, stop, limits)
-        # At the end of a step that ends at a break, signals are as before the break.
-        step = Step(t, length, np.nextafter(goal, t))
-        holds = holding(progress)
-        if holds and not ends_known:
-            set_rates(t, Y, p, progress, w, room, room.rate)
-            set_left(p, progress, w, room.ends[0])
-            ends_known = True
-        take(step, p, progress, w, room)
-        size_of_error = error(length, Y, limits, room)
-        counts[STEPS] += 1
-        if not size_of_error <= 1.0:
-            counts[REJECTED] += 1
-            clock[REPEATED] = 1.0
-            h = _shortened(length, size_of_error)
-            if not math.isfinite(size_of_error):
-                room.slopes[1:, :] = 0.0
-            if not math.isfinite(size_of_error) and length < 1e-6 * longest:
-                clock[TIME], clock[LENGTH] = t, length
-                return DIVERGED
-            if h < tiny:
-                clock[TIME], clock[LENGTH] = t, h
-                return STUCK
-            continue
-        quick, fast, deep = _sizes(progress, w)
-        if holds:
-            set_left(p, progress, w, room.ends[1])
-        prepare_dense(step, p, progress, w, room)
-        shorter = first_changes(step, p, limits, progress, w, room)
-        high, found = _first_place(room.place)
-        if shorter < high and shorter * length > tiny:
-            h = shorter * length
-            counts[REJECTED] += 1
-            continue
-        again = _mark_past(high, found, room)
-        if again and length > tiny:
-            # What has just begun to move cannot be told from its start: look at a shorter step.
-            h = 0.2 * length
-            counts[REJECTED] += 1
-            continue
-        if again:
-            high = 0.0
-        if watch.note != 0:
-            part = note_at(watch.note)(step, high, WITHIN, p, progress, w, room, watch)
-            if part <= 1.0:
-                _stop_within(step, part, p, progress, output, w, room)
-                return STOPPED
-        if p.rigid != 0:
-            advance(high, step, p, progress, room)
-        reached = goal if reaching and not found else t + high * length
-        _write_within(step, reached, not found, p, progress, output, w, room)
-        if not found:
-            t, idle = reached, 0
-            passing = reaching and stop < len(limits.stops) and goal == limits.stops[stop]
-            if passing:
-                stop += 1
-            largest[SLIP_SIZE], largest[RATE_SIZE], largest[DEPTH_SIZE] = quick, fast, deep
-            _accept(step, t, passing, p, progress, output, w, room)
-            room.ends[0] = room.ends[1]
-            ends_known = ends_known and not passing
-            h = _lengthened(length, size_of_error, clock)
-            continue
+            note_at(watch.note)(aim(t, 0.0, CUT, 0.0, data), 0.0, BEGIN, p, progress, w, room,
+                                watch)
+            derivative(t, progress.state, p, progress.status, progress.closed, w,
+                       room.slopes[0])
+    _show(t, progress, data.output, w)
+    return outcome
 
-        ends_known = False
-        idle = idle + 1 if high * length <= tiny else 0
-        if idle > _MOST_IDLE:
-            clock[TIME], clock[LENGTH] = t, length
-            return STUCK
-        if high > 0.0:
-            take(Step(t, high * length, step.latest), p, progress, w, room)
-            for i in range(len(Y)):
-                Y[i] = room.new[i]
-            t = reached
-        derivative(t, Y, p, status, closed, w, room.rate)
-        h = min(max(0.1 * length, 1e3 * tiny), longest)
-        if not again and idle < _MOST_HELD and _holds_on(p, progress, w, room):
-            for i in range(len(Y)):
-                room.slopes[0, i] = room.rate[i]
+
+@helper
+def _full(data):
+    """Whether a step may have more events than there is room for."""
+    return data.watch.note != 0 and full(data.watch)
+
+
+@helper
+def _take_to_event(step, data):
+    """Take a step that ends where a contact changes, if it has any length."""
+    p, progress, w, room = data.problem, data.progress, data.workspace, data.room
+    if step.h > 0.0:
+        take(step, p, progress, w, room)
+        row = progress.counts[OUTPUTS]
+        if p.rigid != 0 or data.watch.note != 0 or data.output.times[row] <= step.target:
+            prepare_dense(step, p, progress, w, room)
+
+
+@routine
+def _attempt(step, last, smallest, data):
+    """Try a step; what became of it, and the length of the next one.
+
+    Where a contact changes within it, it is cut there.
+    """
+    p, limits, progress, w, room = (data.problem, data.limits, data.progress, data.workspace,
+                                    data.room)
+    numbers, counts, largest = progress.numbers, progress.counts, progress.largest
+    length = step.h
+    if counts[AT_EVENT] != 0:
+        _take_to_event(step, data)
+        return TAKEN, length
+    holds = holding(progress)
+    if holds and counts[KNOWN] == 0:
+        set_rates(step.t, progress.state, p, progress, w, room, room.rate)
+        set_left(p, progress, w, room.ends[0])
+        counts[KNOWN] = 1
+    take(step, p, progress, w, room)
+    size_of_error = error(length, progress.state, limits, room)
+    if not size_of_error <= 1.0:
+        numbers[REPEATED] = 1.0
+        h = _shortened(length, size_of_error)
+        if math.isfinite(size_of_error):
+            return FAILED, h
+        room.slopes[1:, :] = 0.0
+        return NOT_A_NUMBER, h if length >= 1e-6 * limits.longest else 0.0
+    quick, fast, deep = _sizes(progress, w)
+    if holds:
+        set_left(p, progress, w, room.ends[1])
+    prepare_dense(step, p, progress, w, room)
+    shorter = first_changes(step, p, limits, progress, w, room)
+    high, found = _first_place(room.place)
+    if shorter < high and shorter * length > smallest:
+        return CUT, shorter * length
+    again = _mark_past(high, found, room)
+    if again and length > smallest:
+        # What has just begun to move cannot be told from its start: look at a shorter step.
+        return CUT, 0.2 * length
+    if found:
+        counts[AT_EVENT], numbers[UNCUT] = 2 if again else 1, length
+        return CUT, 0.0 if again else high * length
+    largest[SLIP_SIZE], largest[RATE_SIZE], largest[DEPTH_SIZE] = quick, fast, deep
+    return TAKEN, _lengthened(length, size_of_error, numbers)
+
+
+@routine
+def _find_end(step, data):
+    """Note the events of a step; the part of it after which the run ends."""
+    watch = data.watch
+    if watch.note == 0 or not step.h > 0.0:
+        return BEYOND
+    return note_at(watch.note)(step, 1.0, WITHIN, data.problem, data.progress, data.workspace,
+                               data.room, watch)
+
+
+@routine
+def _close(step, writes, data):
+    """Take young flights to the end of a step."""
+    if data.problem.rigid != 0 and step.h > 0.0:
+        advance(1.0, step, data.problem, data.progress, data.room)
+
+
+@routine
+def _stop_at(part, step, data):
+    """End the run at a part of the step."""
+    interpolate(part, data.progress.state, data.room.parts, data.room.state)
+    data.progress.state[:] = data.room.state
+
+
+@routine
+def _go_on(step, h, data):
+    """Make the end of the step the state of the run, and change contacts if it ends there."""
+    progress, room = data.progress, data.room
+    if progress.counts[AT_EVENT] != 0:
+        return _change(step, h, data)
+    _accept(step, data.problem, progress, data.output, data.workspace, room)
+    room.ends[0] = room.ends[1]
+    progress.counts[IDLE] = 0
+    if step.at_break:
+        progress.counts[KNOWN] = 0
+    return RUNNING, h
+
+
+@routine
+def _change(step, h, data):
+    """Change contacts at the end of a step; how the run stands, and the length of the next."""
+    p, limits, progress, w, room, watch = (data.problem, data.limits, data.progress,
+                                           data.workspace, data.room, data.watch)
+    Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
+    times, t = data.output.times, step.target
+    tiny = 1e-14 * max(abs(times[0]), abs(times[-1]))
+    again = counts[AT_EVENT] == 2
+    counts[AT_EVENT], counts[KNOWN] = 0, 0
+    counts[IDLE] = counts[IDLE] + 1 if step.h <= tiny else 0
+    if counts[IDLE] > _MOST_IDLE:
+        return MINIMUM_STEP, h
+    if step.h > 0.0:
+        for i in range(len(Y)):
+            Y[i] = room.new[i]
+    if step.at_break:
+        pass_break(step, p, progress, data.output)
+    derivative(t, Y, p, status, closed, w, room.rate)
+    h = min(max(0.1 * progress.numbers[UNCUT], 1e3 * tiny), limits.longest)
+    if not again and counts[IDLE] < _MOST_HELD and _holds_on(p, progress, w, room):
+        for i in range(len(Y)):
+            room.slopes[0, i] = room.rate[i]
+    else:
+        counts[EVENTS] += 1
+        if p.rigid != 0:
+            flight = _change_stops(t, again, p, limits, progress, w, room)
+            if _outcome(flight) != RUNNING:
+                return _outcome(flight), h
+            h = min(h, max(0.5 * flight, tiny))
         else:
-            counts[EVENTS] += 1
-            if p.rigid != 0:
-                flight = _change_stops(t, again, p, limits, progress, w, room)
-                if _outcome(flight) != GOING_ON:
-                    clock[TIME], clock[LENGTH] = t, length
-                    return _outcome(flight)
-                h = min(h, max(0.5 * flight, tiny))
-            else:
-                _change_clusters(t, again, p, progress, w, room)
-        # Wherever the motion goes on from, an output at this moment shows what comes after.
-        _write_at(t, progress, output, w)
-        if watch.note != 0 and note_at(watch.note)(
-                Step(t, length, step.latest), 0.0, CHANGED, p, progress, w, room, watch) <= 1.0:
-            clock[TIME], clock[LENGTH] = t, h
-            return STOPPED
-    clock[TIME], clock[LENGTH] = t, h
-    return FINISHED if t >= end else GOING_ON
+            _change_clusters(t, again, p, progress, w, room)
+    # Wherever the motion goes on from, an output at this moment shows what comes after.
+    _show(t, progress, data.output, w)
+    if watch.note != 0 and note_at(watch.note)(
+            aim(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, p, progress, w, room, watch) <= 1.0:
+        return STOPPED, h
+    return RUNNING, h
+
+
+METHOD = Method("events", Data, aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,
+                find_end=_find_end, stop_at=_stop_at)
+run_events = step_loop(METHOD)

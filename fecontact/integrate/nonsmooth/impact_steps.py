@@ -34,33 +34,21 @@ Mechanics and Engineering 177 (1999).
 """
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-
-from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import solve
 from fecontact.integrate.nonsmooth.equations import stick_limit
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
-    DIVERGED,
-    FINISHED,
     GAINED,
-    GOING_ON,
     IMPACTS,
-    LENGTH,
-    OUTPUTS,
-    REJECTED,
-    STARTED,
-    STEPS,
-    STUCK,
-    TIME,
-    UNSOLVED,
     Limits,
     NonsmoothProblem,
     Output,
     Progress,
-    Step,
-    aimed,
+    aim,
+    pass_break,
 )
 from fecontact.integrate.nonsmooth.space_contact import contact_of, scale_of
 from fecontact.integrate.nonsmooth.space_impulses import (
@@ -71,7 +59,16 @@ from fecontact.integrate.nonsmooth.space_impulses import (
     set_pushes,
     set_rows,
 )
-from fecontact.integrate.nonsmooth.time_stepping import pass_break
+from fecontact.integrate.step_loop import (
+    FAILED,
+    NOT_A_NUMBER,
+    NOT_SOLVED,
+    OUTPUTS,
+    RUNNING,
+    TAKEN,
+    Method,
+    step_loop,
+)
 from fecontact.laws.signatures import friction_at
 from fecontact.system.kernels import body_acceleration, given_at
 from fecontact.system.nodes import ground_motion, moved_across, moved_along
@@ -91,6 +88,16 @@ _STILL = 1e-9
 _GAIN = 1e-10
 # How often the impulses of a step are found anew with coefficients of its middle.
 _PASSES = 4
+
+
+class Data(NamedTuple):
+    """A run of a solid at rigid stops."""
+
+    problem: NonsmoothProblem
+    limits: Limits
+    progress: Progress
+    output: Output
+    room: ImpactRoom
 
 
 @helper
@@ -263,24 +270,32 @@ def _too_deep(t, Y, closed, limits, p, room):
 
 
 @helper
-def _write(upto, t, h, Y, out, which, progress, output, room):
-    """Write the outputs of a step from Y to ``out``; forces are constant in it."""
-    m, n = len(room.change), len(room.grip)
-    counts, times, states = progress.counts, output.times, output.states
-    while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= upto:
-        row = counts[OUTPUTS]
-        part = (times[row] - t) / h
-        for i in range(m):
-            gained = out[m + i] - Y[m + i]
-            states[row, i] = Y[i] + h * part * (Y[m + i] + 0.5 * part * gained)
-            states[row, m + i] = Y[m + i] + part * gained
-        for i in range(2 * m, len(Y)):
-            states[row, i] = Y[i] + part * (out[i] - Y[i])
-        for j in range(n):
-            output.normal[row, j] = room.forces[which, j]
-        for a in range(2 * n):
-            output.friction[row, a] = room.forces[which, n + a]
-        counts[OUTPUTS] += 1
+def _fill_within(row, t, h, Y, out, which, output, room):
+    """Fill a row in a step of length h from Y to ``out``; forces are constant in it."""
+    m, n, states = len(room.change), len(room.grip), output.states
+    part = (output.times[row] - t) / h
+    for i in range(m):
+        gained = out[m + i] - Y[m + i]
+        states[row, i] = Y[i] + h * part * (Y[m + i] + 0.5 * part * gained)
+        states[row, m + i] = Y[m + i] + part * gained
+    for i in range(2 * m, len(Y)):
+        states[row, i] = Y[i] + part * (out[i] - Y[i])
+    for j in range(n):
+        output.normal[row, j] = room.forces[which, j]
+    for a in range(2 * n):
+        output.friction[row, a] = room.forces[which, n + a]
+
+
+@routine
+def _fill(row, step, data):
+    """Fill a row of the output, by the first half of the step or the second."""
+    output, room = data.output, data.room
+    half = 0.5 * step.h
+    middle = step.t + half
+    if output.times[row] <= middle:
+        _fill_within(row, step.t, half, data.progress.state, room.half, 1, output, room)
+    else:
+        _fill_within(row, middle, step.target - middle, room.half, room.end, 2, output, room)
 
 
 @helper
@@ -296,68 +311,56 @@ def _fastest(p, room):
     return fastest
 
 
-@kernel(nogil=True)
-def run_impact_steps(
-    p: NonsmoothProblem, limits: Limits, progress: Progress, output: Output,
-    room: ImpactRoom, most: int,
-) -> int:
-    """Go on for at most ``most`` steps, up to the last of the output times; how it ended."""
-    Y, counts, clock, closed = progress.state, progress.counts, progress.clock, progress.closed
-    m = p.system.rows.shape[2]
-    t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
-    tiny = 1e-14 * max(abs(output.times[0]), abs(end), limits.longest)
-    if counts[STARTED] == 0:
-        counts[STARTED] = 1
-        for i in range(2 * m):
-            room.largest[i] = abs(Y[i])
-        put_on_ground(t, Y, closed, p, room)
-    stop = 0
-    while stop < len(limits.stops) and limits.stops[stop] <= t:
-        stop += 1
-    for _ in range(most):
-        if t >= end:
-            break
-        goal, length, reaching = aimed(t, h, end, stop, limits)
-        latest = np.nextafter(goal, t)
-        half = 0.5 * length
-        counts[STEPS] += 1
-        quick = _fastest(p, room)
-        whole = _go(t, length, latest, Y, closed, 0, quick, p, room, room.whole)
-        first = _go(t, half, latest, Y, closed, 1, quick, p, room, room.half)
-        second = -1
-        if first >= 0:
-            second = _go(t + half, half, latest, room.half, room.closed[1], 2, quick, p, room,
-                         room.end)
-        if whole < 0 or first < 0 or second < 0:
-            counts[REJECTED] += 1
-            h = 0.25 * length
-            if h < tiny:
-                clock[TIME], clock[LENGTH] = t, h
-                return UNSOLVED
-            continue
-        struck = whole > 0 or first > 0 or second > 0
-        worst = max(_error(struck, limits, room), _too_deep(
-            min(t + length, latest), room.end[: 2 * m], room.closed[2], limits, p, room))
-        if not worst <= 1.0:
-            counts[REJECTED] += 1
-            h = length * max(0.1, 0.8 / math.sqrt(worst)) if worst < math.inf else 0.1 * length
-            if h < tiny:
-                clock[TIME], clock[LENGTH] = t, h
-                return STUCK if math.isfinite(room.end[m]) else DIVERGED
-            continue
-        counts[IMPACTS] += (first > 0) + (second > 0)
-        counts[GAINED] += (first == 2) + (second == 2)
-        reached = goal if reaching else t + length
-        _write(t + half, t, half, Y, room.half, 1, progress, output, room)
-        _write(reached, t + half, reached - (t + half), room.half, room.end, 2, progress, output,
-               room)
-        Y[:] = room.end
-        closed[:] = room.closed[2]
-        put_on_ground(reached, Y, closed, p, room)
-        if reaching and stop < len(limits.stops) and goal == limits.stops[stop]:
-            stop += 1
-            pass_break(Step(t, length, latest), reached, p, progress, output)
-        t = reached
-        h = length * min(4.0, max(0.3, 0.8 / math.sqrt(max(worst, 1e-3))))
-    clock[TIME], clock[LENGTH] = t, h
-    return FINISHED if t >= end else GOING_ON
+@routine
+def _begin(t, data):
+    """Put the nodes on the ground; the first step fills the first row."""
+    progress, room = data.progress, data.room
+    for i in range(len(room.largest)):
+        room.largest[i] = abs(progress.state[i])
+    put_on_ground(t, progress.state, progress.closed, data.problem, room)
+    progress.counts[OUTPUTS] = 0
+    return RUNNING
+
+
+@routine
+def _attempt(step, last, smallest, data):
+    """Try a step and its halves; what became of it, and the length of the next one."""
+    p, limits, progress, room = data.problem, data.limits, data.progress, data.room
+    Y, closed, counts = progress.state, progress.closed, progress.counts
+    t, length, latest, m = step.t, step.h, step.latest, p.system.rows.shape[2]
+    half = 0.5 * length
+    quick = _fastest(p, room)
+    whole = _go(t, length, latest, Y, closed, 0, quick, p, room, room.whole)
+    first = _go(t, half, latest, Y, closed, 1, quick, p, room, room.half)
+    second = -1
+    if first >= 0:
+        second = _go(t + half, half, latest, room.half, room.closed[1], 2, quick, p, room,
+                     room.end)
+    if whole < 0 or first < 0 or second < 0:
+        return NOT_SOLVED, 0.25 * length
+    struck = whole > 0 or first > 0 or second > 0
+    worst = max(_error(struck, limits, room), _too_deep(
+        min(t + length, latest), room.end[: 2 * m], room.closed[2], limits, p, room))
+    if not worst <= 1.0:
+        finite = math.isfinite(room.end[m])
+        h = length * max(0.1, 0.8 / math.sqrt(worst)) if worst < math.inf else 0.1 * length
+        return FAILED if finite else NOT_A_NUMBER, h
+    counts[IMPACTS] += (first > 0) + (second > 0)
+    counts[GAINED] += (first == 2) + (second == 2)
+    return TAKEN, length * min(4.0, max(0.3, 0.8 / math.sqrt(max(worst, 1e-3))))
+
+
+@routine
+def _go_on(step, h, data):
+    """Make the end of the step the state of the run."""
+    p, progress, room = data.problem, data.progress, data.room
+    progress.state[:] = room.end
+    progress.closed[:] = room.closed[2]
+    put_on_ground(step.target, progress.state, progress.closed, p, room)
+    if step.at_break:
+        pass_break(step, p, progress, data.output)
+    return RUNNING, h
+
+
+METHOD = Method("impacts", Data, aim, _attempt, _fill, _go_on, _begin)
+run_impact_steps = step_loop(METHOD)

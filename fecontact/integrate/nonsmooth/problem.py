@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, Size, Vector, allocate
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.step_loop import CUT, OUTPUTS, RATES, STEP, TIME
 from fecontact.system.nodes import AXES, MODES, NODES, SystemArrays
-from fecontact.system.powers import POWER_COUNT
+from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
 # curve of the coefficient has not begun to change.
@@ -26,17 +27,16 @@ OPEN, STICK, FIXED = 0, 2, 3
 # State of a closed stop, and of one that an event closes though no force presses it yet.
 CLOSED, HELD = 1, 2
 
-# What a run returns: steps used up, end reached, step too short, numbers not finite, no unique
-# accelerations at rigid stops, no impulses of an impact, an event at which it is to end.
-GOING_ON, FINISHED, STUCK, DIVERGED, PARADOX, UNSOLVED, STOPPED = range(7)
-
-# Entries of Progress.clock: the time reached, the length of the next step, the error of the last
-# one, and whether the next one repeats one that failed.
-TIME, LENGTH, LAST_ERROR, REPEATED = range(4)
-# Entries of Progress.counts: what the run has done, outputs written, whether it has begun, impacts
-# that gained energy.
-COUNTS = 7
-STEPS, REJECTED, EVENTS, IMPACTS, OUTPUTS, STARTED, GAINED = range(COUNTS)
+# Entries of Progress.numbers after those of the step loop: the error of the last step, whether the
+# next one repeats one that failed, and the length of that which an event cuts short.
+NUMBERS = 5
+LAST_ERROR, REPEATED, UNCUT = range(STEP + 1, NUMBERS)
+# Entries of Progress.counts after those of the step loop: changes of contact, impacts and those
+# that gained energy; changes in a row without any time between them; whether the step ends at one,
+# and whether that has just begun to move; how often a step was cut; whether what its begin has is
+# known from the step before.
+COUNTS = 12
+EVENTS, IMPACTS, GAINED, IDLE, AT_EVENT, CUTS, KNOWN = range(RATES + 1, COUNTS)
 # Entries of Progress.largest: slip velocity, penetration rate and penetration.
 SIZES = 3
 SLIP_SIZE, RATE_SIZE, DEPTH_SIZE = range(SIZES)
@@ -100,7 +100,7 @@ class Progress(NamedTuple):
     of implicit steps, in space (2 n,) along the first tangents and then along the second ones.
     """
 
-    clock: Annotated[Array, 4]
+    numbers: Annotated[Array, NUMBERS]
     counts: Annotated[Integers, COUNTS]
     state: Annotated[Array, WITH_WORK]
     status: Annotated[Integers, CLUSTERS]
@@ -122,20 +122,53 @@ class Output(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step: begin, length, and the last time at which what is given in time counts."""
+    """A step.
+
+    Attributes
+    ----------
+    t, h : float
+        Its begin and its length.
+    latest : float
+        The last time at which what is given in time counts: as before a break, at its end.
+    target : float
+        The time at its end.
+    at_break : bool
+        Whether it ends at a break.
+    """
 
     t: float
     h: float
     latest: float
+    target: float
+    at_break: bool
 
 
 @helper
-def aimed(t, h, end, stop, limits):
-    """The next stop or the end, length of a step to there, h at most, and whether it reaches."""
-    goal = end if stop == len(limits.stops) else min(end, limits.stops[stop])
+def aim(t, h, last, smallest, data):
+    """A step of the length h at most, exactly that if it was cut, to the next break or the end."""
+    limits, end = data.limits, data.output.times[-1]
+    goal, is_break = end, False
+    for k in range(len(limits.stops)):
+        if t < limits.stops[k]:
+            is_break = limits.stops[k] <= end
+            goal = min(end, limits.stops[k])
+            break
     length = min(h, limits.longest)
-    reaches = length >= (goal - t) * (1.0 - 1e-10)
-    return goal, goal - t if reaches else length, reaches
+    near = 0.0 if last == CUT else 1e-10
+    if length >= (goal - t) * (1.0 - near) or t + length >= goal:
+        return Step(t, goal - t, np.nextafter(goal, t), goal, is_break)
+    return Step(t, length, np.nextafter(goal, t), t + length, False)
+
+
+@helper
+def pass_break(step, p, progress, output):
+    """Add the work that the drive puts in where its motions jump, at the end of a step."""
+    first = 2 * p.system.rows.shape[2]
+    work = drive_jump(step.latest, step.target, progress.state, p.system)
+    progress.state[first + DRIVE] += work
+    last = progress.counts[OUTPUTS] - 1
+    if last >= 0 and output.times[last] == step.target:
+        output.states[last, first + DRIVE] += work
 
 
 class Workspace(NamedTuple):
@@ -179,7 +212,7 @@ def progress_for(
     problem: NonsmoothProblem, rubbing: NDArray[np.bool_], state: Array, time: float, length: float
 ) -> Progress:
     """A run that is about to start; ``rubbing`` (k,) are the clusters that friction may stop."""
-    made = allocate(Progress, sizes_of(problem), clock=np.array([time, length, 0.0, 0.0]),
-                    status=np.where(rubbing, OPEN, FIXED))
+    made = allocate(Progress, sizes_of(problem), status=np.where(rubbing, OPEN, FIXED))
+    made.numbers[TIME], made.numbers[STEP] = time, length
     made.state[:len(state)] = state
     return made

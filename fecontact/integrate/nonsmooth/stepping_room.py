@@ -23,6 +23,10 @@ from fecontact.system.nodes import GroundMotion
 from fecontact.system.powers import POWER_COUNT
 
 STAGES = 3
+# Entries of `Room.tries`: the largest floor of the slip velocities, and attempts in a row whose
+# error was too large.
+TRIES = 2
+SLOWEST, IN_A_ROW = range(TRIES)
 # From values at the thirds of a step to the coefficients of a cubic.
 THIRDS = fit(np.arange(4) / 3.0)
 
@@ -62,6 +66,8 @@ class Room(NamedTuple):
         ``hold.side`` at the begin of the step.
     inertia : (n,) array
         Tx Tx^T of each node, or in space T2 T2^T if that is larger.
+    tries : (2,) array
+        What attempts at a step leave to the next one.
     cubic, speed, halves : (4,), (4,), (DEPTH, 5) arrays
         Polynomials over the step, and parts of it.
     """
@@ -81,6 +87,7 @@ class Room(NamedTuple):
     old: Matrix
     sides: Vector
     inertia: Vector
+    tries: Vector
     cubic: Vector
     speed: Vector
     halves: Matrix
@@ -100,4 +107,4 @@ def room_for(problem: NonsmoothProblem, space: InSpace = IN_PLANE) -> Room:
                 np.zeros((STAGES, 2 * m)), np.zeros((STAGES, m)), np.zeros((STAGES, k * n)),
                 np.zeros((STAGES, size - m)), start, known, np.zeros(m + size), before, after,
                 np.zeros((n, node_columns(problem))), np.zeros(k * n),
-                np.zeros(n), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))
+                np.zeros(n), np.zeros(TRIES), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))

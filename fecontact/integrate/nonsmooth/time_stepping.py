@@ -10,51 +10,57 @@ Numerical Analysis 14 (1977).
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from fecontact.core.addresses import function_at
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import helper, routine
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
 from fecontact.integrate.nonsmooth.event_search import ROUGHLY, UNFELT, first_pressed, pressed
 from fecontact.integrate.nonsmooth.problem import (
-    DIVERGED,
-    FINISHED,
+    CUTS,
     FORCE,
-    GOING_ON,
-    LENGTH,
+    KNOWN,
     LIMIT,
-    OUTPUTS,
     PENETRATION,
     RATE,
-    REJECTED,
     SLIP,
     SLIP_ACROSS,
     SLIP_SIZE,
-    STARTED,
-    STEPS,
-    STUCK,
-    TIME,
     Limits,
     NonsmoothProblem,
     Output,
     Progress,
-    Step,
     Workspace,
-    aimed,
+    aim,
+    pass_break,
 )
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
 from fecontact.integrate.nonsmooth.stepping_room import (
+    IN_A_ROW,
     OBSERVE,
     POWERS,
     SLIPS_BACK,
+    SLOWEST,
     STAGES,
     THIRDS,
     Room,
 )
+from fecontact.integrate.step_loop import (
+    CUT,
+    FAILED,
+    NOT_A_NUMBER,
+    OUTPUTS,
+    RUNNING,
+    STEPS,
+    TAKEN,
+    Method,
+    step_loop,
+)
 from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
-from fecontact.system.powers import DRIVE, body_powers, drive_jump
+from fecontact.system.powers import body_powers
 
 _observe_at, _powers_at = function_at(OBSERVE), function_at(POWERS)
 _slips_back_at = function_at(SLIPS_BACK)
@@ -67,9 +73,20 @@ ERROR_1 = B1 - GAMMA / (1.0 - GAMMA)
 ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
 NODES = (GAMMA, GAMMA + A21, 1.0)
 # A step is cut so often at most before what is left counts as error.
-CUTS = 3
+MOST_CUTS = 3
 # Outputs nearer to an end of a step, in parts of it, are at that end.
 _NEAR = 1e-9
+
+
+class Data(NamedTuple):
+    """A run by implicit steps."""
+
+    problem: NonsmoothProblem
+    limits: Limits
+    progress: Progress
+    output: Output
+    workspace: Workspace
+    room: Room
 
 
 @helper
@@ -173,13 +190,15 @@ def _slip_changes(w, room):
     return False
 
 
-@helper
-def _write_row(row, t, h, p, progress, output, w, room):
-    """State at an output time within a step of length h, by cubics through both ends."""
-    m = p.system.rows.shape[2]
+@routine
+def _fill(row, step, data):
+    """State at an output time within a step, by cubics through both ends."""
+    p, progress, output, w, room = (data.problem, data.progress, data.output, data.workspace,
+                                    data.room)
+    m, h = p.system.rows.shape[2], step.target - step.t
     Y, new, before, after = progress.state, room.new, room.before, room.after
     states, time = output.states, output.times[row]
-    x = (time - t) / h
+    x = (time - step.t) / h
     early, late = (1.0 - x) * (1.0 - x), x * x
     for i in range(m):
         q, q_new, v, v_new = Y[i], new[i], Y[m + i], new[m + i]
@@ -313,120 +332,80 @@ def _set_end(h, m, progress, room):
     room.after[m:] = rates[STAGES - 1]
 
 
-@helper
-def _accept(step, reached, p, progress, output, w, room):
-    """Write the outputs of a step and go on to its end."""
-    counts, times = progress.counts, output.times
-    if counts[STARTED] == 0:
-        counts[STARTED] = 1
+@routine
+def _begin(t, data):
+    """Prepare the first step, which fills the first row."""
+    data.room.tries[SLOWEST] = _set_inertia(data.problem, data.limits, data.room)
+    data.progress.counts[OUTPUTS] = 0
+    return RUNNING
+
+
+@routine
+def _attempt(step, last, smallest, data):
+    """Try a step; what became of it, and the length of the next one."""
+    p, limits, progress, output, w, room = (data.problem, data.limits, data.progress, data.output,
+                                            data.workspace, data.room)
+    Y, counts, largest, tries = progress.state, progress.counts, progress.largest, room.tries
+    n, _, m = p.system.rows.shape
+    length, slowest = step.h, tries[SLOWEST]
+    moved = ground_motion(step.t, p.system)
+    _observe(moved, Y, p, w.nodes, room)
+    room.old[:] = w.nodes
+    quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
+    _prepare(step, quick, p, progress, w, room)
+    finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
+    if in_space(p.system):
+        # Athwart a fast belt slip velocities are small, and their errors count.
+        finest *= 0.01
+    solved = _solve_stages(step, finest, p, limits, progress, room)
+    if solved < STAGES:
+        finite = math.isfinite(room.states[solved, m])
+        return FAILED if finite else NOT_A_NUMBER, 0.25 * length
+    worst = _error(step, p, limits, Y, room)
+    if worst > 1.0:
+        tries[IN_A_ROW] += 1.0
+        # Where a node begins to slip or to stick, the error falls with the length only.
+        factor = 0.9 * worst ** (-1.0 / 3.0) if tries[IN_A_ROW] == 1.0 else 0.7 / worst
+        return FAILED, length * max(factor, 0.02)
+    _set_rates(step, p, w, room)
+    if counts[KNOWN] == 0:
+        room.before[:m] = room.accelerations[0]
+        room.before[m:] = room.rates[0]
+    if counts[CUTS] < MOST_CUTS:
+        part = _passed_over(step, p, limits, limits.rtol * (slowest + quick), w, room)
+        if part * length > smallest and part < 1.0:
+            counts[CUTS] += 1
+            return CUT, part * length
+    row = counts[OUTPUTS]
+    # Ends of steps are exact; polynomials over a step know no change of slip within it.
+    part = (output.times[row] - step.t) / length
+    if _NEAR < part < 1.0 - _NEAR and _slip_changes(w, room):
+        return CUT, part * length
+    for j in range(n):
+        slip = abs(w.nodes[j, SLIP])
+        if in_space(p.system):
+            slip = math.hypot(slip, w.nodes[j, SLIP_ACROSS])
+        largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
+    _set_end(length, m, progress, room)
+    if counts[STEPS] == 0:
         progress.carried[:] = room.forces[0]
-    while counts[OUTPUTS] < len(times) and times[counts[OUTPUTS]] <= reached:
-        _write_row(counts[OUTPUTS], step.t, reached - step.t, p, progress, output, w, room)
-        counts[OUTPUTS] += 1
+    tries[IN_A_ROW], counts[CUTS] = 0.0, 0
+    return TAKEN, length * min(8.0, max(0.3, 0.9 * max(worst, 1e-12) ** (-1.0 / 3.0)))
+
+
+@routine
+def _go_on(step, h, data):
+    """Make the end of the step the state of the run."""
+    progress, room = data.progress, data.room
     progress.state[:] = room.new
     room.before[:] = room.after
     progress.carried[:] = room.forces[STAGES - 1]
+    room.sides[:] = room.hold.side
+    progress.counts[KNOWN] = 0 if step.at_break else 1
+    if step.at_break:
+        pass_break(step, data.problem, progress, data.output)
+    return RUNNING, h
 
 
-@helper
-def pass_break(step, t, p, progress, output):
-    """Add the work that the drive puts in where its motions jump, at the time t."""
-    first = 2 * p.system.rows.shape[2]
-    work = drive_jump(step.latest, t, progress.state, p.system)
-    progress.state[first + DRIVE] += work
-    last = progress.counts[OUTPUTS] - 1
-    if last >= 0 and output.times[last] == t:
-        output.states[last, first + DRIVE] += work
-
-
-@kernel(nogil=True)
-def run_steps(
-    p: NonsmoothProblem, limits: Limits, progress: Progress, output: Output,
-    w: Workspace, room: Room, most: int,
-) -> int:
-    """Go on for at most ``most`` steps, up to the last of the output times; how it ended.
-
-    The rows of ``output`` are filled as ``progress.counts`` says.
-    """
-    Y, counts, clock, largest = progress.state, progress.counts, progress.clock, progress.largest
-    n, _, m = p.system.rows.shape
-    slowest = _set_inertia(p, limits, room)
-    room.hold.side[:] = 0.0
-    room.sides[:] = 0.0
-    t, h, end = clock[TIME], clock[LENGTH], output.times[-1]
-    tiny = 1e-14 * max(abs(output.times[0]), abs(end), limits.longest)
-    stop, in_a_row, cuts, known_before = 0, 0, 0, False
-    while stop < len(limits.stops) and limits.stops[stop] <= t:
-        stop += 1
-    for _ in range(most):
-        if t >= end:
-            break
-        goal, length, reaching = aimed(t, h, end, stop, limits)
-        # At the end of a step that ends at a break, signals are as before the break.
-        step = Step(t, length, np.nextafter(goal, t))
-        counts[STEPS] += 1
-        moved = ground_motion(t, p.system)
-        _observe(moved, Y, p, w.nodes, room)
-        room.old[:] = w.nodes
-        quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
-        _prepare(step, quick, p, progress, w, room)
-        finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
-        if in_space(p.system):
-            # Athwart a fast belt slip velocities are small, and their errors count.
-            finest *= 0.01
-        solved = _solve_stages(step, finest, p, limits, progress, room)
-        if solved < STAGES:
-            counts[REJECTED] += 1
-            h = 0.25 * length
-            if h < tiny:
-                clock[TIME], clock[LENGTH] = t, h
-                return STUCK if math.isfinite(room.states[solved, m]) else DIVERGED
-            continue
-        worst = _error(step, p, limits, Y, room)
-        if worst > 1.0:
-            counts[REJECTED] += 1
-            in_a_row += 1
-            # Where a node begins to slip or to stick, the error falls with the length only.
-            factor = 0.9 * worst ** (-1.0 / 3.0) if in_a_row == 1 else 0.7 / worst
-            h = length * max(factor, 0.02)
-            if h < tiny:
-                clock[TIME], clock[LENGTH] = t, h
-                return STUCK
-            continue
-        _set_rates(step, p, w, room)
-        if not known_before:
-            room.before[:m] = room.accelerations[0]
-            room.before[m:] = room.rates[0]
-        if cuts < CUTS:
-            part = _passed_over(step, p, limits, limits.rtol * (slowest + quick), w, room)
-            if part * length > tiny and part < 1.0:
-                counts[REJECTED] += 1
-                cuts += 1
-                h = part * length
-                continue
-        row = counts[OUTPUTS]
-        if row < len(output.times):
-            # Ends of steps are exact; polynomials over a step know no change of slip within it.
-            part = (output.times[row] - t) / length
-            if _NEAR < part < 1.0 - _NEAR and _slip_changes(w, room):
-                counts[REJECTED] += 1
-                h = part * length
-                continue
-        for j in range(n):
-            slip = abs(w.nodes[j, SLIP])
-            if in_space(p.system):
-                slip = math.hypot(slip, w.nodes[j, SLIP_ACROSS])
-            largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
-        _set_end(length, m, progress, room)
-        t = goal if reaching else t + length
-        _accept(step, t, p, progress, output, w, room)
-        known_before = True
-        room.sides[:] = room.hold.side
-        if reaching and stop < len(limits.stops) and goal == limits.stops[stop]:
-            stop += 1
-            known_before = False
-            pass_break(step, t, p, progress, output)
-        in_a_row, cuts = 0, 0
-        h = length * min(8.0, max(0.3, 0.9 * max(worst, 1e-12) ** (-1.0 / 3.0)))
-    clock[TIME], clock[LENGTH] = t, h
-    return FINISHED if t >= end else GOING_ON
+METHOD = Method("implicit", Data, aim, _attempt, _fill, _go_on, _begin)
+run_steps = step_loop(METHOD)

@@ -3,7 +3,7 @@
 import time as clock
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from fecontact.integrate.rodas5p.state import (
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
+from fecontact.integrate.run_to_end import ENDS, finish
 from fecontact.integrate.series.branches import chosen_series, from_state
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
@@ -62,8 +63,6 @@ _SLOW = 20.0
 # or of this part of the largest that it has been. In parts of steps the error is that of what is
 # kept, else that of a solution of lower order.
 _LOOSER, _COLLOCATED, _IN_PARTS, _FADED = 10.0, 10.0, 200.0, 0.1
-# Steps of a piece of a run: at first, at least and at most.
-_FEWEST, _MOST_STEPS = 200, 10_000_000
 
 
 def start(
@@ -276,47 +275,6 @@ def _ground_bounds(system: ContactSystem, times: Array) -> Array:
                      sum(one.largest_acceleration(start, end) for one in motions)])
 
 
-class Advancing(Protocol):
-    """A run that can be left and taken up again."""
-
-    @property
-    def attempts(self) -> int:
-        """Steps so far, those that failed included."""
-
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
-
-    def advance(self, most: int) -> int:
-        """Try so many steps; ``step_loop.RUNNING`` while output times are left."""
-
-
-def finish(
-    run: Advancing, progress: Callable[[float], None] | None = None, seconds: float = 0.2,
-    keep: Callable[[], None] | None = None,
-) -> int:
-    """Go on to the end or a failure, reporting about every ``seconds``; the status.
-
-    ``keep`` is called after every piece of the run.
-    """
-    steps = _FEWEST
-    while True:
-        begin, first = clock.perf_counter(), run.attempts
-        status, done, passed = step_loop.RUNNING, 0, 0.0
-        # A call returns early when its events fill the table.
-        while status == step_loop.RUNNING and done < steps and passed < seconds:
-            status = run.advance(steps - done)
-            done, passed = run.attempts - first, clock.perf_counter() - begin
-        if progress is not None:
-            progress(run.time)
-        if status != step_loop.RUNNING:
-            return status
-        if keep is not None:
-            keep()
-        steps = int(np.clip(done * seconds / max(passed, 1e-9), _FEWEST,
-                            min(10 * steps, _MOST_STEPS)))
-
-
 def integrate(
     system: ContactSystem,
     state: Array,
@@ -364,10 +322,6 @@ def integrate(
     lost, creep = np.split(work[:, POWER_COUNT:], NODE_POWERS, axis=1)
     return Solution(times, states, work[:, :POWER_COUNT], ended, statistics,
                     node_friction_work=lost, node_creep_work=creep, events=run.events)
-
-
-ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,
-        step_loop.NOT_FINITE: Status.NOT_FINITE, step_loop.STOPPED: Status.EVENT}
 
 
 def _place(run: Run, ended: Status) -> str:

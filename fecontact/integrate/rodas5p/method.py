@@ -58,6 +58,7 @@ from fecontact.integrate.step_loop import (
     NOT_A_NUMBER,
     OUTPUTS,
     RATES,
+    RUNNING,
     TAKEN,
     Method,
     step_loop,
@@ -102,6 +103,7 @@ def _begin(t, data):
                    progress.power[POWER_COUNT:])
     if _watched(watch) or watch.counts[KINKS]:
         begin(t, progress.state, s, control.depth, watch, room.scratch)
+    return RUNNING
 
 
 @routine
@@ -405,7 +407,7 @@ def add_jump(step, state, problem, progress, output):
 
 
 @routine
-def _go_on(step, data):
+def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     problem, progress, room, output = data.problem, data.progress, data.room, data.output
     if problem.control.work:
@@ -426,6 +428,7 @@ def _go_on(step, data):
     # Those of the other nodes are zero.
     dynamics.copy_gradients(room.gradients_after, progress.gradients, room.near)
     keep_ends(n, room)
+    return RUNNING, h
 
 
 METHOD = Method("rodas5p", Data, _aim, _attempt, _fill, _go_on, _begin, _resume, _close, _full,

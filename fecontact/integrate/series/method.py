@@ -46,6 +46,7 @@ from fecontact.integrate.step_loop import (
     FAILED,
     NOT_A_NUMBER,
     RATES,
+    RUNNING,
     TAKEN,
     Method,
     step_loop,
@@ -357,19 +358,20 @@ def _find_end(step, data):
 
 
 @routine
-def _go_on(step, data):
+def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     progress, series = data.progress, data.series
     _set_state(step, series, progress.state)
     if data.problem.control.work:
         for k in range(len(_WORKS)):
             progress.work[_WORKS[k]] += value_at(series.powers[k], step.part)
+    return RUNNING, h
 
 
 @helper
 def _stop_at(part, step, data):
     """The same: runs end at ends of steps."""
-    _go_on(step, data)
+    _go_on(step, 0.0, data)
 
 
 METHOD = Method("series", Data, _aim, _attempt, _fill, _go_on, full=_full, find_end=_find_end,
