@@ -14,7 +14,7 @@ _FEWEST, _MOST_STEPS = 200, 10_000_000
 # How a run ended, by what the step loop returns.
 ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,
         step_loop.NOT_FINITE: Status.NOT_FINITE, step_loop.STOPPED: Status.EVENT,
-        step_loop.NO_ACCELERATIONS: Status.PARADOX, step_loop.NO_IMPULSES: Status.IMPACT_UNSOLVED}
+        step_loop.PARADOX: Status.PARADOX, step_loop.IMPACT_UNSOLVED: Status.IMPACT_UNSOLVED}
 
 
 class Advancing(Protocol):

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from fecontact.core.compiled import helper, kernel
 
 # How a call of the loop ended.
-(RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED, NO_ACCELERATIONS,
- NO_IMPULSES) = range(7)
+(RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED, PARADOX,
+ IMPACT_UNSOLVED) = range(7)
 # First entries of ``progress.numbers``: the time reached, and the length of the next step; and of
 # ``progress.counts``.
 TIME, STEP = range(2)
@@ -136,7 +136,7 @@ def step_loop(method: Method) -> Any:
                     numbers[TIME], numbers[STEP] = t, h
                     if last == FAILED:
                         return MINIMUM_STEP
-                    return NOT_FINITE if last == NOT_A_NUMBER else NO_IMPULSES
+                    return NOT_FINITE if last == NOT_A_NUMBER else IMPACT_UNSOLVED
                 continue
 
             part = find_end(step, data)

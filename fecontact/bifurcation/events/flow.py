@@ -11,11 +11,13 @@ change its sign.
 # Compiled functions: their types are those of their signatures for numba.
 
 import math
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel
-from fecontact.core.records import IntegerVector, Matrix, Vector
+from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.records import ANY, IntegerVector, Matrix, Size, Vector
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.dop853 import ERROR_3, ERROR_5, STAGES, A, B, C
 from fecontact.integrate.nonsmooth.equations import (
     derivative,
@@ -38,6 +40,17 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at
 from fecontact.integrate.nonsmooth.transitions import decide_clusters
+from fecontact.integrate.step_loop import (
+    FAILED,
+    NOT_A_NUMBER,
+    OUTPUTS,
+    RATES,
+    RUNNING,
+    STEP,
+    TAKEN,
+    Method,
+    step_loop,
+)
 from fecontact.laws.signatures import normal_at
 
 # Step of differences, in sizes of the states or in the longest step, and their weights: to both
@@ -76,53 +89,150 @@ def _direction(i, step, p, status, w):
     return side
 
 
+# Number of states, and that of the directions of derivatives: states, time and parameter.
+STATES = Size("states")
+DIRECTIONS = STATES + 2
+
+
+class Given(NamedTuple):
+    """A motion with friction and stops whose states are kept.
+
+    Attributes
+    ----------
+    problem, above, below : NonsmoothProblem
+        The system, and that with the parameter changed by ``change`` to either side.
+    tick : float
+        Step of differences in time [s], 0 for equations that do not depend on it.
+    rtol, longest : float
+        Tolerance, and longest step [s].
+    begin, sign : float
+        Time at the begin [s]; -1 for a motion backwards. Times of the run are sizes of the times
+        since then.
+    status, closed : (k,), (n,) integer arrays
+        What sticks and slips, and what is closed.
+    sizes : (d,) array
+        Those of the states.
+    """
+
+    problem: NonsmoothProblem
+    above: NonsmoothProblem
+    below: NonsmoothProblem
+    change: float
+    tick: float
+    rtol: float
+    longest: float
+    begin: float
+    sign: float
+    status: IntegerVector
+    closed: IntegerVector
+    sizes: Annotated[Array, STATES]
+
+
+class Reached(NamedTuple):
+    """How far a motion has come."""
+
+    numbers: Annotated[Array, STEP + 1]
+    counts: Annotated[Integers, RATES + 1]
+    state: Annotated[Array, STATES]
+
+
+class Rows(NamedTuple):
+    """Times (N,), ascending, and states (N, d) at these."""
+
+    times: Vector
+    states: Annotated[Array, ANY, STATES]
+
+
+class FlowRoom(NamedTuple):
+    """Room for a step: ``full`` and ``rate`` for a state with its work; stages and derivatives."""
+
+    workspace: Workspace
+    full: Vector
+    rate: Vector
+    around: Annotated[Array, STATES]
+    near: Annotated[Array, STATES]
+    places: Annotated[Array, STAGES + 1, STATES]
+    stages: Annotated[Array, STAGES + 1, STATES]
+    J: Annotated[Array, STATES, DIRECTIONS]
+    moved: Annotated[Array, STATES, DIRECTIONS]
+    varied: Annotated[Array, STAGES, STATES, DIRECTIONS]
+
+
+class Data(NamedTuple):
+    """A motion that is followed.
+
+    Unless it has no rows, ``slopes`` (d, d + 2) is the derivative of the state by that at the
+    start, by the time ``begin``, and by the parameter.
+    """
+
+    given: Given
+    progress: Reached
+    output: Rows
+    slopes: Matrix
+    room: FlowRoom
+
+
+class Step(NamedTuple):
+    """A step that is tried; ``wanted`` is the length it should have had."""
+
+    t: float
+    h: float
+    target: float
+    wanted: float
+
+
 @helper
-def _add_differences(t, y, p, above, below, change, sizes, tick, status, closed, w, full, rate,
-                     around, near, out):
-    """Fill out (d, d + 2) with the derivatives of the rates: by states, time and parameter."""
-    d = len(y)
+def _rates_in(t, y, p, given, room, out):
+    """Rates of the states y at a time."""
+    _rates(t, y, p, given.status, given.closed, room.workspace, room.full, room.rate, out)
+
+
+@routine
+def _add_differences(t, y, given, room):
+    """Fill ``room.J`` with the derivatives of the rates: by states, time and parameter."""
+    p, near, around, out, d = given.problem, room.near, room.around, room.J, len(y)
     out[:] = 0.0
-    _rates(t, y, p, status, closed, w, full, rate, near)
+    _rates_in(t, y, p, given, room, near)
     for i in range(d):
-        step = PART * sizes[i]
-        side = _direction(i, step, p, status, w)
+        step = PART * given.sizes[i]
+        side = _direction(i, step, p, given.status, room.workspace)
         for k in range(5):
             weight = _BOTH[k] if side == 0 else _ONE[k] * side
             if weight == 0.0:
                 continue
             around[:] = y
             around[i] += step * (k - 2 if side == 0 else k * side)
-            _rates(t, around, p, status, closed, w, full, rate, near)
+            _rates_in(t, around, p, given, room, near)
             for j in range(d):
                 out[j, i] += weight * near[j] / step
         # The slip velocities at y itself, for the next state.
-        _rates(t, y, p, status, closed, w, full, rate, near)
-    if tick > 0.0:
+        _rates_in(t, y, p, given, room, near)
+    if given.tick > 0.0:
         for k in range(5):
             if _BOTH[k] != 0.0:
-                _rates(t + (k - 2) * tick, y, p, status, closed, w, full, rate, near)
+                _rates_in(t + (k - 2) * given.tick, y, p, given, room, near)
                 for j in range(d):
-                    out[j, d] += _BOTH[k] * near[j] / tick
-    _rates(t, y, above, status, closed, w, full, rate, near)
+                    out[j, d] += _BOTH[k] * near[j] / given.tick
+    _rates_in(t, y, given.above, given, room, near)
     for j in range(d):
-        out[j, d + 1] += near[j] / (2.0 * change)
-    _rates(t, y, below, status, closed, w, full, rate, near)
+        out[j, d + 1] += near[j] / (2.0 * given.change)
+    _rates_in(t, y, given.below, given, room, near)
     for j in range(d):
-        out[j, d + 1] -= near[j] / (2.0 * change)
+        out[j, d + 1] -= near[j] / (2.0 * given.change)
 
 
-@helper
-def _stages(t, h, y, p, status, closed, w, full, rate, places, slopes):
+@routine
+def _set_stages(t, h, y, given, room):
     """Fill the states and slopes of all stages of a step, the last of which is its end."""
-    d = len(y)
+    places, slopes = room.places, room.stages
     for stage in range(STAGES + 1):
-        for i in range(d):
+        for i in range(len(y)):
             total = 0.0
             for k in range(stage):
                 total += (A[stage, k] if stage < STAGES else B[k]) * slopes[k, i]
             places[stage, i] = y[i] + h * total
         node = C[stage] if stage < STAGES else 1.0
-        _rates(t + node * h, places[stage], p, status, closed, w, full, rate, slopes[stage])
+        _rates_in(t + node * h, places[stage], given.problem, given, room, slopes[stage])
 
 
 @helper
@@ -143,73 +253,83 @@ def _error(h, sizes, rtol, slopes):
     return abs(h) * fifth * fifth / math.sqrt(fifth * fifth + 0.01 * third * third)
 
 
-@kernel(nogil=True)
-def flow(
-    p: NonsmoothProblem, above: NonsmoothProblem, below: NonsmoothProblem,
-    w: Workspace, change: float, tick: float, limits: Vector, begin: float, longest: float,
-    times: Vector, start: Vector, status: IntegerVector, closed: IntegerVector, sizes: Vector,
-    full: Vector, rate: Vector, states: Matrix, slopes: Matrix,
-) -> int:
-    """Fill ``states`` (N, d) at ``times`` (N,) after ``begin``, all of one sign and ascending in
-    size; 1 if that fails, else 0.
+@routine
+def _begin(t, data):
+    """The derivatives are those of the start; a first time after it is left to the steps."""
+    slopes = data.slopes
+    for i in range(len(slopes)):
+        for j in range(len(slopes[0])):
+            slopes[i, j] = 1.0 if i == j else 0.0
+    data.progress.counts[OUTPUTS] = 1 if data.output.times[0] == 0.0 else 0
+    return RUNNING
 
-    ``limits`` is (rtol,). Unless it has no rows, ``slopes`` (d, d + 2) becomes the derivative of
-    the last state by the start, by the time ``begin``, and by the parameter, which ``above`` and
-    ``below`` change by ``change`` to either side; ``tick`` is the step of differences in time, 0
-    for equations that do not depend on it. ``full`` and ``rate`` are room for a state.
-    """
-    d = len(start)
-    y, around, near = start.copy(), np.empty(d), np.empty(d)
-    places, stages = np.empty((STAGES + 1, d)), np.empty((STAGES + 1, d))
-    J, moved = np.empty((d, d + 2)), np.empty((d, d + 2))
-    varied = np.empty((STAGES, d, d + 2))
-    derivatives = len(slopes) > 0
-    if derivatives:
-        slopes[:] = 0.0
+
+@routine
+def _aim(t, h, last, smallest, data):
+    """The next step to try, of the length h, to the next output at most."""
+    goal = data.output.times[data.progress.counts[OUTPUTS]]
+    reaching = h >= (goal - t) * (1.0 - 1e-10)
+    return Step(t, goal - t if reaching else h, goal if reaching else t + h, h)
+
+
+@routine
+def _attempt(step, last, smallest, data):
+    """Try a step; what became of it, and the length of the next one."""
+    given, room, h = data.given, data.room, step.h
+    _set_stages(given.begin + given.sign * step.t, given.sign * h, data.progress.state, given,
+                room)
+    size = _error(h, given.sizes, given.rtol, room.stages)
+    if not size <= 1.0:
+        shorter = h * (max(0.2, 0.9 * size**-0.125) if math.isfinite(size) else 0.1)
+        if shorter < _SHORTEST * (data.output.times[-1] + abs(given.begin)):
+            shorter = 0.0
+        return FAILED if math.isfinite(size) else NOT_A_NUMBER, shorter
+    grown = min(5.0, max(0.5, 0.9 * max(size, 1e-12) ** -0.125)) * h
+    # A step that was cut at a time does not shorten the next one.
+    return TAKEN, min(given.longest, max(step.wanted, grown) if h < step.wanted else grown)
+
+
+@routine
+def _close(step, writes, data):
+    """Carry the derivatives over a step, by the same stages."""
+    given, room, slopes = data.given, data.room, data.slopes
+    J, moved, varied, length = room.J, room.moved, room.varied, given.sign * step.h
+    d = len(slopes)
+    for stage in range(STAGES if d > 0 else 0):
+        _add_differences(given.begin + given.sign * step.t + C[stage] * length,
+                         room.places[stage], given, room)
         for i in range(d):
-            slopes[i, i] = 1.0
-    t, span = 0.0, abs(times[-1])
-    sign = 1.0 if times[-1] >= 0.0 else -1.0
-    h = min(longest, span)
-    for row in range(len(times)):
-        while t != times[row]:
-            left = abs(times[row] - t)
-            reaching = h >= left * (1.0 - 1e-10)
-            length = sign * (left if reaching else h)
-            _stages(begin + t, length, y, p, status, closed, w, full, rate, places, stages)
-            size = _error(length, sizes, limits[0], stages)
-            if not size <= 1.0:
-                h = abs(length) * (max(0.2, 0.9 * size**-0.125) if math.isfinite(size) else 0.1)
-                if h < _SHORTEST * (span + abs(begin)):
-                    return 1
-                continue
-            if derivatives:
-                for stage in range(STAGES):
-                    _add_differences(begin + t + C[stage] * length, places[stage], p, above, below,
-                                     change, sizes, tick, status, closed, w, full, rate, around,
-                                     near, J)
-                    for i in range(d):
-                        for j in range(d + 2):
-                            moved[i, j] = slopes[i, j]
-                            for k in range(stage):
-                                moved[i, j] += length * A[stage, k] * varied[k, i, j]
-                    for i in range(d):
-                        for j in range(d + 2):
-                            total = J[i, j] if j >= d else 0.0
-                            for k in range(d):
-                                total += J[i, k] * moved[k, j]
-                            varied[stage, i, j] = total
-                for i in range(d):
-                    for j in range(d + 2):
-                        for k in range(STAGES):
-                            slopes[i, j] += length * B[k] * varied[k, i, j]
-            y[:] = places[STAGES]
-            t = times[row] if reaching else t + length
-            grown = min(5.0, max(0.5, 0.9 * max(size, 1e-12) ** -0.125)) * abs(length)
-            # A step that was cut at a time does not shorten the next one.
-            h = min(longest, max(h, grown) if reaching else grown)
-        states[row] = y
-    return 0
+            for j in range(d + 2):
+                moved[i, j] = slopes[i, j]
+                for k in range(stage):
+                    moved[i, j] += length * A[stage, k] * varied[k, i, j]
+        for i in range(d):
+            for j in range(d + 2):
+                total = J[i, j] if j >= d else 0.0
+                for k in range(d):
+                    total += J[i, k] * moved[k, j]
+                varied[stage, i, j] = total
+    for i in range(d):
+        for j in range(d + 2):
+            for k in range(STAGES):
+                slopes[i, j] += length * B[k] * varied[k, i, j]
+
+
+@helper
+def _fill(row, step, data):
+    """Fill a row of the output, which is at the end of the step."""
+    data.output.states[row] = data.room.places[STAGES]
+
+
+@helper
+def _go_on(step, h, data):
+    """Make the end of the step the state of the motion."""
+    data.progress.state[:] = data.room.places[STAGES]
+    return RUNNING, h
+
+
+METHOD = Method("flow", Data, _aim, _attempt, _fill, _go_on, _begin, close=_close)
+flow = step_loop(METHOD)
 
 
 @helper

@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.events.flow import (
     PART,
+    STATES,
+    Data,
+    FlowRoom,
+    Given,
+    Reached,
+    Rows,
     flow,
     forces_of_touch,
     kinetic_coefficients,
@@ -18,10 +24,12 @@ from fecontact.bifurcation.events.flow import (
 )
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.records import allocate
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.driver import nonsmooth_problem
 from fecontact.integrate.nonsmooth.problem import STICK, NonsmoothProblem, workspace_for
 from fecontact.integrate.solvers import SetValued
+from fecontact.integrate.step_loop import FINISHED
 from fecontact.system.powers import POWER_COUNT
 
 # In place of an event: the end of a period of the forcing.
@@ -30,6 +38,8 @@ PERIOD = -1
 _CHANGE = 1e-5
 # Steps are at most this part of the period.
 _LONGEST = 0.02
+# Steps that no motion needs.
+_MOST_STEPS = 10**9
 # Impulses and speeds within rounding of zero, relative to the largest.
 _ROUNDING = 1e-9
 # Durations in periods below which what vanishes at the end of a phase, divided by the power of the
@@ -209,11 +219,15 @@ class Motion:
         d = 2 * self.modes
         states, slopes = np.empty((len(times), d)), np.empty((d if derivatives else 0, d + 2))
         above, below, change = self._beside if derivatives else (self.problem, self.problem, 1.0)
-        failed = flow(self.problem, above, below, self._workspace, change, self.tick,
-                      np.array([self.rtol]), begin, self.longest, np.ascontiguousarray(times),
-                      np.ascontiguousarray(start), *phase.arrays, self.sizes, self._full,
-                      self._rate, states, slopes)
-        if failed or not np.isfinite(states).all():
+        given = Given(self.problem, above, below, change, self.tick, self.rtol, self.longest, begin,
+                      1.0 if times[-1] >= 0.0 else -1.0, *phase.arrays, self.sizes)
+        sizes, rows = {STATES: d}, Rows(np.abs(times), states)
+        reached = allocate(Reached, sizes, state=np.array(start, dtype=float),
+                           numbers=np.array([0.0, min(self.longest, rows.times[-1])]))
+        room = allocate(FlowRoom, sizes, workspace=self._workspace, full=self._full,
+                        rate=self._rate)
+        ended = flow(Data(given, reached, rows, slopes, room), _MOST_STEPS)
+        if ended != FINISHED or not np.isfinite(states).all():
             raise AnalysisError("The motion between two events could not be followed.")
         return states, slopes
 

@@ -40,8 +40,8 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.rigid_stops import (
     NO_ACCELERATION,
+    NO_IMPULSES,
     RATE_ROUNDING,
-    UNSOLVED,
     change_contacts_at,
     settle,
 )
@@ -54,11 +54,11 @@ from fecontact.integrate.step_loop import (
     BEYOND,
     CUT,
     FAILED,
+    IMPACT_UNSOLVED,
     MINIMUM_STEP,
-    NO_ACCELERATIONS,
-    NO_IMPULSES,
     NOT_A_NUMBER,
     OUTPUTS,
+    PARADOX,
     RUNNING,
     STOPPED,
     TAKEN,
@@ -94,8 +94,8 @@ class Data(NamedTuple):
 @helper
 def _outcome(flight):
     """Whether a run goes on after a change of contact."""
-    return NO_ACCELERATIONS if flight == NO_ACCELERATION else (
-        NO_IMPULSES if flight == UNSOLVED else RUNNING)
+    return PARADOX if flight == NO_ACCELERATION else (
+        IMPACT_UNSOLVED if flight == NO_IMPULSES else RUNNING)
 
 
 @helper

@@ -80,7 +80,7 @@ from fecontact.system.powers import (
 )
 
 # Returned instead of a time of flight, which is zero at least.
-NO_ACCELERATION, UNSOLVED = -1.0, -2.0
+NO_ACCELERATION, NO_IMPULSES = -1.0, -2.0
 # Slip velocities below this part of the largest are none, energies gained rounding.
 _NEAR, _GAIN = 1e-9, 1e-10
 # Rounding of penetration rates relative to the largest slip velocity or rate.
@@ -400,7 +400,7 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
     After an impact, stops whose penetration rate is below ``slow``, or whose rebound is lower than
     the rounding of the ``height`` [m] or shorter than the time ``brief`` [s], close if a force
     presses them. Returns the longest flight that a rebound may take [s], infinite if none,
-    NO_ACCELERATION or UNSOLVED, and fills ``out`` with Y'.
+    NO_ACCELERATION or NO_IMPULSES, and fills ``out`` with Y'.
     """
     Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest
     n = len(p.cluster)
@@ -423,7 +423,7 @@ def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
         struck = struck or room.touched[j]
         progress.counts[IMPACTS] += 1 if room.touched[j] else 0
     if approached and not _strike(t, touching, p, progress, w):
-        return UNSOLVED
+        return NO_IMPULSES
     return _decide(t, touching, struck, slow, height, brief, _NEAR * near, p, progress, room, w,
                    out)
 
