@@ -100,8 +100,8 @@ class Method(NamedTuple):
     stop_at: Callable[..., Any] = _never
 
 
-def step_loop(method: Method) -> Any:
-    """The compiled loop ``advance(data, most)`` of a method.
+def step_loop(method: Method, constants: str = "") -> Any:
+    """The compiled loop ``advance(data, most)`` of a method; ``constants`` as for a kernel.
 
     It goes on until ``most`` steps have been tried and one was taken, and returns how it ended.
     Rows of the output are filled that belong to the times passed. A run that is continued gives
@@ -109,7 +109,7 @@ def step_loop(method: Method) -> Any:
     """
     aim, attempt, fill, go_on, begin, resume, close, full, find_end, stop_at = method[2:]
 
-    def advance(data, most):  # type: ignore[no-untyped-def]
+    def advance(data, most):
         progress, output = data.progress, data.output
         numbers, counts, times = progress.numbers, progress.counts, output.times
         smallest = 1e-14 * max(abs(times[0]), abs(times[-1]))
@@ -163,5 +163,5 @@ def step_loop(method: Method) -> Any:
 
     advance.__qualname__ = f"advance_{method.name}"
     advance.__annotations__ = {"data": method.data, "most": int, "return": int}
-    return kernel(advance, nogil=True)
+    return kernel(advance, constants=constants, nogil=True)
 

@@ -14,9 +14,9 @@ from fecontact.core.errors import InputError
 from fecontact.core.records import Matrix, Vector
 from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.integrate.rodas5p import driver
-from fecontact.integrate.series import polynomials, small_systems
+from fecontact.integrate.series import polynomials
 from fecontact.integrate.series.branches import MOST_MODES
-from fecontact.integrate.series.method import Data, advance
+from fecontact.integrate.series.method import SMALL, Data, advance
 from fecontact.laws import (
     ConstantFriction,
     Harmonics,
@@ -459,7 +459,7 @@ def test_ensembles_and_derivatives():
     assert run.series is None
 
 
-@pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
+@pytest.mark.parametrize(("modes", "nodes"), SMALL.sizes)
 def test_what_small_systems_take_for_granted(modes, nodes):
     rng = np.random.default_rng(modes)
     system = oscillator(np.linspace(5.0, 300.0, modes), np.full(modes, 0.01),
@@ -467,7 +467,7 @@ def test_what_small_systems_take_for_granted(modes, nodes):
     state = 1e-3 * rng.normal(size=2 * modes)
     runs = [driver.start(system, state, np.linspace(0.0, 0.2, 11), rtol=1e-8, series="always")
             for _ in range(2)]
-    said = small_systems.fixed_values(modes, nodes)
+    said = SMALL.values(modes, nodes)
     for values in (runs[0].problem, runs[0].progress, runs[0].output, runs[0].watch,
                    runs[0].series):
         for field, expected in said.get(type(values), {}).items():

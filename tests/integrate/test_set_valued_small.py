@@ -9,9 +9,8 @@ from systems import two_mass_system
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate.bernstein import of_nested
 from fecontact.integrate.nonsmooth import driver
-from fecontact.integrate.nonsmooth.event_driven import run_events
+from fecontact.integrate.nonsmooth.event_driven import SMALL, run_events
 from fecontact.integrate.nonsmooth.problem import EVENTS
-from fecontact.integrate.nonsmooth.steps import small_systems
 from fecontact.integrate.step_loop import REJECTIONS, RUNNING
 from fecontact.laws import ExponentialFriction, PrescribedForce, RoughSurface
 
@@ -48,9 +47,9 @@ def finished(go):
         pass
 
 
-@pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
+@pytest.mark.parametrize(("modes", "nodes"), SMALL.sizes)
 def test_what_runs_of_small_systems_take_for_granted(modes, nodes):
-    said, found = small_systems.fixed_values(modes, nodes), 0
+    said, found = SMALL.values(modes, nodes), 0
     given = run_of(system(modes, nodes)).go.args
     for values in (*given[0], given[0].problem.system):
         for field, expected in said.get(type(values), {}).items():
@@ -64,7 +63,7 @@ def test_what_runs_of_small_systems_take_for_granted(modes, nodes):
     assert found == sum(map(len, said.values()))
 
 
-@pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
+@pytest.mark.parametrize(("modes", "nodes"), SMALL.sizes)
 def test_same_results_as_by_the_run_of_all_systems(modes, nodes):
     own, other = (run_of(system(modes, nodes)) for _ in range(2))
     assert own.go.func is not run_events

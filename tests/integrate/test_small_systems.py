@@ -5,9 +5,10 @@ import pytest
 from systems import friction_oscillator, two_mass_system
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
-from fecontact.integrate.lanes import small_systems as lane_systems
+from fecontact.integrate import small_systems
+from fecontact.integrate.lanes import step_loop as lanes_loop
 from fecontact.integrate.lanes.driver import side_by_side
-from fecontact.integrate.rodas5p import driver, method, small_systems
+from fecontact.integrate.rodas5p import driver, method, propagation
 from fecontact.integrate.rodas5p.state import Output
 from fecontact.integrate.rodas5p.variational import Variation
 from fecontact.laws import DahlFriction, ExponentialFriction, RoughSurface
@@ -57,18 +58,18 @@ def assert_as_said(values, said):
 
 @pytest.mark.parametrize(("modes", "nodes"), small_systems.SIZES)
 def test_what_step_loops_take_for_granted(modes, nodes):
-    said = small_systems.fixed_values(modes, nodes)
+    said = method.SMALL.values(modes, nodes)
     run = run_of(system(modes, nodes))
     tuples = (run.problem, run.progress, run.room, run.output, run.variation)
     found = sum(assert_as_said(values, said) for values in tuples)
     assert found >= sum(map(len, said.values()))
 
 
-@pytest.mark.parametrize(("modes", "nodes"), lane_systems.USUAL)
+@pytest.mark.parametrize(("modes", "nodes"), lanes_loop.SMALL.sizes)
 def test_what_step_loops_of_lanes_take_for_granted(modes, nodes):
     one, times = system(modes, nodes), np.array([[0.0, 0.1]])
     begun = side_by_side([one], lambda _: np.zeros(2 * modes), times, 1e-6, None, "auto")[0]
-    said = lane_systems.fixed_values(modes, nodes)
+    said = lanes_loop.SMALL.values(modes, nodes)
     lanes, runs = begun.lanes(), begun.runs
     spare = begun.spare()
     found = sum(assert_as_said(values, said) for values in (lanes, runs, *spare))
@@ -80,7 +81,7 @@ def test_what_step_loops_of_lanes_take_for_granted(modes, nodes):
 def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
     # Steps of one length: where they follow the error, rounding shifts their ends.
     own, other = (run_of(system(modes, nodes), max_step=2e-5) for _ in range(2))
-    assert small_systems.advance_for(own.problem, own.variation) is not method.advance
+    assert method.advance_for(own.problem, own.variation) is not method.advance
     own.advance(400)
     method.advance(method.Data(other.problem, other.progress, other.room, other.output,
                                other.variation, other.watch), 400)
@@ -93,7 +94,7 @@ def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
 
 @pytest.mark.parametrize("modes", [1, 2, 3])
 def test_what_derivatives_take_for_granted(modes):
-    said = small_systems.values_of_derivatives(modes, 1)
+    said = propagation.SMALL.values(modes, 1)
     run = run_of(system(modes, 1), vary=True)
     tuples = (run.problem, run.progress, run.room, run.output, run.variation)
     found = sum(assert_as_said(values, said) for values in tuples)
@@ -109,8 +110,10 @@ def test_same_derivatives_as_by_the_code_of_all_systems(modes, monkeypatch):
     found = []
     for small, parts in ((True, False), (False, False), (False, True)):
         if not small:
-            monkeypatch.setattr(small_systems, "_small", lambda problem: False)
-            monkeypatch.setattr(small_systems, "in_parts", lambda problem, parts=parts: parts)
+            monkeypatch.setattr(propagation, "is_small", lambda problem: False)
+            monkeypatch.setattr(method, "is_small", lambda problem: False)
+            monkeypatch.setattr(propagation, "in_parts", lambda problem, parts=parts: parts)
+            monkeypatch.setattr(driver, "in_parts", lambda problem, parts=parts: parts)
         run = run_of(block, vary=vary, vary_rtol=1e9, max_step=2e-5)
         run.advance(300)
         found.append((run.time, run.variation.variation.columns))
@@ -126,9 +129,9 @@ def test_systems_with_more_to_them_have_the_step_loop_of_all():
     small = friction_oscillator()
     for other in (system(5, 1), system(2, 3), small.with_(friction=DahlFriction(0.3, 1e6))):
         run = run_of(other)
-        assert small_systems.advance_for(run.problem, run.variation) is method.advance
+        assert method.advance_for(run.problem, run.variation) is method.advance
     run = run_of(small, vary=True)
-    assert small_systems.advance_for(run.problem, run.variation) is method.advance
+    assert method.advance_for(run.problem, run.variation) is method.advance
     for other in (small, two_mass_system()):
         run = run_of(other)
-        assert small_systems.advance_for(run.problem, run.variation) is not method.advance
+        assert method.advance_for(run.problem, run.variation) is not method.advance

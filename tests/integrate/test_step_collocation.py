@@ -11,7 +11,8 @@ import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, Status, simulate
 from fecontact.core.errors import InputError
 from fecontact.integrate import ContactEvents, Rodas5P, step_loop
-from fecontact.integrate.collocation import small_systems, tableau
+from fecontact.integrate.collocation import tableau
+from fecontact.integrate.collocation.method import SMALL
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.variational import Variation
 from fecontact.laws import (
@@ -246,7 +247,7 @@ def test_breaks_and_jumps_of_forces():
 
 # Other integrators -------------------------------------------------------------------------------
 
-@pytest.mark.parametrize(("modes", "nodes"), small_systems.small_systems.SIZES)
+@pytest.mark.parametrize(("modes", "nodes"), SMALL.sizes)
 def test_systems_of_all_sizes_move_as_by_rodas5p(modes, nodes):
     system, times = block(modes, nodes), np.linspace(0.0, 0.3, 61)
     start = np.zeros(2 * modes)
@@ -397,9 +398,9 @@ def test_ensembles():
     assert (twice.states[0] == twice.states[1]).all()
 
 
-@pytest.mark.parametrize(("modes", "nodes"), small_systems.small_systems.SIZES)
+@pytest.mark.parametrize(("modes", "nodes"), SMALL.sizes)
 def test_what_step_loops_take_for_granted(modes, nodes):
-    said = small_systems.fixed_values(modes, nodes)
+    said = SMALL.values(modes, nodes)
     system = block(modes, nodes, normal=RoughSurface(10e6, 10e-6, 40.0))
     run = driver.start(system, np.zeros(2 * modes), np.linspace(0.0, 0.1, 11), rtol=1e-8,
                        collocation="always")

@@ -25,7 +25,7 @@ from fecontact.bifurcation.events.flow import (
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.records import allocate
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.driver import nonsmooth_problem
 from fecontact.integrate.nonsmooth.problem import STICK, NonsmoothProblem, workspace_for
 from fecontact.integrate.solvers import SetValued
@@ -104,7 +104,7 @@ class Phase:
         return self.status, self.closed
 
     @cached_property
-    def arrays(self) -> tuple[Array, Array]:
+    def arrays(self) -> tuple[Integers, Integers]:
         """Status (k,) and closed stops (n,) for kernels."""
         return np.array(self.status, dtype=np.int64), np.array(self.closed, dtype=np.int64)
 

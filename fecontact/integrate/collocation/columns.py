@@ -46,7 +46,9 @@ from fecontact.integrate.collocation.tableau import (
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
-from fecontact.integrate.rodas5p.variational import Vary, add_matrices
+from fecontact.integrate.rodas5p.propagation import RECORDS, open_nodes
+from fecontact.integrate.rodas5p.variational import DIRECTIONS, Vary, add_matrices
+from fecontact.integrate.small_systems import USUAL, Sized
 from fecontact.laws.signatures import friction_at, normal_at
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
@@ -322,3 +324,5 @@ def propagate(
 
 
 propagate_at = function_at(propagate)
+SMALL = Sized(propagate.for_values, (*RECORDS, Collocation), USUAL, open_nodes,
+              lambda nodes: {DIRECTIONS: 4})

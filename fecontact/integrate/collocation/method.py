@@ -1,5 +1,6 @@
 """Steps by collocation: few long ones, each of which ends where forces switch."""
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ from fecontact.integrate.rodas5p.step_length import (
     target_of,
 )
 from fecontact.integrate.rodas5p.variational import Vary, begin_anew, keep, write_columns
+from fecontact.integrate.small_systems import Sized
 from fecontact.integrate.step_loop import (
     CUT,
     FAILED,
@@ -289,4 +291,6 @@ def _attempt(step, last, smallest, data):
 
 
 METHOD = Method("collocation", Data, _aim, _attempt, _fill, _go_on, close=_close)
-advance = step_loop(METHOD)
+# Runs by collocation are of these systems, with any number of columns, or none.
+SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Room,
+                                          state.Output, Collocation))

@@ -17,7 +17,7 @@ from fecontact.integrate.collocation.tableau import (
 )
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.rodas5p import dynamics
-from fecontact.integrate.rodas5p.small_systems import not_small
+from fecontact.integrate.small_systems import not_small
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.nodes import MODES, NODES
 from fecontact.system.powers import WORKS

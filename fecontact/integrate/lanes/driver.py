@@ -21,12 +21,12 @@ from fecontact.integrate.lanes.arrays import (
     Lanes,
     lanes_for,
 )
-from fecontact.integrate.lanes.small_systems import USUAL, advance_for
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import control_for, start
 from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
 from fecontact.integrate.run_to_end import ENDS
 from fecontact.integrate.series.branches import series_pay
+from fecontact.integrate.small_systems import FEW
 from fecontact.integrate.step_loop import FINISHED, RUNNING
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.ground.motion import constant_speed
@@ -69,7 +69,7 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     """
     s = system.arrays
     n, _, m = s.rows.shape
-    if ((m, n) not in USUAL or s.rows.shape[1] > 2 or s.memory.any() or s.second_motion
+    if ((m, n) not in FEW or s.rows.shape[1] > 2 or s.memory.any() or s.second_motion
             or s.friction_scale or system.ground.wavy or system.breakpoints(begin, end)):
         return None
     acts = (s.drive_stiffness != 0.0) | (s.drive_damping != 0.0)
@@ -181,7 +181,7 @@ class SideBySide:
         """Go on with runs that no other worker has until none is left, or they are not wanted."""
         lanes, spare = self.lanes(), self.spare()
         runs = self.runs._replace(counts=np.zeros(4, dtype=np.int64))
-        advance = advance_for(self._kind.modes, self._kind.nodes)
+        advance = step_loop.SMALL.of(self._kind.modes, self._kind.nodes)
         ended = step_loop.GOES_ON
         while wanted() and (ended != step_loop.DONE or self._resume()):
             runs = self._dealt_to(runs, workers)

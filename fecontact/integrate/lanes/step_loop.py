@@ -7,7 +7,7 @@ another one computes, so that results do not depend on which runs are side by si
 
 import numpy as np
 
-from fecontact.core.compiled import helper, routine
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.lanes.functions import reciprocal_fifth_root
 from fecontact.core.lanes.vectors import (
     WIDTH,
@@ -46,6 +46,7 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.driver import SWITCH_PART as _SWITCH_PART
 from fecontact.integrate.rodas5p.state import Step
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
+from fecontact.integrate.small_systems import FEW, Sized
 from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
 from fecontact.system.nodes import GroundMotion
 
@@ -340,8 +341,7 @@ def advance(
     """Go on until ``most`` steps have been tried in all lanes; returns how it ended.
 
     ``problem``, ``progress`` and ``room`` are those of some run of the same kind, as room for
-    checks of single lanes. It is compiled for each size, in
-    :mod:`fecontact.integrate.lanes.small_systems`.
+    checks of single lanes. It is compiled for each size: ``SMALL``.
     """
     active = _fill(b, runs)
     for _ in range(most):
@@ -360,3 +360,10 @@ def advance(
             if b.progress.runs[lane] >= 0:
                 active |= 1 << lane
     return GOES_ON
+
+
+# The arrays of the run that checks of single lanes are made with are among these.
+SMALL = Sized(
+    lambda given: kernel(advance, constants=given, nogil=True),
+    (run_arrays.Problem, run_arrays.Progress, run_arrays.Room, arrays.LaneSystem,
+     arrays.LaneControl, arrays.LaneProgress, arrays.LaneRoom, arrays.LaneRuns), FEW)

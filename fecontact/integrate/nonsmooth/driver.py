@@ -219,9 +219,8 @@ def start(
         loop = partial(impact_steps.run_impact_steps,
                        impact_steps.Data(*data, impact_room_for(problem)))
     elif scheme == "events":
-        from fecontact.integrate.nonsmooth.event_driven import Data
+        from fecontact.integrate.nonsmooth.event_driven import Data, run_for
         from fecontact.integrate.nonsmooth.event_search import room_for
-        from fecontact.integrate.nonsmooth.steps.small_systems import run_for
         loop = partial(run_for(problem), Data(*data, workspace, room_for(problem), found.watch))
     else:
         from fecontact.integrate.nonsmooth import time_stepping

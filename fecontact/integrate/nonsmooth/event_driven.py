@@ -6,7 +6,10 @@ step's interpolation to the last digits, and repeated with the shorter length.
 """
 
 import math
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
@@ -15,6 +18,7 @@ from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, Room, first_changes, least_depth
 from fecontact.integrate.nonsmooth.problem import (
     AT_EVENT,
+    CLUSTERS,
     DEPTH_SIZE,
     EVENTS,
     FORCE,
@@ -22,6 +26,8 @@ from fecontact.integrate.nonsmooth.problem import (
     IDLE,
     KNOWN,
     LAST_ERROR,
+    NODE_COLUMNS,
+    NODE_ENTRIES,
     OPEN,
     PENETRATION,
     RATE,
@@ -50,6 +56,7 @@ from fecontact.integrate.nonsmooth.steps.rates import set_rates, set_slips, shar
 from fecontact.integrate.nonsmooth.steps.releases import holding, set_left
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
 from fecontact.integrate.rodas5p.event_kernels import Watch
+from fecontact.integrate.small_systems import FEW, Sized
 from fecontact.integrate.step_loop import (
     BEYOND,
     CUT,
@@ -475,3 +482,16 @@ def _change(step, h, data):
 METHOD = Method("events", Data, aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,
                 find_end=_find_end, stop_at=_stop_at)
 run_events = step_loop(METHOD)
+# For nodes of which each has a slip velocity of its own.
+SMALL = Sized(
+    partial(step_loop, METHOD), (NonsmoothProblem, Limits, Progress, Output, Workspace, Room), FEW,
+    lambda modes, nodes: {NonsmoothProblem: {"cluster": np.arange(nodes)}},
+    lambda nodes: {CLUSTERS: nodes, NODE_ENTRIES: NODE_COLUMNS})
+
+
+def run_for(problem: NonsmoothProblem) -> Any:
+    """The loop for a system of this size, or for all."""
+    nodes, _, modes = problem.system.rows.shape
+    if (modes, nodes) in FEW and len(problem.rows) == nodes and problem.system.second_motion == 0:
+        return SMALL.of(modes, nodes)
+    return run_events

@@ -24,9 +24,9 @@ from fecontact.integrate.reference.scipy import (
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
+from fecontact.integrate.rodas5p.propagation import in_parts, propagate_for
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.sliders import attend
-from fecontact.integrate.rodas5p.small_systems import in_parts, propagate_for
 from fecontact.integrate.rodas5p.state import (
     Control,
     Output,
@@ -138,9 +138,9 @@ def start(
     propagate, looser = 0, _LOOSER
     if vary and collocated:
         # Compiled for runs that need it only.
-        from fecontact.integrate.collocation.small_systems import propagate_for as carried_for
+        from fecontact.integrate.collocation import columns as carried
 
-        propagate, looser = carried_for(problem), _COLLOCATED
+        propagate, looser = int(carried.SMALL.of(m, n).address), _COLLOCATED
     elif vary:
         propagate, looser = propagate_for(problem), _IN_PARTS if in_parts(problem) else _LOOSER
     return Run(

@@ -1,6 +1,7 @@
 """Steps of Rodas5P for contact systems."""
 
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,12 +45,14 @@ from fecontact.integrate.rodas5p.step_length import (
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
+    Variation,
     Vary,
     begin_anew,
     keep,
     propagate_at,
     write_columns,
 )
+from fecontact.integrate.small_systems import Sized, is_small
 from fecontact.integrate.step_loop import (
     ANEW,
     BEYOND,
@@ -434,3 +437,16 @@ def _go_on(step, h, data):
 METHOD = Method("rodas5p", Data, _aim, _attempt, _fill, _go_on, _begin, _resume, _close, _full,
                 _find_end, _stop_at)
 advance = step_loop(METHOD)
+SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Room, state.Output),
+              more=lambda modes, nodes: {Variation: {"columns": (0, None)}})
+
+
+def advance_for(problem: state.Problem, vary: Vary) -> Any:
+    """The loop of a run: that of the size of its system if it is small, or that of all.
+
+    Runs with derivatives have the latter.
+    """
+    if len(vary.variation.columns) or not is_small(problem):
+        return advance
+    nodes, _, modes = problem.system.rows.shape
+    return SMALL.of(modes, nodes)

@@ -12,8 +12,7 @@ from fecontact.integrate.collocation.room import JACOBIANS, Collocation
 from fecontact.integrate.event_arrays import take_events
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p.event_kernels import Watch
-from fecontact.integrate.rodas5p.method import Data
-from fecontact.integrate.rodas5p.small_systems import advance_for
+from fecontact.integrate.rodas5p.method import Data, advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.integrate.series.branches import Series
@@ -121,16 +120,18 @@ class Run:
         data: Any
         if self.series is not None:
             # Compiled for runs that need it only.
-            from fecontact.integrate.series import method, small_systems
+            from fecontact.integrate.series import method as by_series
 
-            data = method.Data(self.problem, self.progress, self.output, self.watch, self.series)
-            loop = small_systems.advance_for(self.problem)
+            data = by_series.Data(self.problem, self.progress, self.output, self.watch,
+                                  self.series)
+            loop = by_series.advance_for(self.problem)
         elif self.collocation is not None:
-            from fecontact.integrate.collocation import method, small_systems
+            from fecontact.integrate.collocation import method as by_collocation
 
-            data = method.Data(self.problem, self.progress, self.room, self.output,
-                               self.collocation, self.variation)
-            loop = small_systems.advance_for(self.problem)
+            data = by_collocation.Data(self.problem, self.progress, self.room, self.output,
+                                       self.collocation, self.variation)
+            nodes, _, modes = self.problem.system.rows.shape
+            loop = by_collocation.SMALL.of(modes, nodes)
         else:
             data = Data(self.problem, self.progress, self.room, self.output, self.variation,
                         self.watch)

@@ -8,7 +8,8 @@ falls to zero.
 """
 
 import math
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,7 @@ from fecontact.integrate.series.expansion import (
     set_forcing,
 )
 from fecontact.integrate.series.polynomials import COEFFICIENTS, DEGREE, first_zero, value_at
+from fecontact.integrate.small_systems import FEW, Sized
 from fecontact.integrate.step_loop import (
     BEYOND,
     FAILED,
@@ -377,3 +379,13 @@ def _stop_at(part, step, data):
 METHOD = Method("series", Data, _aim, _attempt, _fill, _go_on, full=_full, find_end=_find_end,
                 stop_at=_stop_at)
 advance = step_loop(METHOD)
+SMALL = Sized(partial(step_loop, METHOD),
+              (state.Problem, state.Progress, state.Output, Series), FEW)
+
+
+def advance_for(problem: state.Problem) -> Any:
+    """The loop for a system of this size, or for all."""
+    nodes, _, modes = problem.system.rows.shape
+    if (modes, nodes) in FEW and problem.system.second_motion == 0:
+        return SMALL.of(modes, nodes)
+    return advance
