@@ -176,7 +176,7 @@ def _keep_on_disk(compiled: Any, function: Any, module: str = "", variant: str =
         # Without the number of the line, which says nothing of what is compiled.
         name = re.sub(r"-\d+(?=\.py)", "", stored._impl.filename_base)
         if inspect.getclosurevars(getattr(function, "py_func", function)).nonlocals:
-            # What it encloses counts with its sources; numba would ask for the very same objects.
+            # The sources of enclosed functions are in the digest; numba would compare the objects.
             stored._index_key = lambda signature, codegen: (signature, codegen.magic_tuple())
         stored._cache_file = _StoredCode(stored.cache_path, name + mark,
                                          (source_digest(function), module))

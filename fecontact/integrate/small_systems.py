@@ -32,7 +32,7 @@ def sizes_of(modes: int, nodes: int) -> dict[Size, int]:
 
 
 def _same_values(modes: int, nodes: int) -> Values:
-    """What else is the same in all small systems of a size, for each record.
+    """Values that all small systems of a size share, for each record.
 
     They have one block and one motion of the ground.
     """
@@ -88,7 +88,7 @@ class Sized:
     lengths: Callable[[int], dict[Size, int]] = lambda nodes: {}
 
     def values(self, modes: int, nodes: int) -> Values:
-        """What is the same in all calls of the kernel of a size, for each record."""
+        """Values and shapes that are the same in all calls of the kernel of a size, by record."""
         found = shapes(sizes_of(modes, nodes) | self.lengths(nodes), *self.records)
         same = {record: fields for record, fields in _same_values(modes, nodes).items()
                 if record in found}

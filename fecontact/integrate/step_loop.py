@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 from fecontact.core.compiled import helper, kernel
 
 # How a call of the loop ended.
-(RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED, PARADOX,
- IMPACT_UNSOLVED) = range(7)
+RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED, PARADOX, IMPACT_UNSOLVED = range(7)
 # First entries of ``progress.numbers``: the time reached, and the length of the next step; and of
 # ``progress.counts``.
 TIME, STEP = range(2)
 STARTED, OUTPUTS, STEPS, REJECTIONS, RATES = range(5)
-# What became of an attempt at a step: it was taken; it is made anew, as what it starts from has
-# changed; it is made again with exactly the length that is returned, with about that length, or
-# with a shorter one, as its error was too large or not finite, or its impulses were not found.
+# Outcome of an attempt at a step: taken; repeated as the state at its start has been corrected;
+# repeated with exactly the length that is returned; with about that length; with a shorter one, as
+# its error was too large or not finite, or its impulses were not found.
 TAKEN, ANEW, CUT, SHORTER, FAILED, NOT_A_NUMBER, NOT_SOLVED = range(7)
 # The part of a step after which a run ends that goes on.
 BEYOND = 2.0
@@ -52,10 +51,11 @@ def _never(part, step, data):
 
 
 class Method(NamedTuple):
-    """What a method does in the loop, as compiled functions of its ``data``, a record.
+    """The compiled functions of a method that the loop calls, with its ``data``, a record.
 
-    That has ``progress`` with ``state``, ``numbers`` and ``counts``, and ``output`` with ``times``
-    and ``states``. A step has its begin ``t``, its length ``h`` and the time ``target`` at its end.
+    The record has ``progress`` with ``state``, ``numbers`` and ``counts``, and ``output`` with
+    ``times`` and ``states``. A step has its begin ``t``, its length ``h`` and the time ``target``
+    at its end.
 
     Attributes
     ----------
@@ -63,9 +63,9 @@ class Method(NamedTuple):
     data : type
         The record.
     aim(t, h, last, smallest, data)
-        The step to try, of about the length h; ``last`` is what became of the attempt before.
+        The step to try, of about the length h; ``last`` is the outcome of the attempt before.
     attempt(step, last, smallest, data)
-        Try it; what became of it, and the length of the next one.
+        Try it; the outcome, and the length of the next attempt or step.
     fill(row, step, data)
         Fill a row of the output, whose time is in the step.
     go_on(step, h, data)
@@ -75,9 +75,9 @@ class Method(NamedTuple):
         Prepare the first step of a run; how it stands. The first row of the states is filled;
         ``counts[OUTPUTS] = 0`` leaves it to the first step.
     resume(t, data)
-        Set what is not kept between calls.
+        Set the data that is not kept between calls.
     close(step, writes, data)
-        What a step leaves behind, before its outputs are written, if it ``writes`` any.
+        Finish an accepted step before its outputs are filled; ``writes`` says if there are any.
     full(data)
         Whether there is no room left for the events of a step.
     find_end(step, data)

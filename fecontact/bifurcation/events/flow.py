@@ -274,7 +274,7 @@ def _aim(t, h, last, smallest, data):
 
 @routine
 def _attempt(step, last, smallest, data):
-    """Try a step; what became of it, and the length of the next one."""
+    """Try a step; its outcome, and the length of the next one."""
     given, room, h = data.given, data.room, step.h
     _set_stages(given.begin + given.sign * step.t, given.sign * h, data.progress.state, given,
                 room)

@@ -118,7 +118,7 @@ def _set_begin(t, end, problem, progress, room, c):
 
 @routine
 def _set_given(step, after, s, c):
-    """What is given in time at the stages, and the speed of the ground just ``after`` the begin."""
+    """Signals at the stages, and the speed of the ground just ``after`` the start of the step."""
     for i in range(STAGES):
         dynamics.set_given(min(step.t + POINTS[i] * step.h, step.latest), s, c.given[i], c.load[i])
         c.speeds[i + 1] = c.given[i, dynamics.SPEED]
@@ -142,7 +142,7 @@ def _aim(t, h, last, smallest, data):
                                           data.output, data.collocation)
     end = output.times[-1]
     if last == TAKEN:
-        # What is predicted may be too short to move the time.
+        # The predicted length may be too short to change the time.
         if not t + h > t:
             h = smallest
         if c.flags[BEGINS] != 0:
@@ -237,7 +237,7 @@ def _switch(h, near, solved, error, problem, progress, c):
 
 @routine
 def _attempt(step, last, smallest, data):
-    """Try a step; what became of it, and the length of the next one."""
+    """Try a step; its outcome, and the length of the next one."""
     problem, progress, room, output, c, vary = (data.problem, data.progress, data.room, data.output,
                                                 data.collocation, data.vary)
     control, numbers, t = problem.control, progress.numbers, step.t
@@ -255,8 +255,8 @@ def _attempt(step, last, smallest, data):
         error = moved = step_error(step, problem, progress, room, c)
         if error <= 1.0 and control.work:
             error = max(error, work_error(step, before, problem, progress, room, c))
-    # A switch nearer to an end is there, as far as the time can tell; that at which the step
-    # before ended is passed.
+    # A switch this near to an end counts as being there; the one at which the step before ended
+    # has been passed.
     near, part, roughly = max(_TIME * abs(t), smallest), 2.0, False
     if c.flags[BEGINS] != 0:
         near = max(near, _LOCATED * numbers[LAST_STEP])

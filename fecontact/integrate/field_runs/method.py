@@ -120,7 +120,7 @@ class Data(NamedTuple):
     """A run of a vector field.
 
     If there are columns in ``varied``, steps end at output times, where the columns are stored and
-    begin anew. Events are noted in ``watch``.
+    restarted. Events are noted in ``watch``.
     """
 
     field: FieldKernel
@@ -230,7 +230,7 @@ def _error(step, field, progress, room, rtol):
 
 @routine
 def _attempt(step, last, smallest, data):
-    """Try a step; what became of it, and the length of the next one."""
+    """Try a step; its outcome, and the length of the next one."""
     field, progress, room, output = data.field, data.progress, data.room, data.output
     if last == TAKEN:
         _set_time_rate(step, field, progress, room)
@@ -270,7 +270,7 @@ def _close(step, writes, data):
 
 @routine
 def _fill(row, step, data):
-    """Fill a row of the output; the columns begin anew there."""
+    """Fill a row of the output; the columns are stored and restarted there."""
     progress, room, output, varied = data.progress, data.room, data.output, data.varied
     if output.times[row] == step.target:
         for k in range(len(room.after)):

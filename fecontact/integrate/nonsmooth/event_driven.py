@@ -357,7 +357,7 @@ def _take_to_event(step, data):
 
 @routine
 def _attempt(step, last, smallest, data):
-    """Try a step; what became of it, and the length of the next one.
+    """Try a step; its outcome, and the length of the next one.
 
     Where a contact changes within it, it is cut there.
     """
@@ -392,7 +392,7 @@ def _attempt(step, last, smallest, data):
         return CUT, shorter * length
     again = _mark_past(high, found, room)
     if again and length > smallest:
-        # What has just begun to move cannot be told from its start: look at a shorter step.
+        # A contact that has just begun to move is too close to where it started: a shorter step.
         return CUT, 0.2 * length
     if found:
         counts[AT_EVENT], numbers[UNCUT] = 2 if again else 1, length

@@ -324,7 +324,7 @@ def _begin(t, data):
 
 @routine
 def _attempt(step, last, smallest, data):
-    """Try a step and its halves; what became of it, and the length of the next one."""
+    """Try a step and its halves; its outcome, and the length of the next one."""
     p, limits, progress, room = data.problem, data.limits, data.progress, data.room
     Y, closed, counts = progress.state, progress.closed, progress.counts
     t, length, latest, m = step.t, step.h, step.latest, p.system.rows.shape[2]

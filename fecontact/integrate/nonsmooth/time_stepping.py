@@ -342,7 +342,7 @@ def _begin(t, data):
 
 @routine
 def _attempt(step, last, smallest, data):
-    """Try a step; what became of it, and the length of the next one."""
+    """Try a step; its outcome, and the length of the next one."""
     p, limits, progress, output, w, room = (data.problem, data.limits, data.progress, data.output,
                                             data.workspace, data.room)
     Y, counts, largest, tries = progress.state, progress.counts, progress.largest, room.tries

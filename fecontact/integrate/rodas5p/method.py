@@ -77,7 +77,7 @@ class Data(NamedTuple):
     """A run by Rodas5P.
 
     If the columns of ``vary.variation`` are not empty, those that belong to each output time are
-    put into ``vary.transitions``, and begin anew there; the output times must then be breaks.
+    put into ``vary.transitions`` and restarted there; the output times must then be breaks.
     What is watched for is noted in ``watch``.
     """
 
@@ -288,7 +288,7 @@ def _switch_part(step, smallest, problem, progress, room, watch):
 
 @helper
 def _refused(step, error, progress, room):
-    """What became of a step whose error is too large, and the length of the next attempt."""
+    """Outcome of a step whose error is too large, and the length of the next attempt."""
     progress.numbers[REJECTED_LAST] = 1.0
     progress.numbers[CAUTIOUS] = 0.0 if step.caution > 0.0 else step.h
     if not error < np.inf:
@@ -298,7 +298,7 @@ def _refused(step, error, progress, room):
 
 @routine
 def _attempt(step, last, smallest, data):
-    """Try a step; what became of it, and the length of the next one."""
+    """Try a step; its outcome, and the length of the next one."""
     problem, progress, room, vary, watch = (data.problem, data.progress, data.room, data.vary,
                                             data.watch)
     control, numbers, end = problem.control, progress.numbers, data.output.times[-1]

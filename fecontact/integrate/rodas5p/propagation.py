@@ -1,4 +1,4 @@
-"""What carries derivatives over the steps of a run."""
+"""Choice of the kernel that carries derivatives over the steps of a run."""
 
 from fecontact.core.records import shapes
 from fecontact.integrate.rodas5p import dynamics, state
@@ -22,7 +22,7 @@ SMALL = Sized(propagate.for_values, RECORDS, USUAL, open_nodes, lambda nodes: {D
 
 
 def propagate_for(problem: state.Problem) -> int:
-    """Address of what carries derivatives over a step: that of the size of the system, or of all.
+    """Address of the kernel that carries derivatives over a step, for this size or for all.
 
     For the same systems as the step loops, with any number of columns; other systems without
     internal variables go in parts of steps.

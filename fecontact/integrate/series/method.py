@@ -307,7 +307,7 @@ def _aim(t, h, last, smallest, data):
     first, node, meets = _first_switch(part, h, series)
     counts[SWITCHES] = counts[SWITCHES] + 1 if node >= 0 and first * h <= smallest else 0
     if counts[SWITCHES] > _MOST_SWITCHES * len(series.states):
-        # What happens at one time without end: a little later it is another place.
+        # Switches without end at one time: go on a little later, from another place.
         counts[SWITCHES] = 0
         first, node = min(part, 1e3 * smallest / h), -1
     if node < 0:
@@ -372,7 +372,7 @@ def _go_on(step, h, data):
 
 @helper
 def _stop_at(part, step, data):
-    """The same: runs end at ends of steps."""
+    """The same as ``_go_on``: runs end at ends of steps."""
     _go_on(step, 0.0, data)
 
 
