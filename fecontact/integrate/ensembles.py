@@ -31,7 +31,6 @@ from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.lanes.driver import SideBySide, side_by_side
 from fecontact.integrate.rodas5p.driver import again
 from fecontact.integrate.rodas5p.run import Run
-from fecontact.integrate.run_to_end import ENDS
 from fecontact.integrate.simulate import (
     require_max_step,
     require_resolved_span,
@@ -39,6 +38,7 @@ from fecontact.integrate.simulate import (
 )
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
 from fecontact.integrate.step_loop import RUNNING
+from fecontact.integrate.step_runs import ENDS
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import MOVING, Moving, in_time, state_size

@@ -21,9 +21,9 @@ from fecontact.integrate.field_runs.saltation import Passage, joined, passages, 
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p.driver import start
 from fecontact.integrate.rodas5p.variational import MOVE
-from fecontact.integrate.run_to_end import ENDS, finish
 from fecontact.integrate.simulate import output_times, require_max_step
 from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, require_solver
+from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Status
 from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem

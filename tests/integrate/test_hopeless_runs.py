@@ -1,5 +1,8 @@
 """Runs that could not end are refused before they begin."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 from systems import friction_oscillator, impact_oscillator
@@ -7,7 +10,8 @@ from systems import friction_oscillator, impact_oscillator
 import fecontact as fc
 from fecontact.core.errors import InputError
 from fecontact.integrate import Rodas5P, Scipy, SetValued
-from fecontact.integrate.nonsmooth import driver, problem
+from fecontact.integrate.nonsmooth import driver
+from fecontact.integrate.step_loop import MINIMUM_STEP, RUNNING, STEP
 
 SOLVERS = (Rodas5P(), Rodas5P(series="never"), Rodas5P(collocation="always"), Scipy("LSODA"))
 
@@ -51,29 +55,21 @@ def test_short_runs_of_fast_drives_end():
 
 
 @pytest.mark.parametrize("scheme", ["events", "stepping"])
-def test_set_valued_runs_whose_steps_stay_too_short_end_with_a_status(scheme, monkeypatch):
-    """Impacts can follow each other ever closer: what was computed until then is kept."""
-    begin, lengths, advance = driver.start, [], 1e-14
-
-    def start(*given, **options):
-        run = begin(*given, **options)
-        run.go(1)
-
-        def go(most):
-            lengths.append(float(run.course.clock[problem.LENGTH]))
-            run.course.counts[[problem.STEPS, problem.REJECTED]] += most
-            run.course.clock[problem.TIME] += most * advance
-            run.course.clock[problem.LENGTH] = advance
-            return problem.GOING_ON
-
-        return run._replace(go=go, scheme=scheme)
-
-    monkeypatch.setattr(driver, "start", start)
-    run = fc.simulate(friction_oscillator(), 1.0, solver=SetValued())
-    assert run.status is fc.Status.MINIMUM_STEP
-    assert len(lengths) < 1000
-    # Implicit steps that are rejected are tried at their longest now and then.
-    assert max(lengths[1:]) == (1.0 / 50.0 if scheme == "stepping" else advance)
+def test_set_valued_runs_whose_steps_stay_too_short_end_with_a_status(scheme):
+    """Steps of at most 1e-14 s, as where impacts follow each other ever closer."""
+    system = friction_oscillator()
+    run = driver.start(system, np.zeros(system.size), np.linspace(0.0, 1.0, 11), rtol=1e-6,
+                       scheme=scheme)
+    data, = run.loop.args
+    slow = data._replace(limits=data.limits._replace(longest=1e-13))
+    run = replace(run, loop=partial(run.loop.func, slow))
+    run.progress.numbers[STEP] = 1e-13
+    status = RUNNING
+    while status == RUNNING:
+        status = run.advance(7_000)
+        assert run.attempts < 100_000
+    assert status == MINIMUM_STEP
+    assert run.time < 1e-8
 
 
 def test_times_too_close_for_steps_are_refused():

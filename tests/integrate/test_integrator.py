@@ -20,7 +20,7 @@ from fecontact import (
 )
 from fecontact.integrate import step_loop
 from fecontact.integrate.rodas5p import driver as control
-from fecontact.integrate.run_to_end import finish
+from fecontact.integrate.step_runs import finish
 from fecontact.laws import (
     ExponentialFriction,
     Harmonic,

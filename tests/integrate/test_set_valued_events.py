@@ -169,8 +169,8 @@ def test_runs_in_pieces_are_the_same_to_the_last_bit(system, end, options):
         while (status := run.advance(piece)) == RUNNING:
             pass
         assert status == FINISHED
-        found.append((run.output.states, run.output.friction, run.course.numbers,
-                      run.course.counts))
+        found.append((run.output.states, run.output.friction, run.progress.numbers,
+                      run.progress.counts))
     for other in found[:2]:
         for one, whole in zip(other, found[2], strict=True):
             np.testing.assert_array_equal(one, whole)
@@ -180,6 +180,6 @@ def test_a_run_without_time_between_its_events_ends_whatever_its_pieces():
     run = driver.start(belt(), np.array([0.5, 0.2]), np.linspace(0.0, 30.0, 301), rtol=1e-6)
     run.advance(5)
     # As if no time had passed between many changes of contact, in calls before.
-    run.course.counts[[IDLE, AT_EVENT]] = 200, 1
-    run.course.numbers[STEP] = 0.0
+    run.progress.counts[[IDLE, AT_EVENT]] = 200, 1
+    run.progress.numbers[STEP] = 0.0
     assert run.advance(1) == MINIMUM_STEP

@@ -50,7 +50,7 @@ def finished(go):
 @pytest.mark.parametrize(("modes", "nodes"), SMALL.sizes)
 def test_what_runs_of_small_systems_take_for_granted(modes, nodes):
     said, found = SMALL.values(modes, nodes), 0
-    given = run_of(system(modes, nodes)).go.args
+    given = run_of(system(modes, nodes)).loop.args
     for values in (*given[0], given[0].problem.system):
         for field, expected in said.get(type(values), {}).items():
             value = getattr(values, field)
@@ -66,10 +66,10 @@ def test_what_runs_of_small_systems_take_for_granted(modes, nodes):
 @pytest.mark.parametrize(("modes", "nodes"), SMALL.sizes)
 def test_same_results_as_by_the_run_of_all_systems(modes, nodes):
     own, other = (run_of(system(modes, nodes)) for _ in range(2))
-    assert own.go.func is not run_events
-    finished(own.go)
-    finished(lambda most: run_events(*other.go.args, most))
-    assert own.course.counts[EVENTS] == other.course.counts[EVENTS] > 2
+    assert own.loop.func is not run_events
+    finished(own.advance)
+    finished(lambda most: run_events(*other.loop.args, most))
+    assert own.progress.counts[EVENTS] == other.progress.counts[EVENTS] > 2
     for name in ("states", "friction", "normal"):
         found, expected = getattr(own.output, name), getattr(other.output, name)
         scale = np.abs(expected).max(axis=0)
@@ -84,15 +84,15 @@ def test_other_systems_have_the_run_of_all():
     T = np.concatenate([plain.basis.T, plain.basis.T[-1:]])
     together = ModalBasis(plain.basis.angular_frequencies, plain.basis.damping, T,
                           np.zeros((4, 2)), np.full(2, 0.5))
-    assert run_of(plain.with_(basis=together)).go.func is run_events
-    assert run_of(two_mass_system()).go.func is not run_events
+    assert run_of(plain.with_(basis=together)).loop.func is run_events
+    assert run_of(two_mass_system()).loop.func is not run_events
 
 
 def test_steps_at_the_limit_of_stability_seldom_fail():
     # The load comes all at once: the normal contact rings at 150 Hz for some seconds.
     run = run_of(system(3, 1), end=9.0, rtol=1e-6)
-    finished(run.go)
-    assert run.course.counts[REJECTIONS] < 0.22 * run.attempts
+    finished(run.advance)
+    assert run.progress.counts[REJECTIONS] < 0.22 * run.attempts
 
 
 def test_bernstein_coefficients_of_nested_products():

@@ -27,8 +27,8 @@ from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.field_runs.saltation import joined, passages, with_passages
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
-from fecontact.integrate.run_to_end import ENDS, finish
 from fecontact.integrate.simulate import require_resolved_span
+from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import Moving, in_time, state_size
 from fecontact.system.fields.vector_field import VectorField

@@ -14,8 +14,8 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.integrate.events import AnyEvent, Events
-from fecontact.integrate.run_to_end import ENDS, finish
 from fecontact.integrate.step_loop import RUNNING
+from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Status, output_part
 from fecontact.system.fields.vector_field import VectorField
 

@@ -19,7 +19,7 @@ from fecontact.core.types import Array
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.reference.scipy import largest_motions
 from fecontact.integrate.rodas5p.driver import start
-from fecontact.integrate.run_to_end import finish
+from fecontact.integrate.step_runs import finish
 from fecontact.laws.base import NormalLaw
 from fecontact.laws.signatures import normal_at
 from fecontact.system import kernels

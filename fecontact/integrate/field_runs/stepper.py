@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -10,22 +9,19 @@ from fecontact.core.checks import require_state
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH
 from fecontact.integrate.courses import COEFFICIENTS
-from fecontact.integrate.event_arrays import take_events, watch_for
-from fecontact.integrate.events import AnyEvent, Events
+from fecontact.integrate.event_arrays import watch_for
+from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.field_runs.method import Data, Output, Progress, Room, advance
 from fecontact.integrate.field_runs.python_functions import PythonFunction
 from fecontact.integrate.field_runs.variational import Varied, varied_for
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.step_loop import (
-    OUTPUTS,
-    RATES,
-    REJECTIONS,
     RUNNING,
     STEP,
-    STEPS,
     TIME,
 )
+from fecontact.integrate.step_runs import StepRun
 from fecontact.system.fields.one_place import FieldKernel, python_field
 from fecontact.system.fields.vector_field import VectorField
 
@@ -34,7 +30,7 @@ _FLOOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class FieldSteps:
+class FieldSteps(StepRun):
     """A run of a vector field that can be left and taken up again.
 
     Attributes
@@ -60,48 +56,12 @@ class FieldSteps:
     found: list[tuple[Array, Array]] = field(default_factory=list)
 
     @property
-    def states(self) -> Array:
-        """States (N, d) at the output times; those passed are filled."""
-        return self.output.states
-
-    @property
     def transitions(self) -> Array:
         """Derivatives (N, d, d) of the states to those at the output time before."""
         return self.varied.transitions
 
-    @property
-    def outputs(self) -> int:
-        """Number of output times passed."""
-        return int(self.progress.counts[OUTPUTS])
-
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
-        return float(self.progress.numbers[TIME])
-
-    @property
-    def attempts(self) -> int:
-        """Steps so far, those that failed included."""
-        counts = self.progress.counts
-        return int(counts[STEPS] + counts[REJECTIONS])
-
-    @property
-    def statistics(self) -> dict[str, Any]:
-        """Counts of steps, rejected steps, right-hand sides of the stages and Jacobians."""
-        counts = self.progress.counts
-        steps = int(counts[STEPS])
-        return {"steps": steps, "rejected": int(counts[REJECTIONS]),
-                "right_hand_sides": int(counts[RATES]), "jacobians": steps + 1}
-
-    @property
-    def events(self) -> Events:
-        """Events so far."""
-        rows = [np.zeros((0, 3)), *(rows for rows, _ in self.found)]
-        states = [np.zeros((0, self.moving.dimension)), *(states for _, states in self.found)]
-        return Events.of_rows(np.vstack(rows), np.vstack(states))
-
-    def advance(self, most: int) -> int:
-        """Try so many steps; how the run stands, such as ``step_loop.RUNNING``.
+    def step(self, most: int) -> int:
+        """Try so many steps by the loop; how it ended.
 
         Raises
         ------
@@ -109,20 +69,14 @@ class FieldSteps:
             What a field of Python raised.
         AnalysisError
             If a complex step that was asked for turned out wrong.
-        InputError
-            If an event is not finite.
         """
-        try:
-            status = advance(Data(self.kernel, self.progress, self.room, self.output, self.varied,
-                                  self.watch), most)
-        finally:
-            # An interrupt shows when the compiled code has returned, and its events are there.
-            take_events(self.watch, self.found, self.time)
+        status = int(advance(Data(self.kernel, self.progress, self.room, self.output, self.varied,
+                                  self.watch), most))
         if self.function is not None and self.function.error is not None:
             raise self.function.error
         if status != RUNNING:
             self.moving.heed(self.kernel.wrong)
-        return int(status)
+        return status
 
 
 def start_field(

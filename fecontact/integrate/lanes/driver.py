@@ -24,10 +24,10 @@ from fecontact.integrate.lanes.arrays import (
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import control_for, start
 from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
-from fecontact.integrate.run_to_end import ENDS
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.small_systems import FEW
 from fecontact.integrate.step_loop import FINISHED, RUNNING
+from fecontact.integrate.step_runs import ENDS
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.ground.motion import constant_speed
 from fecontact.laws.simd import simd_address

@@ -2,9 +2,9 @@
 
 import time as clock
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,16 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.coefficients import Coefficient, node_values
 from fecontact.integrate.event_arrays import watch_for
-from fecontact.integrate.events import AnyEvent, Events
+from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
 from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between_events, stops_of
 from fecontact.integrate.reference.scipy import longest_step
-from fecontact.integrate.rodas5p.event_kernels import FOUND
-from fecontact.integrate.run_to_end import ENDS, finish
-from fecontact.integrate.step_loop import OUTPUTS, REJECTIONS, STEPS, TIME
+from fecontact.integrate.rodas5p.event_kernels import Watch
+from fecontact.integrate.step_loop import REJECTIONS, STEPS
+from fecontact.integrate.step_runs import ENDS, StepRun, finish
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction.stribeck import Frictionless
@@ -117,13 +117,12 @@ def integrate_set_valued(
                 impact_law=impact_law, tangential_restitution=tangential_restitution,
                 static_coefficient=static_coefficient, longest=longest, max_step=max_step,
                 events=events)
-    course, output, times = run.course, run.output, run.output.times
-    counts = course.counts
+    output, times, counts = run.output, run.times, run.progress.counts
     n, m, solid = system.basis.contact_nodes, system.basis.modes, system.basis.dimension == 3
     try:
         ended = ENDS[finish(run, progress)]
     except KeyboardInterrupt:
-        if not counts[OUTPUTS]:  # nothing was computed that could be kept
+        if not run.outputs:  # nothing was computed that could be kept
             raise
         ended = Status.INTERRUPTED
     statistics: dict[str, Any] = {
@@ -133,7 +132,7 @@ def integrate_set_valued(
         "seconds": clock.perf_counter() - begin}
     if ended is Status.FINISHED and counts[kinds.GAINED]:
         ended = Status.IMPACT_GAINED
-    done, Y, last = int(counts[OUTPUTS]), course.state, run.time
+    done, Y, last = run.outputs, run.progress.state, run.time
     time, states = times[:done], output.states[:done]
     friction, normal = output.friction[:done], output.normal[:done]
     if done < len(times) and done and last > time[-1] and np.isfinite(Y).all():
@@ -145,34 +144,23 @@ def integrate_set_valued(
     end = 2 * m + POWER_COUNT
     return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
                     statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
-                    friction_force=friction, events=run.found.events)
+                    friction_force=friction, events=run.events)
 
 
-class Run(NamedTuple):
-    """A run: what goes on by so many steps and tells how that ended, and what is filled by it."""
+@dataclass(frozen=True, eq=False)
+class Run(StepRun):
+    """A run with set-valued friction; ``loop`` is that of its method, with its data."""
 
-    go: Callable[[int], int]
-    course: kinds.Progress
+    loop: Callable[[int], int]
+    progress: kinds.Progress
     output: kinds.Output
-    found: "_Found"
+    watch: Watch
     scheme: str
+    found: list[tuple[Array, Array]] = field(default_factory=list)
 
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
-        return float(self.course.numbers[TIME])
-
-    @property
-    def attempts(self) -> int:
-        """Steps so far, those that failed included."""
-        return int(self.course.counts[STEPS] + self.course.counts[REJECTIONS])
-
-    def advance(self, most: int) -> int:
-        """Try so many steps; how the run stands."""
-        try:
-            return int(self.go(most))
-        finally:
-            self.found.empty()
+    def step(self, most: int) -> int:
+        """Try so many steps by the loop; how it ended."""
+        return self.loop(most)
 
 
 def start(
@@ -211,7 +199,9 @@ def start(
                           np.empty((len(times), system.basis.contact_nodes)))
     workspace = kinds.workspace_for(problem)
     loop: Callable[..., int]
-    found, data = _Found(system, events), (problem, limits, course, output)
+    watch = watch_for(system, events, False)
+    watch = watch._replace(note=note_events.address if events else 0)
+    data = problem, limits, course, output
     if solid and restitution is not None:
         from fecontact.integrate.nonsmooth import impact_steps
         from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
@@ -221,7 +211,7 @@ def start(
     elif scheme == "events":
         from fecontact.integrate.nonsmooth.event_driven import Data, run_for
         from fecontact.integrate.nonsmooth.event_search import room_for
-        loop = partial(run_for(problem), Data(*data, workspace, room_for(problem), found.watch))
+        loop = partial(run_for(problem), Data(*data, workspace, room_for(problem), watch))
     else:
         from fecontact.integrate.nonsmooth import time_stepping
         from fecontact.integrate.nonsmooth.space_contact import in_space
@@ -230,37 +220,13 @@ def start(
         _require_no_events(events)
         loop = partial(time_stepping.run_steps, time_stepping.Data(
             *data, workspace, stepping_room(problem, in_space() if solid else IN_PLANE)))
-    return Run(loop, course, output, found, scheme)
+    return Run(loop, course, output, watch, scheme)
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:
     if events:
         raise InputError("SetValued: scheme = 'stepping', which this system needs, locates no "
                          "events; leave them out, or use fewer contact nodes.")
-
-
-class _Found:
-    """Room for the events of a run, and those found so far."""
-
-    def __init__(self, system: ContactSystem, events: Sequence[AnyEvent]) -> None:
-        watch = watch_for(system, events, False)
-        self.watch = watch._replace(note=note_events.address if events else 0)
-        self._rows: list[tuple[Array, Array]] = []
-
-    def empty(self) -> None:
-        """Take the events out of the room."""
-        count = int(self.watch.counts[FOUND])
-        if count:
-            self._rows.append((self.watch.found[:count].copy(), self.watch.states[:count].copy()))
-            self.watch.counts[FOUND] = 0
-
-    @property
-    def events(self) -> Events:
-        """All in chronological order."""
-        size = self.watch.states.shape[1]
-        found, states = zip(*self._rows, (np.zeros((0, 3)), np.zeros((0, size))),
-                            strict=True)
-        return Events.of_rows(np.vstack(found), np.vstack(states))
 
 
 def nonsmooth_problem(

@@ -42,6 +42,7 @@ from fecontact.integrate.nonsmooth.problem import (
     Progress,
     Workspace,
     aim,
+    pace,
     pass_break,
 )
 from fecontact.integrate.nonsmooth.rigid_stops import (
@@ -436,7 +437,7 @@ def _go_on(step, h, data):
     progress.counts[IDLE] = 0
     if step.at_break:
         progress.counts[KNOWN] = 0
-    return RUNNING, h
+    return pace(step, progress, data.output.times), h
 
 
 @routine
@@ -476,7 +477,7 @@ def _change(step, h, data):
     if watch.note != 0 and note_at(watch.note)(
             aim(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, p, progress, w, room, watch) <= 1.0:
         return STOPPED, h
-    return RUNNING, h
+    return pace(step, progress, times), h
 
 
 METHOD = Method("events", Data, aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,

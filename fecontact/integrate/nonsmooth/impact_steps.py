@@ -48,6 +48,7 @@ from fecontact.integrate.nonsmooth.problem import (
     Output,
     Progress,
     aim,
+    pace,
     pass_break,
 )
 from fecontact.integrate.nonsmooth.space_contact import contact_of, scale_of
@@ -359,7 +360,7 @@ def _go_on(step, h, data):
     put_on_ground(step.target, progress.state, progress.closed, p, room)
     if step.at_break:
         pass_break(step, p, progress, data.output)
-    return RUNNING, h
+    return pace(step, progress, data.output.times), h
 
 
 METHOD = Method("impacts", Data, aim, _attempt, _fill, _go_on, _begin)

@@ -8,7 +8,17 @@ from numpy.typing import NDArray
 from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, Size, Vector, allocate
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.step_loop import CUT, OUTPUTS, RATES, STEP, TIME
+from fecontact.integrate.step_loop import (
+    CUT,
+    MINIMUM_STEP,
+    OUTPUTS,
+    RATES,
+    REJECTIONS,
+    RUNNING,
+    STEP,
+    STEPS,
+    TIME,
+)
 from fecontact.system.nodes import AXES, MODES, NODES, SystemArrays
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump
 
@@ -28,15 +38,18 @@ OPEN, STICK, FIXED = 0, 2, 3
 CLOSED, HELD = 1, 2
 
 # Entries of Progress.numbers after those of the step loop: the error of the last step, whether the
-# next one repeats one that failed, and the length of that which an event cuts short.
-NUMBERS = 5
-LAST_ERROR, REPEATED, UNCUT = range(STEP + 1, NUMBERS)
+# next one repeats one that failed, the length of that which an event cuts short, and a time from
+# which the pace of the run is looked at.
+NUMBERS = 6
+LAST_ERROR, REPEATED, UNCUT, MARK = range(STEP + 1, NUMBERS)
 # Entries of Progress.counts after those of the step loop: changes of contact, impacts and those
 # that gained energy; changes in a row without any time between them; whether the step ends at one,
 # and whether that has just begun to move; how often a step was cut; whether what its begin has is
-# known from the step before.
-COUNTS = 12
-EVENTS, IMPACTS, GAINED, IDLE, AT_EVENT, CUTS, KNOWN = range(RATES + 1, COUNTS)
+# known from the step before; steps at the time `MARK`.
+COUNTS = 13
+EVENTS, IMPACTS, GAINED, IDLE, AT_EVENT, CUTS, KNOWN, MARKED = range(RATES + 1, COUNTS)
+# A run is stuck that advances by less than this part of its span in so many steps.
+_MANY_STEPS, _LEAST_PART = 20_000, 1e-8
 # Entries of Progress.largest: slip velocity, penetration rate and penetration.
 SIZES = 3
 SLIP_SIZE, RATE_SIZE, DEPTH_SIZE = range(SIZES)
@@ -158,6 +171,18 @@ def aim(t, h, last, smallest, data):
     if length >= (goal - t) * (1.0 - near) or t + length >= goal:
         return Step(t, goal - t, np.nextafter(goal, t), goal, is_break)
     return Step(t, length, np.nextafter(goal, t), t + length, False)
+
+
+@helper
+def pace(step, progress, times):
+    """Status of a run after a step: whether it advances fast enough ever to end."""
+    numbers, counts = progress.numbers, progress.counts
+    if counts[STEPS] + counts[REJECTIONS] - counts[MARKED] < _MANY_STEPS:
+        return RUNNING
+    stuck = counts[MARKED] > 0 and step.target - numbers[MARK] < _LEAST_PART * (
+        times[-1] - times[0])
+    numbers[MARK], counts[MARKED] = step.target, counts[STEPS] + counts[REJECTIONS]
+    return MINIMUM_STEP if stuck else RUNNING
 
 
 @helper

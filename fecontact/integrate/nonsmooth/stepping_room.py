@@ -23,10 +23,10 @@ from fecontact.system.nodes import GroundMotion
 from fecontact.system.powers import POWER_COUNT
 
 STAGES = 3
-# Entries of `Room.tries`: the largest floor of the slip velocities, and attempts in a row whose
-# error was too large.
-TRIES = 2
-SLOWEST, IN_A_ROW = range(TRIES)
+# Entries of `Room.tries`: the largest floor of the slip velocities, attempts in a row whose error
+# was too large, and attempts at short steps whose stages could not be solved.
+TRIES = 3
+SLOWEST, IN_A_ROW, UNSOLVED = range(TRIES)
 # From values at the thirds of a step to the coefficients of a cubic.
 THIRDS = fit(np.arange(4) / 3.0)
 
@@ -66,7 +66,7 @@ class Room(NamedTuple):
         ``hold.side`` at the begin of the step.
     inertia : (n,) array
         Tx Tx^T of each node, or in space T2 T2^T if that is larger.
-    tries : (2,) array
+    tries : (3,) array
         What attempts at a step leave to the next one.
     cubic, speed, halves : (4,), (4,), (DEPTH, 5) arrays
         Polynomials over the step, and parts of it.

@@ -35,6 +35,7 @@ from fecontact.integrate.nonsmooth.problem import (
     Progress,
     Workspace,
     aim,
+    pace,
     pass_break,
 )
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
@@ -46,6 +47,7 @@ from fecontact.integrate.nonsmooth.stepping_room import (
     SLOWEST,
     STAGES,
     THIRDS,
+    UNSOLVED,
     Room,
 )
 from fecontact.integrate.step_loop import (
@@ -74,6 +76,9 @@ ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
 NODES = (GAMMA, GAMMA + A21, 1.0)
 # A step is cut so often at most before what is left counts as error.
 MOST_CUTS = 3
+# Stages may fail in a range of lengths that short steps, of less than this part of the longest one,
+# do not get past as they grow: after so many failures a longest step is tried.
+_SHORT, _MOST_UNSOLVED = 1e-3, 50.0
 # Outputs nearer to an end of a step, in parts of it, are at that end.
 _NEAR = 1e-9
 
@@ -359,6 +364,7 @@ def _attempt(step, last, smallest, data):
         finest *= 0.01
     solved = _solve_stages(step, finest, p, limits, progress, room)
     if solved < STAGES:
+        tries[UNSOLVED] += 1.0
         finite = math.isfinite(room.states[solved, m])
         return FAILED if finite else NOT_A_NUMBER, 0.25 * length
     worst = _error(step, p, limits, Y, room)
@@ -390,6 +396,11 @@ def _attempt(step, last, smallest, data):
     if counts[STEPS] == 0:
         progress.carried[:] = room.forces[0]
     tries[IN_A_ROW], counts[CUTS] = 0.0, 0
+    if length > _SHORT * limits.longest:
+        tries[UNSOLVED] = 0.0
+    elif tries[UNSOLVED] > _MOST_UNSOLVED:
+        tries[UNSOLVED] = 0.0
+        return TAKEN, limits.longest
     return TAKEN, length * min(8.0, max(0.3, 0.9 * max(worst, 1e-12) ** (-1.0 / 3.0)))
 
 
@@ -404,7 +415,7 @@ def _go_on(step, h, data):
     progress.counts[KNOWN] = 0 if step.at_break else 1
     if step.at_break:
         pass_break(step, data.problem, progress, data.output)
-    return RUNNING, h
+    return pace(step, progress, data.output.times), h
 
 
 METHOD = Method("implicit", Data, aim, _attempt, _fill, _go_on, _begin)

@@ -37,8 +37,8 @@ from fecontact.integrate.rodas5p.state import (
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
-from fecontact.integrate.run_to_end import ENDS, finish
 from fecontact.integrate.series.branches import chosen_series, from_state
+from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (

@@ -9,25 +9,20 @@ import numpy as np
 
 from fecontact.core.types import Array
 from fecontact.integrate.collocation.room import JACOBIANS, Collocation
-from fecontact.integrate.event_arrays import take_events
-from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.rodas5p.method import Data, advance_for
 from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
 from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.integrate.series.branches import Series
-from fecontact.integrate.step_loop import OUTPUTS, RATES, REJECTIONS, STEPS, TIME
+from fecontact.integrate.step_runs import StepRun
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(StepRun):
     """A run of the compiled integrator that can be left and taken up again.
 
     Attributes
     ----------
-    status : int
-        ``step_loop.RUNNING`` while output times are left, ``FINISHED``, ``MINIMUM_STEP``,
-        ``NOT_FINITE``, or ``STOPPED`` at an event.
     problem : Problem
         What is integrated, and how finely.
     output : Output
@@ -57,66 +52,33 @@ class Run:
     found: list[tuple[Array, Array]] = field(default_factory=list)
 
     @property
-    def times(self) -> Array:
-        """Output times (N,) [s]."""
-        return self.output.times
-
-    @property
-    def states(self) -> Array:
-        """States (N, size) at the output times."""
-        return self.output.states
-
-    @property
     def work(self) -> Array:
         """Work (N, p + 2 n) up to the output times [J]."""
         return self.output.work
 
     @property
-    def events(self) -> Events:
-        """Events so far."""
-        rows = [np.zeros((0, 3)), *(rows for rows, _ in self.found)]
-        states = [np.zeros((0, self.states.shape[1])), *(states for _, states in self.found)]
-        return Events.of_rows(np.vstack(rows), np.vstack(states))
-
-    @property
-    def outputs(self) -> int:
-        """Number of output times passed."""
-        return int(self.progress.counts[OUTPUTS])
-
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
-        return float(self.progress.numbers[TIME])
-
-    @property
-    def attempts(self) -> int:
-        """Steps so far, those that failed included."""
-        counts = self.progress.counts
-        return int(counts[STEPS] + counts[REJECTIONS])
-
-    @property
     def statistics(self) -> dict[str, int]:
         """Counts of steps, rejected steps, right-hand sides and Jacobians, or of expansions."""
-        counts = self.progress.counts
+        found = super().statistics
         if self.series is not None:
-            return {"steps": int(counts[STEPS]), "rejected": int(counts[REJECTIONS]),
-                    "expansions": int(counts[RATES])}
-        jacobians = int(counts[STEPS]) + 1
+            return {"steps": found["steps"], "rejected": found["rejected"],
+                    "expansions": found["right_hand_sides"]}
         if self.collocation is not None:
-            jacobians = int(self.collocation.flags[JACOBIANS])
-        return {"steps": int(counts[STEPS]),
-                "rejected": int(counts[REJECTIONS]),
-                "right_hand_sides": int(counts[RATES]),
-                "jacobians": jacobians}
+            return found | {"jacobians": int(self.collocation.flags[JACOBIANS])}
+        return found
 
     @property
     def transitions(self) -> Array:
         """Derivatives (N, size, columns) of the states to those at the output time before."""
         return np.swapaxes(self.variation.transitions, 1, 2)
 
+    def step(self, most: int) -> int:
+        """Try so many steps by the loop; how it ended."""
+        return self._loop(most)
+
     @cached_property
-    def _advance(self) -> Callable[[int], int]:
-        """What goes on by so many steps."""
+    def _loop(self) -> Callable[[int], int]:
+        """The loop of the method, with its data."""
         data: Any
         if self.series is not None:
             # Compiled for runs that need it only.
@@ -137,12 +99,3 @@ class Run:
                         self.watch)
             loop = advance_for(self.problem, self.variation)
         return partial(loop, data)
-
-    def advance(self, steps: int) -> int:
-        """So many steps more, those that fail included; returns the status."""
-        try:
-            status = self._advance(steps)
-        finally:
-            # An interrupt shows when the compiled code has returned, and its events are there.
-            take_events(self.watch, self.found, self.time)
-        return int(status)
