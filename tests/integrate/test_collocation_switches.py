@@ -14,7 +14,8 @@ from fecontact.integrate import Rodas5P, step_loop
 from fecontact.integrate.collocation import tableau
 from fecontact.integrate.collocation.courses import first_switch
 from fecontact.integrate.rodas5p import driver
-from fecontact.integrate.rodas5p.state import REJECTIONS, WORST_NODE
+from fecontact.integrate.rodas5p.state import WORST_NODE
+from fecontact.integrate.step_loop import REJECTIONS
 from fecontact.laws import (
     BilateralCubic,
     BilateralPiecewise,

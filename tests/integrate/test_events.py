@@ -158,13 +158,13 @@ def test_events_of_the_piece_that_is_interrupted_are_kept():
     given = impact_oscillator(2, 9.845), np.zeros(4), np.linspace(0.0, 30.0, 301)
     run, whole = (start(*given, rtol=1e-6, events=[ContactEvents()], series="never")
                   for _ in range(2))
-    step = run._advance
+    step = run._loop
 
     def interrupted(steps):
         step(steps)
         raise KeyboardInterrupt
 
-    vars(run)["_advance"] = interrupted
+    vars(run)["_loop"] = interrupted
     with pytest.raises(KeyboardInterrupt):
         run.advance(2000)
     whole.advance(2000)

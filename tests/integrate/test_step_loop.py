@@ -223,4 +223,4 @@ def test_a_run_that_grows_beyond_all_bounds_ends():
     assert LOOP(run, 10**6) == MINIMUM_STEP
     # x = 1 / (1 - t)
     assert run.progress.numbers[TIME] == pytest.approx(1.0, abs=1e-3)
-    assert run.progress.counts[REJECTIONS] > 5
+    assert run.progress.counts[REJECTIONS] > 0
