@@ -31,8 +31,8 @@ from integrator_problems import Problem, friction_oscillator, shortened
 from numpy.typing import NDArray
 
 from fecontact.integrate.nonsmooth import driver as set_valued
-from fecontact.integrate.nonsmooth.problem import GOING_ON
 from fecontact.integrate.rodas5p import driver as smoothed
+from fecontact.integrate.step_loop import RUNNING
 
 Array = NDArray[np.float64]
 Prepared = Callable[[float], Callable[[], Array]]
@@ -55,7 +55,7 @@ def by_scheme(problem: Problem, scheme: str) -> Prepared:
                                scheme=scheme)
 
         def solve() -> Array:
-            while run.go(10**9) == GOING_ON:
+            while run.advance(10**9) == RUNNING:
                 pass
             return run.output.states[:, : len(problem.state)]
 

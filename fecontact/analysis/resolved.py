@@ -36,8 +36,9 @@ _WINDOW, _GAP = 256, 16  # intervals repeated in one run; largest gap skipped wi
 _NUMBERS = 20_000_000  # stored per run
 _STEPS = 1_000_000  # repeated per run
 _SMALL_SOLID = 40  # values of a state of a solid up to which that many steps are repeated
-# Times that a repeated run may report its progress, and more for each thousand steps of the run.
-_REPORTS, _REPORTS_MORE = 5, 2
+# Times that a repeated run may report its progress, and more for each second that its part of the
+# run has taken: twenty times as long.
+_REPORTS, _REPORTS_MORE = 5, 100
 _FAILURES = 8  # consecutive failures before the run is considered not repeatable
 _LONG = "between them the run took too many steps"
 _TOLD = 2e-3  # fraction of the time
@@ -282,7 +283,7 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
 
 
 def _limit(run: Trajectory, times: Array) -> Callable[[float], None] | None:
-    """Function of the progress that ends a repeated set-valued run of far more steps than the run.
+    """Function of the progress that ends a repeated set-valued run that takes far too long.
 
     Where a node is at the border of stick and slip, steps from a state within them can become very
     short.
@@ -290,7 +291,7 @@ def _limit(run: Trajectory, times: Array) -> Callable[[float], None] | None:
     if run.statistics["solver"] != SetValued().name:
         return None
     part = (times[-1] - times[0]) / (run.time[-1] - run.time[0])
-    left = _REPORTS + _REPORTS_MORE * part * float(run.statistics.get("steps", 0)) / 1e3
+    left = _REPORTS + _REPORTS_MORE * part * float(run.statistics.get("seconds", 0.0))
 
     def count(time: float) -> None:
         nonlocal left

@@ -12,7 +12,8 @@ from fecontact import read_case, write_case
 from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
 from fecontact.integrate import SetValued
-from fecontact.integrate.nonsmooth import driver, problem
+from fecontact.integrate.nonsmooth import driver
+from fecontact.integrate.step_loop import RUNNING, STEPS, TIME
 from fecontact.laws import ExponentialFriction, LinearContact, RoughSurface
 from fecontact.output.plots.run import thinned
 from fecontact.plot import plot_contact_map, plot_friction_work, plot_history, plot_phase
@@ -140,15 +141,15 @@ def test_repeats_that_take_far_more_steps_than_the_run_are_given_up(monkeypatch)
 
     def start(*given, **options):
         made = begin(*given, **options)
-        made.go(1)
+        made.advance(1)
 
-        def go(most):
+        def loop(most):
             calls.append(most)
-            made.course.counts[problem.STEPS] += most
-            made.course.clock[problem.TIME] += 1e-6
-            return problem.GOING_ON
+            made.progress.counts[STEPS] += most
+            made.progress.numbers[TIME] += 1e-6
+            return RUNNING
 
-        return made._replace(go=go)
+        return replace(made, loop=loop)
 
     monkeypatch.setattr(driver, "start", start)
     found = resolved(run)
