@@ -583,6 +583,10 @@ def test_an_index_that_cannot_be_written_is_no_success(tmp_path, capsys):
     tokens = ["sweep", str(tmp_path / "sweep.toml"), "-o", str(tmp_path / "s"), "--workers", "1"]
     assert execute(tokens) == 1
     said = capsys.readouterr()
+    assert_kind(said.err)
+    assert "index.csv is of no sweep" in said.err
+    assert execute([*tokens, "--overwrite"]) == 1
+    said = capsys.readouterr()
     assert "wrote" not in said.out
     assert_kind(said.err)
     assert "index.csv cannot be written" in said.err
