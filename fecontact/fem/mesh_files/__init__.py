@@ -57,8 +57,8 @@ def read_mesh(
     points : mapping of name to name, (x, y) or (x, y, z)
         Points by new name: a group of the file, or the node nearest to a place [m] in the body.
     part : str, optional
-        One of several bodies in the file: a physical group of cells (Gmsh), an element set or part
-        (Abaqus), a group of cells (MED), a property number (Nastran); all cells by default.
+        One of several bodies in the file: a physical group of cells (Gmsh), an element set, part or
+        instance (Abaqus), a group of cells (MED), a property number (Nastran); by default all.
 
     Raises
     ------

@@ -1,20 +1,22 @@
-"""Abaqus input files: parts with plane or solid elements, their sets and surfaces.
+"""Abaqus input files: parts and instances with plane or solid elements, their sets and surfaces.
 
 Unlike meshio this reads plane-strain and reduced-integration elements, several blocks of nodes,
-sets named on *ELEMENT, and surfaces.
+sets named on *ELEMENT, surfaces, local coordinate systems, displaced instances and included files.
 """
 
 import re
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.checks import whole_number
-from fecontact.core.errors import MeshError, ModelWarning, shown
-from fecontact.core.types import Integers
+from fecontact.core.errors import MeshError, ModelWarning, choices, nearest, shown
+from fecontact.core.types import Array, Integers
+from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
 _PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
@@ -28,11 +30,43 @@ _SOLID_KINDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 
 _FACES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
           8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))}
 
-# Numbers, ranges of numbers (GENERATE) and names of other sets.
-Members = list[int | range | str]
+# Keywords that stiffen or load the mesh by other means than its plane and solid elements.
+_CONSTRAINTS = ("TIE", "COUPLING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING",
+                "SHELL TO SOLID COUPLING", "EQUATION", "MPC", "RIGID BODY", "EMBEDDED ELEMENT",
+                "PRE-TENSION SECTION", "FASTENER", "CONNECTOR SECTION", "JOINT", "SPRING",
+                "DASHPOT", "MASS", "ROTARY INERTIA")
+_GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
+_KINDS = {"NSET": "nodes", "ELSET": "elements"}
+_PARALLEL = 1e-9  # sine of the angle between directions that span no plane
 
-_ENCLOSED = ("PART", "INSTANCE", "ASSEMBLY")  # each closed by *END PART and so on
-_WITH_DATA = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
+
+@dataclass(frozen=True)
+class _NodesOf:
+    """The nodes of the elements in a set."""
+
+    elements: "Members"
+
+
+_T = TypeVar("_T")
+# Numbers, and ranges of numbers (GENERATE).
+Members = list[Integers | range | _NodesOf]
+
+
+@dataclass
+class _Sets:
+    """Sets, and surfaces of (set, number of the side), by name."""
+
+    nodes: dict[str, Members] = field(default_factory=dict)
+    elements: dict[str, Members] = field(default_factory=dict)
+    surfaces: dict[str, list[tuple[Members, int]]] = field(default_factory=dict)
+
+    def of(self, kind: str) -> dict[str, Members]:
+        return self.nodes if kind == "nodes" else self.elements
+
+    def copy(self) -> "_Sets":
+        return _Sets({name: [*members] for name, members in self.nodes.items()},
+                     {name: [*members] for name, members in self.elements.items()},
+                     {name: [*rows] for name, rows in self.surfaces.items()})
 
 
 def read_inp(path: Path) -> RawMesh:
@@ -41,83 +75,49 @@ def read_inp(path: Path) -> RawMesh:
     Raises
     ------
     MeshError
-        If the file is cut off, holds a displaced part, or names nodes, elements or sets that it
-        does not hold.
+        If the file is cut off, includes a missing file or itself, makes its mesh by keywords such
+        as *NGEN, or names nodes, elements, sets, parts or instances that it does not hold.
 
     Warns
     -----
     ModelWarning
-        If the file ends with elements and some nodes belong to none of them.
+        If the file ends with elements and some nodes belong to none of them, or holds constraints,
+        springs or masses, which are not read.
     """
-    text = path.read_text(encoding="utf-8", errors="replace")
-    part = _Part()
-    parts = {"": part}
-    in_part: dict[str | None, str] = {}
-    keyword = ""
-    for keyword, options, rows in _blocks(text):
-        match keyword:
-            case "NODE":
-                part.add_nodes(options, rows)
-            case "ELEMENT":
-                part.add_elements(options, rows)
-            case "NSET":
-                one = parts.get(in_part.get(options.get("INSTANCE"), "no instance"), part)
-                one.add_set(one.node_sets, options["NSET"], options, rows)
-            case "ELSET":
-                one = parts.get(in_part.get(options.get("INSTANCE"), "no instance"), part)
-                one.add_set(one.element_sets, options["ELSET"], options, rows)
-            case "SURFACE" if options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
-                for one in parts.values() if part.in_assembly else (part,):
-                    one.add_surface(options["NAME"], rows, len(parts) > 2)
-            case "SYSTEM" if rows:
-                raise MeshError("The file gives nodes in a local coordinate system (*SYSTEM); "
-                                "export them in the global one.")
-            case "PART":
-                part = parts[options["NAME"]] = _Part()
-            case "ASSEMBLY":
-                for one in parts.values():
-                    one.in_assembly = True
-            case "INSTANCE" if any(float(word or 0) for row in rows for word in row):
-                raise MeshError("The file displaces its part in *INSTANCE; export the part itself.")
-            case "INSTANCE":
-                in_part[options.get("NAME")] = options.get("PART", "")
-            case "INCLUDE":
-                raise MeshError("The file includes another one (*INCLUDE), which is not read; put "
-                                "everything into one file.")
-    found = {name: one for name, one in parts.items() if one.nodes and one.elements}
-    if not found:
+    deck, assembly = Deck(path), _Assembly()
+    try:
+        for keyword, options, lines in deck.blocks():
+            assembly.add(keyword, options, lines)
+    except MeshError:
+        if deck.is_read:  # a cut file explains why its last block is wrong
+            deck.require_end()
+        raise
+    bodies = assembly.bodies()
+    if not bodies:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
-    _require_end(text)
-    joined = _joined({name: one.raw_mesh() for name, one in found.items()})
-    if keyword == "ELEMENT" and (unused := part.unused_nodes):
-        warnings.warn(f"{path}: the file ends with *ELEMENT data, and {unused} of "
-                      f"{len(part.nodes)} nodes belong to no element; if the file is cut off, "
+    deck.require_end()
+    joined = _joined({body.title or body.name: body.raw_mesh() for body in bodies})
+    unused = sum(body.part.unused_nodes for body in bodies) if deck.ends_with_elements else 0
+    if unused:
+        cut = deck.ends_with_elements[0]
+        name = "" if cut == path.name else f" {cut}"
+        warnings.warn(f"{path}: the file{name} ends with *ELEMENT data, and {unused} of "
+                      f"{len(joined.points)} nodes belong to no element; if the file is cut off, "
                       f"elements are missing.", ModelWarning, stacklevel=4)
+    if unread := [f"{deck.keywords[name]} *{name}" for name in _CONSTRAINTS if deck.keywords[name]]:
+        warnings.warn(f"{path}: the file holds {', '.join(unread)}, which are not read; the mesh "
+                      f"has none of their stiffness or mass, so give supports, links and welds "
+                      f"beside it.", ModelWarning, stacklevel=4)
     return joined
-
-
-def _require_end(text: str) -> None:
-    """Refuse a file that ends within data, within a part, or before the data of a keyword."""
-    lines = [line.strip() for line in text.splitlines()]
-    if not text.endswith("\n") and lines[-1] and not lines[-1].startswith("*"):
-        raise MeshError(f"The last line, {shown(lines[-1])}, has no line break, so the file may be "
-                        f"cut off; end it with a line break if it is complete.")
-    lines = [line for line in lines if line and not line.startswith("**")]
-    keywords = [line[1:].partition(",")[0].strip().upper() for line in lines if line[0] == "*"]
-    for name in _ENCLOSED:
-        if keywords.count(name) > keywords.count(f"END {name}"):
-            raise MeshError(f"The file has a line *{name} without a line *END {name}, so it may be "
-                            f"cut off; add the line if the file is complete.")
-    nodes_of_elements = keywords[-1] == "NSET" and "ELSET" in lines[-1].upper()
-    if lines[-1].startswith("*") and keywords[-1] in _WITH_DATA and not nodes_of_elements:
-        raise MeshError(f"The file ends with the line {shown(lines[-1])} without its data, so it "
-                        f"may be cut off; remove the line if the file is complete.")
 
 
 def _joined(parts: dict[str, RawMesh]) -> RawMesh:
     """Several parts, each with its own numbers, in one mesh with equally named groups joined."""
     if len(parts) == 1:
-        return next(iter(parts.values()))
+        (name, raw), = parts.items()
+        if name:
+            raw.parts.setdefault(name, raw.cells)
+        return raw
     joined = RawMesh(np.concatenate([raw.points for raw in parts.values()]), [],
                      sets_are_boundaries=True, separate=True)
     first = 0
@@ -135,209 +135,482 @@ def _joined(parts: dict[str, RawMesh]) -> RawMesh:
     return joined
 
 
-def _blocks(text: str) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """Keyword, options and rows of data of each keyword block."""
-    keyword = ""
-    options: dict[str, str] = {}
-    rows: list[list[str]] = []
-    joined = re.sub(r"^(\*[^*\n].*,)[ \t\r]*\n(?!\*)", r"\1", text, flags=re.MULTILINE)
-    for line in joined.splitlines():
-        line = line.strip()
-        if not line or line.startswith("**"):
+def _words(line: str) -> list[str]:
+    return [word.strip() for word in line.split(",")]
+
+
+def _values(line: str) -> list[float]:
+    return [float(word or 0) for word in _words(line.rstrip(", "))]
+
+
+def _place(values: list[float]) -> Array:
+    """Return three coordinates; those that are left out are zero."""
+    return np.array([*values, 0.0, 0.0, 0.0][:3])
+
+
+def _find(sets: dict[str, Members], name: str) -> Members | None:
+    if name in sets:
+        return sets[name]
+    return next((found for key, found in sets.items() if key.upper() == name.upper()), None)
+
+
+def _members(owner: "_Part | _Instance", kind: str, word: str) -> Members:
+    """The number that a word is, or the members of the set that it names."""
+    if (number := whole_number(word)) is not None:
+        return [np.array([number])]
+    if (found := owner.find(kind, word)) is None:
+        raise MeshError(f"The file refers to a set '{word}' that it does not hold.")
+    return found
+
+
+def _add_set(
+    owner: "_Part | _Instance", keyword: str, options: Options, lines: list[str]
+) -> None:
+    kind = _KINDS[keyword]
+    members = owner.sets.of(kind).setdefault(options[keyword], [])
+    if keyword == "NSET" and "ELSET" in options:
+        members.append(_NodesOf(_members(owner, "elements", options["ELSET"])))
+    numbers: list[int] = []
+    for line in lines:
+        words = [word for word in _words(line) if word]
+        if "GENERATE" in options:
+            first, last, *step = (int(word) for word in words)
+            members.append(range(first, last + 1, *step))
             continue
-        if not line.startswith("*"):
-            rows.append([word.strip() for word in line.split(",")])
-            continue
-        yield keyword, options, rows
-        words = [word.strip() for word in line[1:].split(",")]
-        keyword, rows = words[0].upper(), []
-        pairs = [word.partition("=") for word in words[1:]]
-        options = {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
-    yield keyword, options, rows
+        for word in words:
+            if (number := whole_number(word)) is None:
+                members += _members(owner, kind, word)
+            else:
+                numbers.append(number)
+    members.append(np.array(numbers, np.int64))
+
+
+def _local_system(lines: list[str]) -> tuple[Array, Array] | None:
+    """Origin and axes (rows) of the data lines of *SYSTEM; None for the global system."""
+    if not lines:
+        return None
+    values = _values(lines[0])
+    origin = _place(values[:3])
+    if len(values) <= 3:
+        return origin, np.eye(3)
+    x = _place(values[3:]) - origin
+    if len(lines) > 1:
+        in_plane = _place(_values(lines[1])) - origin
+    else:  # Abaqus keeps the z axis and projects the x axis on the x-y plane.
+        x[2] = 0.0
+        in_plane = np.array([-x[1], x[0], 0.0])
+    z = np.cross(x, in_plane)
+    if not np.linalg.norm(z) > _PARALLEL * np.linalg.norm(x) * np.linalg.norm(in_plane):
+        raise MeshError(f"The points of the lines {shown('; '.join(lines[:2]))} below *SYSTEM do "
+                        f"not span an x-y plane; give an origin, a point on the x axis and a point "
+                        f"beside this axis.")
+    x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+    return origin, np.array([x, np.cross(z, x), z])
+
+
+def _cartesian(places: Array, system: str) -> Array:
+    """Cartesian coordinates of (r, theta, z) for C, of (r, theta, phi) in degrees for S."""
+    if system == "R":
+        return places
+    r, theta, z = places[:, 0], np.radians(places[:, 1]), places[:, 2]
+    if system == "S":  # phi is the angle above the x-y plane
+        r, z = r * np.cos(np.radians(z)), r * np.sin(np.radians(z))
+    elif system != "C":
+        raise MeshError(f"The line *NODE, SYSTEM={system} names an unknown system; it may be R "
+                        f"(rectangular), C (cylindrical) or S (spherical).")
+    return np.column_stack([r * np.cos(theta), r * np.sin(theta), z])
+
+
+@dataclass(frozen=True)
+class _Placement:
+    """A translation, and then a rotation about an axis through two points [degrees]."""
+
+    shift: Array
+    first: Array
+    axis: Array
+    degrees: float = 0.0
+
+    @classmethod
+    def read(cls, lines: list[str], name: str) -> "_Placement | None":
+        """Placement of the data lines of *INSTANCE; None if it moves nothing."""
+        if not lines:
+            return None
+        values, turn = _values(lines[0]), _values(lines[1]) if len(lines) > 1 else [0.0] * 7
+        first, axis, degrees = _place(turn), _place(turn[3:6]) - _place(turn), turn[-1]
+        length = float(np.linalg.norm(axis))
+        if len(values) > 3 or len(turn) != 7 or (degrees and not length > 0.0):
+            raise MeshError(f"The lines {shown('; '.join(lines))} of the instance '{name}' must be "
+                            f"a translation x, y, z and, on a second line, a rotation: two points "
+                            f"of its axis, x, y, z each, and the angle in degrees.")
+        moves = any(values) or degrees % 360.0
+        return cls(_place(values), first, axis / (length or 1.0), degrees) if moves else None
+
+    def moved(self, places: Array) -> Array:
+        arms = places + self.shift - self.first
+        angle = np.radians(self.degrees)
+        along = np.outer(arms @ self.axis, self.axis)
+        turned = along + np.cos(angle) * (arms - along) + np.sin(angle) * np.cross(self.axis, arms)
+        return self.first + (turned if self.degrees else arms)
+
+
+class _Assembly:
+    """Parts and instances as read so far; the part without a name holds a mesh outside of parts."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, _Part] = {"": _Part("")}
+        self.instances: list[_Instance] = []
+        # Nodes and elements of the assembly itself, which are reference points, are not read.
+        self.current: _Part | None = self.parts[""]
+
+    def add(self, keyword: str, options: Options, lines: list[str]) -> None:
+        part = self.current
+        match keyword:
+            case "NODE" if part is not None:
+                part.add_nodes(options, lines)
+            case "ELEMENT" if part is not None:
+                part.add_elements(options, lines)
+            case "SYSTEM" if part is not None:
+                part.system = _local_system(lines)
+            case "NSET" | "ELSET":
+                self._add_set(keyword, options, lines)
+            case "SURFACE" if options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
+                self._add_surface(options["NAME"], lines)
+            case "PART":
+                name = options["NAME"]
+                self.current = self.parts[name.upper()] = _Part(name)
+            case "END PART":
+                self.current = self.parts[""]
+            case "ASSEMBLY" | "END INSTANCE":
+                self.current = None
+            case "INSTANCE":
+                self._add_instance(options, lines)
+            case _ if keyword in _GENERATING:
+                raise MeshError(f"The file makes nodes or elements by *{keyword}, which is not "
+                                f"read; write all nodes and elements as data of *NODE and "
+                                f"*ELEMENT.")
+
+    def bodies(self) -> list["_Instance"]:
+        """Return the meshes of the file.
+
+        They have the names of parts if each part has one instance at most and none is displaced,
+        and those of instances otherwise.
+        """
+        of_part = {one.source: one for one in self.instances if one.source}
+        independent = [one for one in self.instances if not one.source]
+        once = len(of_part) + len(independent) == len(self.instances)
+        displaced = any(one.placement for one in of_part.values())
+        distinct = self.parts.keys().isdisjoint(one.name.upper() for one in independent)
+        found = [_Instance("", self.parts[""]), *self.instances]
+        if once and distinct and not displaced:
+            found = [*(of_part.get(key) or _Instance(part.name, part)
+                       for key, part in self.parts.items()), *independent]
+            for key, one in of_part.items():
+                one.title = self.parts[key].name
+        return [one for one in found if one.part.node_blocks and one.part.element_blocks]
+
+    def _add_instance(self, options: Options, lines: list[str]) -> None:
+        name, source = options["NAME"], options.get("PART", "").upper()
+        if any(one.name.upper() == name.upper() for one in self.instances):
+            raise MeshError(f"The file holds two instances '{name}'; rename one of them.")
+        if "LIBRARY" in options:
+            raise MeshError(f"The instance '{name}' takes its mesh from results (LIBRARY="
+                            f"{options['LIBRARY']}), which are not read; write its mesh into the "
+                            f"file.")
+        if source not in self.parts:
+            known = [part.name for part in self.parts.values() if part.name]
+            raise MeshError(f"The instance '{name}' is of the part '{options['PART']}', which the "
+                            f"file does not hold{nearest(options['PART'], known)}; its parts are: "
+                            f"{choices(known)}.")
+        part = self.parts[source] if source else _Part("")
+        held = bool(part.node_blocks)
+        self.current = replace(
+            part, system=None, node_blocks=[*part.node_blocks],
+            element_blocks=[*part.element_blocks], other_elements=[*part.other_elements],
+            other_nodes=[*part.other_nodes], sets=part.sets.copy())
+        self.instances.append(_Instance(name, self.current, _Placement.read(lines, name),
+                                        source if held else ""))
+
+    def _add_set(self, keyword: str, options: Options, lines: list[str]) -> None:
+        if "INSTANCE" in options:
+            _add_set(self._instance(options["INSTANCE"], options[keyword]), keyword, options, lines)
+        elif self.current is not None:
+            _add_set(self.current, keyword, options, lines)
+        else:
+            words = [word for line in lines for word in _words(line)]
+            of_elements = options.get("ELSET", "") if keyword == "NSET" else ""
+            for one in self.instances:
+                own = [word for word in words if one.find(_KINDS[keyword], word) is not None]
+                if own or one.find("elements", of_elements) is not None:
+                    _add_set(one, keyword, options, [",".join(own)])
+
+    def _add_surface(self, name: str, lines: list[str]) -> None:
+        rows = [(words[0], int(words[1][1])) for words in map(_words, lines)
+                if len(words) > 1 and re.fullmatch(r"[SE][1-6]", words[1].upper())]
+        for one in self.instances if self.current is None else (self.current,):
+            # In the assembly, numbers belong to the only instance.
+            own = [row for row in rows if one is self.current
+                   or one.find("elements", row[0]) is not None
+                   or (len(self.instances) == 1 and whole_number(row[0]) is not None)]
+            if own or one is self.current:
+                one.sets.surfaces.setdefault(name, []).extend(
+                    (_members(one, "elements", word), side) for word, side in own)
+
+    def _instance(self, name: str, of_set: str) -> "_Instance":
+        for one in self.instances:
+            if one.name.upper() == name.upper():
+                return one
+        known = [one.name for one in self.instances]
+        raise MeshError(f"The set '{of_set}' is of the instance '{name}', which the file does not "
+                        f"hold{nearest(name, known)}; its instances are: {choices(known)}.")
 
 
 @dataclass
 class _Part:
-    """The part as read so far; sets hold Abaqus' numbers and names of other sets."""
+    """A part as read so far: blocks of numbers with places, of elements with Abaqus' numbers."""
 
-    nodes: dict[int, list[float]] = field(default_factory=dict)
-    elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
-    node_sets: dict[str, Members] = field(default_factory=dict)
-    element_sets: dict[str, Members] = field(default_factory=dict)
-    surfaces: dict[str, list[list[str]]] = field(default_factory=dict)
+    name: str
+    node_blocks: list[tuple[Integers, Array]] = field(default_factory=list)
+    element_blocks: list[tuple[str, Integers, Integers]] = field(default_factory=list)
     # Numbers of the elements that are not read (masses, springs, wedges), and of their nodes.
-    other_elements: set[int] = field(default_factory=set)
-    other_nodes: set[int] = field(default_factory=set)
-    in_assembly: bool = False
+    other_elements: list[int] = field(default_factory=list)
+    other_nodes: list[int] = field(default_factory=list)
+    sets: _Sets = field(default_factory=_Sets)
+    system: tuple[Array, Array] | None = None
 
     @property
     def unused_nodes(self) -> int:
         """Number of nodes that belong to no element."""
-        used = {node for _, nodes in self.elements.values() for node in nodes}
-        return len(self.nodes.keys() - used - self.other_nodes)
+        used = [nodes.ravel() for _, _, nodes in self.element_blocks]
+        numbers = np.concatenate([numbers for numbers, _ in self.node_blocks])
+        return len(np.setdiff1d(numbers, np.concatenate([*used, self.other_nodes])))
 
-    def add_nodes(self, options: dict[str, str], rows: list[list[str]]) -> None:
-        if self.in_assembly:
-            return  # reference points have their own numbering
-        if options.get("SYSTEM", "R").upper() != "R":
-            raise MeshError("The file gives nodes in cylindrical or spherical coordinates; export "
-                            "Cartesian ones.")
-        for row in rows:
-            x, y, z = ([float(word or 0) for word in row[1:4]] + [0.0, 0.0])[:3]
-            self.nodes[int(row[0])] = [x, y, z]
+    def find(self, kind: str, word: str) -> Members | None:
+        """Members of a set; None if there is no such set."""
+        return _find(self.sets.of(kind), word)
+
+    def add_nodes(self, options: Options, lines: list[str]) -> None:
+        numbers, places = _numbered_places(lines)
+        places = _cartesian(places, options.get("SYSTEM", "R").upper())
+        if self.system is not None:
+            origin, axes = self.system
+            places = origin + places @ axes
+        if lines:
+            self.node_blocks.append((numbers, places))
         if "NSET" in options:
-            self.node_sets.setdefault(options["NSET"], []).extend(int(row[0]) for row in rows)
+            self.sets.nodes.setdefault(options["NSET"], []).append(numbers)
 
-    def add_elements(self, options: dict[str, str], rows: list[list[str]]) -> None:
+    def add_elements(self, options: Options, lines: list[str]) -> None:
         kind = _kind(options["TYPE"].upper())
-        if self.in_assembly:
-            return
         if kind in (None, "solid"):
-            self.other_elements.update(int(row[0]) for row in rows)
-            self.other_nodes.update(number for row in rows for word in row[1:]
-                                    if (number := whole_number(word)) is not None)
+            for line in lines:
+                number, *nodes = _words(line)
+                self.other_elements.append(int(number))
+                self.other_nodes += [one for node in nodes
+                                     if (one := whole_number(node)) is not None]
         if kind is None:
             return
         if kind == "solid":
-            self.elements[0] = kind, []
+            self.element_blocks.append((kind, np.zeros(1, np.int64), np.zeros((1, 0), np.int64)))
             return
         count = 1 + NODES[kind]
-        numbers = [int(word) for row in rows for word in row if word]
+        numbers = np.fromiter((int(word) for line in lines for word in line.split(",")
+                               if word and not word.isspace()), np.int64)
         if len(numbers) % count:
             raise MeshError(f"The file has elements {options['TYPE']} of another number of nodes "
                             f"than {count - 1}.")
-        for at in range(0, len(numbers), count):
-            self.elements[numbers[at]] = kind, numbers[at + 1:at + count]
+        rows = numbers.reshape(-1, count)
+        if lines:
+            self.element_blocks.append((kind, rows[:, 0], rows[:, 1:]))
         if "ELSET" in options:
-            self.element_sets.setdefault(options["ELSET"], []).extend(numbers[::count])
+            self.sets.elements.setdefault(options["ELSET"], []).append(rows[:, 0])
 
-    def add_set(
-        self, sets: dict[str, Members], name: str, options: dict[str, str],
-        rows: list[list[str]],
-    ) -> None:
-        if self.in_assembly and "INSTANCE" not in options:
-            return  # reference points
-        members = sets.setdefault(name, [])
-        if sets is self.node_sets and "ELSET" in options:
-            for element in self.resolve(self.element_sets, options["ELSET"]):
-                members.extend(self.elements[element][1] if element in self.elements else [])
-        for row in rows:
-            words = [word for word in row if word]
-            if "GENERATE" in options:
-                first, last, *step = (int(word) for word in words)
-                members.append(range(first, last + 1, *step))
-            else:
-                for word in words:
-                    number = whole_number(word)
-                    members.append(word if number is None else number)
 
-    def add_surface(self, name: str, rows: list[list[str]], several: bool) -> None:
-        """Add rows ``set or element, side``; of several parts, only sets that this one has."""
-        known = {title.upper() for title in self.element_sets}
-        self.surfaces.setdefault(name, []).extend(
-            row for row in rows if not (several and self.in_assembly) or row[0].upper() in known)
+def _numbered_places(lines: list[str]) -> tuple[Integers, Array]:
+    """Numbers (n,) and coordinates (n, 3) of rows ``number, x, y, z``."""
+    try:
+        rows = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
+    except ValueError:  # rows of different lengths, or with empty fields
+        rows = np.array([[float(number), *_place([float(word or 0) for word in place])]
+                         for number, *place in map(_words, lines)]).reshape(-1, 4)
+    numbers = rows[:, 0].astype(np.int64)
+    if (rows[:, 0] != numbers).any():
+        raise ValueError(f"{rows[rows[:, 0] != numbers][0, 0]:g} is no number of a node")
+    places = np.zeros((len(rows), 3))
+    places[:, :min(rows.shape[1] - 1, 3)] = rows[:, 1:4]
+    return numbers, places
 
-    def resolve(self, sets: dict[str, Members], name: str) -> list[int]:
-        """The numbers in a set; names in it refer to sets defined before."""
-        by_name = {key.upper(): key for key in sets}
-        pending: Members = [name]
-        seen: set[str] = set()
-        numbers: list[int] = []
-        while pending:
-            member = pending.pop()
-            if isinstance(member, int):
-                numbers.append(member)
-            elif isinstance(member, range):
-                numbers.extend(member)
-            elif member.upper() not in by_name:
-                raise MeshError(f"The file refers to a set '{member}' that it does not hold.")
-            elif member.upper() not in seen:
-                seen.add(member.upper())
-                pending.extend(sets[by_name[member.upper()]])
-        return numbers
 
-    def require_members(self) -> None:
-        """Refuse sets and surfaces that name nodes or elements which the file does not hold."""
-        elements = self.elements.keys() | self.other_elements
-        surfaces = {name: [number for row in rows if (number := whole_number(row[0])) is not None]
-                    for name, rows in self.surfaces.items()}
-        for title, one, groups, known in (
-                ("node set", "node", self.node_sets, self.nodes.keys()),
-                ("element set", "element", self.element_sets, elements),
-                ("surface", "element", surfaces, elements)):
-            for name, members in groups.items():
-                for member in members:
-                    ends = ((member,) if isinstance(member, int) else
-                            (member[0], member[-1]) if isinstance(member, range) and member else ())
-                    for number in ends:
-                        if number not in known:
-                            raise MeshError(
-                                f"The {title} '{name}' names {one} {number}, which the file does "
-                                f"not hold; the file may be cut off, save it again whole.")
+class _Index:
+    """Positions of numbers in an array of distinct ones."""
 
-    def surface(self, rows: list[list[str]]) -> list[list[int]]:
-        """Edges or faces (Abaqus' node numbers) of ``set or element, S1`` rows."""
-        sides = []
-        for name, side, *_ in (row for row in rows if len(row) > 1):
-            if not re.fullmatch(r"[SE][1-6]", side.upper()):
-                continue
-            given = whole_number(name)
-            numbers = self.resolve(self.element_sets, name) if given is None else [given]
-            for number in numbers:
-                if number not in self.elements:
-                    continue
-                kind, nodes = self.elements[number]
-                which = int(side[1]) - 1
-                if kind in SOLID and which < len(_FACES[SOLID[kind]]):
-                    sides.append([nodes[corner] for corner in _FACES[SOLID[kind]][which]])
-                elif kind in PLANE and which < PLANE[kind]:
-                    sides.append([nodes[which], nodes[(which + 1) % PLANE[kind]]])
-        return sides
+    def __init__(self, numbers: Integers) -> None:
+        self.order = np.argsort(numbers, kind="stable")
+        self.numbers = numbers[self.order]
+
+    def __call__(self, wanted: Integers) -> Integers:
+        """Positions, -1 for numbers that are not there."""
+        if not len(self.numbers):
+            return np.full(np.shape(wanted), -1)
+        at = np.minimum(np.searchsorted(self.numbers, wanted), len(self.numbers) - 1)
+        found: Integers = np.where(self.numbers[at] == wanted, self.order[at], -1)
+        return found
+
+    def of_range(self, members: range) -> Integers:
+        if not members:
+            return np.empty(0, np.int64)
+        low, high = sorted((members[0], members[-1]))
+        inside = ((self.numbers >= low) & (self.numbers <= high)
+                  & ((self.numbers - low) % members.step == 0))
+        return self.order[inside]
+
+
+def _last_of_each(numbers: Integers) -> NDArray[np.bool_]:
+    """Mask of the last row of each number: later data replace earlier ones."""
+    last = np.zeros(len(numbers), bool)
+    last[len(numbers) - 1 - np.unique(numbers[::-1], return_index=True)[1]] = True
+    return last
+
+
+@dataclass
+class _Instance:
+    """An instance of a part, with the sets that the assembly makes of it."""
+
+    name: str
+    part: _Part
+    placement: _Placement | None = None
+    source: str = ""  # key of the part, if its mesh is that of the part
+    title: str = ""  # name as a body, if not that of the instance
+    sets: _Sets = field(default_factory=_Sets)
+
+    def find(self, kind: str, word: str) -> Members | None:
+        """Members that ``set``, ``instance.set`` or ``instance.number`` names; None for others."""
+        prefix = f"{self.name}."
+        if word.upper().startswith(prefix.upper()):
+            own = word[len(prefix):]
+            if (number := whole_number(own)) is not None:
+                return [np.array([number])]
+            found = self.part.find(kind, own)
+            return _find(self.sets.of(kind), own) if found is None else found
+        found = _find(self.sets.of(kind), word)
+        return self.part.find(kind, word) if found is None else found
 
     def raw_mesh(self) -> RawMesh:
-        index = {number: k for k, number in enumerate(self.nodes)}
-        if not all(index.keys() >= set(nodes) for _, nodes in self.elements.values()):
-            raise MeshError("The elements name nodes that the file does not hold.")
-        self.require_members()
-        blocks: dict[str, list[list[int]]] = {}
-        for kind, nodes in self.elements.values():
-            if not kind.startswith("line"):
-                blocks.setdefault(kind, []).append([index[number] for number in nodes])
-        parts: dict[str, list[tuple[str, Integers]]] = {}
-        for name in self.element_sets:
-            held: dict[str, list[list[int]]] = {}
-            for number in self.resolve(self.element_sets, name):
-                kind, nodes = self.elements.get(number, ("line", []))
-                if not kind.startswith(("line", "solid")):
-                    held.setdefault(kind, []).append([index[node] for node in nodes])
-            if held:
-                parts[name] = [(kind, np.array(rows)) for kind, rows in held.items()]
-        surfaces = {name: self.surface(rows) for name, rows in self.surfaces.items()}
-        edges = {name: found for name, sides in surfaces.items()
-                 if (found := [side for side in sides if len(side) == 2])}
-        faces = {name: [np.array([[index[node] for node in side] for side in found])
-                        for count in (3, 4)
-                        if (found := [side for side in sides if len(side) == count])]
-                 for name, sides in surfaces.items()}
-        for name in self.element_sets:
-            found = [self.elements[number][1][:2]
-                     for number in self.resolve(self.element_sets, name)
-                     if number in self.elements and self.elements[number][0].startswith("line")]
-            if found:
-                edges.setdefault(name, found)
+        mesh = _NumberedMesh(self.part)
+        node_sets = self._named(self.part.sets.nodes, self.sets.nodes)
+        element_sets = self._named(self.part.sets.elements, self.sets.elements)
+        surfaces = self._named(self.part.sets.surfaces, self.sets.surfaces)
+        mesh.require("node set", "node", node_sets)
+        mesh.require("element set", "element", element_sets)
+        mesh.require("surface", "element", {
+            name: [one for members, _ in rows for one in members]
+            for name, rows in surfaces.items()})
+        held = {name: mesh.held(members) for name, members in element_sets.items()}
+        sides = {name: mesh.sides(rows) for name, rows in surfaces.items()}
+        edges = {name: blocks[2] for name, blocks in sides.items() if 2 in blocks}
+        for name, cells in held.items():
+            if lines := [rows[:, :2] for kind, rows in cells if kind.startswith("line")]:
+                edges.setdefault(name, np.concatenate(lines))
+        faces = {name: [blocks[count] for count in (3, 4) if count in blocks]
+                 for name, blocks in sides.items()}
+        parts = {name: [(kind, rows) for kind, rows in cells
+                        if not kind.startswith(("line", "solid"))] for name, cells in held.items()}
+        places = mesh.places
         return RawMesh(
-            np.array(list(self.nodes.values())),
-            [(kind, np.array(rows)) for kind, rows in blocks.items()],
-            edges={name: np.array([[index[first], index[second]] for first, second in pairs])
-                   for name, pairs in edges.items()},
-            nodes={name: np.array([index[number]
-                                   for number in self.resolve(self.node_sets, name)
-                                   if number in index], np.int64)
-                   for name in self.node_sets},
+            places if self.placement is None else self.placement.moved(places),
+            [(kind, rows) for kind, rows in mesh.cells.items() if not kind.startswith("line")],
+            edges=edges,
+            nodes={name: mesh.nodes_of(members) for name, members in node_sets.items()},
             sets_are_boundaries=True,
             faces={name: blocks for name, blocks in faces.items() if blocks},
-            parts=parts,
+            parts={name: cells for name, cells in parts.items() if cells},
         )
+
+    def _named(self, of_part: dict[str, _T], of_assembly: dict[str, _T]) -> dict[str, _T]:
+        """Groups by name; one of the part whose name the assembly takes is ``instance.name``."""
+        taken = {name.upper() for name in of_assembly}
+        return {**{f"{self.name}." * (name.upper() in taken) + name: group
+                   for name, group in of_part.items()}, **of_assembly}
+
+
+class _NumberedMesh:
+    """Nodes and elements of a part, found by Abaqus' numbers."""
+
+    def __init__(self, part: _Part) -> None:
+        numbers = np.concatenate([numbers for numbers, _ in part.node_blocks])
+        last = _last_of_each(numbers)
+        self.places = np.concatenate([places for _, places in part.node_blocks])[last]
+        self.nodes = _Index(numbers[last])
+        last = _last_of_each(np.concatenate([numbers for _, numbers, _ in part.element_blocks]))
+        blocks: dict[str, list[tuple[Integers, Integers]]] = {}
+        for kind, numbers, nodes in part.element_blocks:
+            kept, last = last[:len(numbers)], last[len(numbers):]
+            rows = self.nodes(nodes[kept])
+            if (rows < 0).any():
+                raise MeshError("The elements name nodes that the file does not hold.")
+            blocks.setdefault(kind, []).append((numbers[kept], rows))
+        self.cells = {kind: np.concatenate([rows for _, rows in found])
+                      for kind, found in blocks.items()}
+        numbers = np.concatenate([numbers for found in blocks.values() for numbers, _ in found])
+        self.elements = _Index(numbers)
+        others = np.array(part.other_elements, np.int64)
+        self.known = {"node": self.nodes,
+                      "element": _Index(np.unique(np.concatenate([numbers, others])))}
+
+    def require(self, title: str, one: str, groups: dict[str, Members]) -> None:
+        """Refuse sets and surfaces that name nodes or elements which the file does not hold."""
+        for name, members in groups.items():
+            for member in members:
+                if isinstance(member, _NodesOf) or not len(member):
+                    continue
+                numbers = np.array([member[0], member[-1]] if isinstance(member, range) else member)
+                unknown = numbers[self.known[one](numbers) < 0]
+                if len(unknown):
+                    raise MeshError(f"The {title} '{name}' names {one} {unknown[0]}, which the "
+                                    f"file does not hold; the file may be cut off, save it again "
+                                    f"whole.")
+
+    def nodes_of(self, members: Members) -> Integers:
+        """Positions of the nodes of a set."""
+        found = [np.empty(0, np.int64)]
+        for member in members:
+            if isinstance(member, _NodesOf):
+                found += [rows.ravel() for _, rows in self.held(member.elements)]
+            else:
+                found.append(_positions(self.nodes, member))
+        return np.unique(np.concatenate(found))
+
+    def held(self, members: Members) -> list[tuple[str, Integers]]:
+        """Elements of a set by kind, by the positions of their nodes."""
+        chosen = np.zeros(len(self.elements.numbers), bool)
+        for member in members:
+            if not isinstance(member, _NodesOf):
+                chosen[_positions(self.elements, member)] = True
+        found = []
+        for kind, rows in self.cells.items():
+            mine, chosen = chosen[:len(rows)], chosen[len(rows):]
+            if mine.any():
+                found.append((kind, rows[mine]))
+        return found
+
+    def sides(self, rows: list[tuple[Members, int]]) -> dict[int, Integers]:
+        """Edges (k, 2) and faces (k, 3), (k, 4) of (elements, number of the side)."""
+        found: dict[int, list[Integers]] = {}
+        for members, side in rows:
+            for kind, nodes in self.held(members):
+                if kind in SOLID and side <= len(_FACES[SOLID[kind]]):
+                    corners = _FACES[SOLID[kind]][side - 1]
+                elif kind in PLANE and side <= PLANE[kind]:
+                    corners = side - 1, side % PLANE[kind]
+                else:
+                    continue
+                found.setdefault(len(corners), []).append(nodes[:, corners])
+        return {count: np.concatenate(blocks) for count, blocks in found.items()}
+
+
+def _positions(index: _Index, member: Integers | range) -> Integers:
+    """Positions of the numbers of a set that an index holds."""
+    found = index.of_range(member) if isinstance(member, range) else index(member)
+    return found[found >= 0]
 
 
 def _kind(name: str) -> str | None:
