@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError, choices, require_finite, require_positive
+from fecontact.core.tables import convert_fields
 from fecontact.core.units import Unit
 
 if TYPE_CHECKING:
@@ -98,6 +99,7 @@ class BranchSettings:
     poincare_scan: int = 0
 
     def __post_init__(self) -> None:
+        convert_fields(self)
         require_positive("BranchSettings", step=self.step, largest_step=self.largest_step,
                          tolerance=self.tolerance, state_tolerance=self.state_tolerance)
         for name in ("transient", "longest_period"):

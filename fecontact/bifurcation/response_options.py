@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.tables import convert_fields
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.problem import ContinuationOptions
@@ -96,6 +97,7 @@ class ResponseSettings:
     component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None = None
 
     def __post_init__(self) -> None:
+        convert_fields(self)
         require_positive("ResponseSettings", step=self.step, largest_step=self.largest_step,
                          points=self.points)
         if self.step > self.largest_step:

@@ -240,6 +240,21 @@ def convert(value: Any, hint: Any, where: str, key: str) -> Any:
                          f"1.8e308, whole numbers 9.2e18.") from None
 
 
+def convert_fields(instance: Any) -> None:
+    """Convert the fields of a frozen dataclass to the types of their annotations.
+
+    Raises
+    ------
+    InputError
+        ``RenderSettings: frames = "many" must be a whole number.``
+    """
+    cls: Any = type(instance)
+    for name, hint in _hints(cls).items():
+        if name in cls.__dataclass_fields__:
+            object.__setattr__(instance, name,
+                               convert(getattr(instance, name), hint, cls.__name__, name))
+
+
 def _decimal_point(value: Any) -> str:
     """A hint at the number that a text with a decimal comma stands for, else an empty text."""
     meant = _COMMA.fullmatch(value.strip()) if isinstance(value, str) else None

@@ -59,7 +59,7 @@ class ContactEvents:
     stop: str | Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        if self.stop is None or isinstance(self.stop, bool | int | float):
+        if not isinstance(self.stop, str | list | tuple):
             raise InputError(f"ContactEvents: stop = {self.stop!r} must be one or several of "
                              f"{choices(CONTACT_EVENTS)}, or () for none.")
         given = (self.stop,) if isinstance(self.stop, str) else tuple(self.stop)

@@ -9,7 +9,15 @@ import numpy as np
 
 from fecontact.core.docstrings import inherit_documentation
 from fecontact.core.errors import InputError, choices, nearest, require_finite
-from fecontact.core.tables import from_table, located, plain, require_known, shown, to_table
+from fecontact.core.tables import (
+    convert_fields,
+    from_table,
+    located,
+    plain,
+    require_known,
+    shown,
+    to_table,
+)
 from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
@@ -58,6 +66,7 @@ class Placement:
     mirror: Literal["x", "y", "z"] | None = None
 
     def __post_init__(self) -> None:
+        convert_fields(self)
         angles = self.rotation if isinstance(self.rotation, tuple) else (self.rotation,)
         require_finite("Placement", **dict(zip("xyz", self.shift, strict=False)))
         for angle in angles:

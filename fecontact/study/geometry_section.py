@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from fecontact.core.errors import InputError, choices, nearest, require_positive
-from fecontact.core.tables import from_table, located, shown, to_table
+from fecontact.core.tables import convert_fields, from_table, located, shown, to_table
 from fecontact.core.types import Coordinates
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.groups import Box
@@ -54,6 +54,7 @@ class MeshFile:
     part: str | None = None
 
     def __post_init__(self) -> None:
+        convert_fields(self)
         require_positive("MeshFile", scale=self.scale)
 
     def mesh(self, folder: Path) -> Mesh:

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
-from fecontact.core.tables import from_table, located, shown, to_table
+from fecontact.core.tables import convert_fields, from_table, located, shown, to_table
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.pairing import pair_faces
@@ -47,7 +46,7 @@ class FaceWeldSettings:
     reach: Annotated[float | None, Unit("m")] = None
 
     def __post_init__(self) -> None:
-        require_kind("FaceWeldSettings", str, first=self.first, second=self.second)
+        convert_fields(self)
 
 
 LinkSettings = Spring | Bushing | Hinge | NonlinearSpring | FaceWeldSettings

@@ -3,10 +3,9 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from numbers import Integral, Real
 from typing import Annotated, Any, Literal
 
-from fecontact.core.checks import require_frame_rate, require_kind, require_scale, whole_number
+from fecontact.core.checks import require_frame_rate, require_scale, whole_number
 from fecontact.core.errors import (
     InputError,
     choices,
@@ -14,7 +13,7 @@ from fecontact.core.errors import (
     require_not_negative,
     require_positive,
 )
-from fecontact.core.tables import located, plain, shown
+from fecontact.core.tables import convert_fields, located, plain, shown
 from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody, Material
@@ -70,6 +69,7 @@ class BodySettings:
     rotation: Rotation | None = None
 
     def __post_init__(self) -> None:
+        convert_fields(self)
         if self.thickness is not None:
             require_positive("BodySettings", thickness=self.thickness)
         with located("BodySettings:", "Material"):
@@ -173,8 +173,7 @@ class BasisSettings:
     eigensolver: Literal["auto", "direct", "iterative"] = "auto"
 
     def __post_init__(self) -> None:
-        require_kind("BasisSettings", Integral, modes=self.modes)
-        require_kind("BasisSettings", Mapping, points=self.points)
+        convert_fields(self)
         if self.modes < 1:
             raise InputError(f"BasisSettings: modes = {self.modes} must be at least 1.")
         given = self.contact_nodes
@@ -278,9 +277,7 @@ class SimulationSettings:
     initial: Literal["rest", "sliding", "preload"] | RigidStart | PointStart = "rest"
 
     def __post_init__(self) -> None:
-        require_kind("SimulationSettings", Real, t_start=self.t_start)
-        require_kind("SimulationSettings", (Real, type(None)), t_end=self.t_end)
-        require_kind("SimulationSettings", Integral, outputs=self.outputs)
+        convert_fields(self)
         if not math.isfinite(self.t_start):
             raise InputError(f"SimulationSettings: t_start = {self.t_start!r} must be finite.")
         if self.t_end is not None and not self.t_start < self.t_end < math.inf:
@@ -344,9 +341,9 @@ class WearSettings:
     outputs: int = 401
 
     def __post_init__(self) -> None:
+        convert_fields(self)
         require_positive("WearSettings", acceleration=self.acceleration)
         for name, least in (("blocks", 1), ("periods", 1), ("settling", 0), ("outputs", 2)):
-            require_kind("WearSettings", Integral, **{name: getattr(self, name)})
             if (count := getattr(self, name)) < least:
                 raise InputError(f"WearSettings: {name} = {count} must be at least {least}.")
         if self.period is not None:
@@ -382,7 +379,7 @@ class OutputSettings:
     points: tuple[str | int, ...] = ()
 
     def __post_init__(self) -> None:
-        require_kind("OutputSettings", Integral, frames=self.frames)
+        convert_fields(self)
         if self.frames < 0:
             raise InputError(f"OutputSettings: frames = {self.frames} must be zero or above.")
 
@@ -422,7 +419,7 @@ class RenderSettings:
     view: Literal["above", "below"] = "above"
 
     def __post_init__(self) -> None:
-        require_kind("RenderSettings", Integral, frames=self.frames)
+        convert_fields(self)
         if self.frames < 1:
             raise InputError(f"RenderSettings: frames = {self.frames} must be at least 1.")
         require_frame_rate("RenderSettings", self.fps)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from fecontact.core.checks import require_kind
 from fecontact.core.dotted_parameters import flattened
 from fecontact.core.errors import InputError, choices, require_positive
+from fecontact.core.tables import convert_fields
 from fecontact.core.units import Unit
 
 _SUMMARIES = ("largest_displacement", "stick_fraction", "mean_normal_force", "peak_normal_force",
@@ -212,7 +213,7 @@ class SweepSettings:
     strobe: Strobing | None = None
 
     def __post_init__(self) -> None:
-        require_kind("SweepSettings", Mapping, axes=self.axes)
+        convert_fields(self)
         self._require_alike()
         for name, count in (("samples", self.samples), ("batch", self.batch)):
             if count is not None and count < 1:
@@ -239,7 +240,6 @@ class SweepSettings:
             raise InputError(f"SweepSettings: method = '{self.method}' draws cases from axes; "
                              f"leave it out where cases are listed.")
         for number, case in enumerate(self.cases):
-            require_kind("SweepSettings", Mapping, cases=case)
             if not case:
                 raise InputError(f"SweepSettings: case {number} has no key; give all cases the "
                                  f"same keys, at least one.")
