@@ -124,6 +124,7 @@ def key_numbers(
             values[name] = value
 
     found = steadiness(trajectory)
+    require_kind("key_numbers", Sequence, points=points)
     chosen = tuple(points) or (usual_point(trajectory.system.basis),)
     for point in chosen:
         # Outputs too far apart show frequencies that the motion does not have.

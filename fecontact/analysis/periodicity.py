@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Literal
 
 import numpy as np
@@ -144,7 +144,7 @@ def strobed_states(
     if period is None:
         period = drive_period(trajectory.system)
     require_positive("strobed_states", period=period)
-    if not 0.0 <= phase <= 1.0:
+    if not (isinstance(phase, Real) and 0.0 <= phase <= 1.0):
         raise InputError(f"strobed_states: phase = {phase!r} must be from 0 to 1.")
     begin = _start(trajectory, t_start)
     tiny = 1e-9 * period
@@ -497,7 +497,7 @@ def _start(trajectory: Trajectory, t_start: float | None) -> float:
     t = trajectory.time
     if t_start is None:
         return 0.5 * float(t[0] + t[-1])
-    if not t[0] <= t_start < t[-1]:
+    if not (isinstance(t_start, Real) and t[0] <= t_start < t[-1]):
         raise InputError(f"t_start = {t_start!r} must be a time of the run, from {t[0]:g} s to "
                          f"below {t[-1]:g} s.")
     return float(t_start)

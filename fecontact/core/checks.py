@@ -49,6 +49,16 @@ def require_flags(owner: str, **values: Any) -> None:
             raise InputError(f"{owner}: {name} = {shown(value)} must be True or False.")
 
 
+def as_several(values: Any, kind: type, owner: str, name: str) -> list[Any]:
+    """One instance of a class, or several, as a list; InputError for anything else."""
+    if isinstance(values, kind):
+        return [values]
+    require_kind(owner, (kind, Sequence), **{name: values})
+    for one in values:
+        require_kind(owner, kind, **{name: one})
+    return list(values)
+
+
 def as_texts(values: Any, what: str) -> tuple[str, ...]:
     """Convert one text or several to a tuple; ``what`` is their name in the InputError."""
     given = (values,) if isinstance(values, str) else values

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.core.errors import InputError, choices, nearest, require_finite, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
@@ -121,6 +121,7 @@ def modal_basis(
     completing = loading(body, system, loads, points)
     # At B, C and the contact nodes there are forces, but no moments.
     at_points = sp.csr_array(displacement_rows(restriction, d))
+    require_kind("modal_basis", Sequence, rows=rows)
     further_rows = [_given_rows(body, given) for given in rows]
     vibration = None if reduction == "craig-bampton" else free_modes(system, modes)
     flexibility = flexibility_of(system, sp.csr_array(
@@ -282,8 +283,11 @@ def _has(body: ElasticBody, name: str) -> bool:
 def _given_rows(body: ElasticBody, given: Any) -> Any:
     import scipy.sparse as sp
 
-    rows = sp.csr_array(given)
-    if rows.shape[1] != body.nodes.size:
+    try:
+        rows = sp.csr_array(given)
+    except (TypeError, ValueError):
+        raise InputError(f"modal_basis: rows holds {shown(given)}, which is no matrix.") from None
+    if rows.ndim != 2 or rows.shape[1] != body.nodes.size:
         raise InputError(f"modal_basis: rows of shape {rows.shape} must be (k, "
                          f"{body.nodes.size}), motions from the displacements of the nodes of "
                          f"this body; pair the faces of the same bodies.")

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -196,6 +198,8 @@ def frequency_response(
         which no orbit is found to start from.
     """
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
+    require_kind("frequency_response", (str, NoneType), parameter=parameter)
+    require_kind("frequency_response", (Real, NoneType), start=start)
     require_kind("frequency_response", (HarmonicBalance, Collocation, Shooting, type(None)),
                  method=method)
     held = preloaded(system, preload)

@@ -2,18 +2,19 @@
 
 import json
 import os
-import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import tomli_w
 
-from fecontact.core.checks import as_path
+from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, shown
 from fecontact.core.files.stored import DamagedError, from_json, member, text
+from fecontact.core.tables import parsed
 from fecontact.laws.registry import movable, trusting, with_folder
 from fecontact.output.files.hdf5 import open_file, store_basis, stored_basis
 from fecontact.reduction.modal_basis import ModalBasis
@@ -50,7 +51,8 @@ def store_model(
     Files of user laws below ``root``, by default the folder of the file, are named relative to it.
     """
     folder = path.parent
-    root = folder if root is None else Path(root)
+    root = folder if root is None else as_path(root, "the folder of laws")
+    require_kind("study", (str, NoneType), study=study)
     for name, number in library_versions().items():
         file.require_group("versions").attrs[name] = number
     store_basis(file.create_group("basis"), system.basis)
@@ -161,7 +163,7 @@ def _changed(study: str, change: Callable[[Any], Any]) -> str:
 
     The same text if nothing changes.
     """
-    tables = tomllib.loads(study)
+    tables = parsed(study, "study")
     changed = {name: table if name in ("geometry", "bodies") else change(table)
                for name, table in tables.items()}
     comments = "".join(f"{line}\n" for line in study.splitlines() if line.startswith("# "))

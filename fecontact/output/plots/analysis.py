@@ -19,8 +19,8 @@ from fecontact.analysis.spectra import (
     require_periods,
     spectrogram,
 )
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.checks import as_several, require_kind
+from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
 from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
@@ -88,6 +88,8 @@ def plot_spectrum(
     from matplotlib.patheffects import withStroke
 
     require_kind("plot_spectrum", Trajectory, trajectory=trajectory)
+    if highest_hz is not None:
+        require_positive("plot_spectrum", highest_hz=highest_hz)
     sampled = evenly_sampled_history(trajectory, quantity, point, component)
     shown = sampled.history
     make = power_spectral_density if density else amplitude_spectrum
@@ -153,6 +155,8 @@ def plot_spectrogram(
     from matplotlib.colors import LogNorm
 
     require_kind("plot_spectrogram", Trajectory, trajectory=trajectory)
+    if highest_hz is not None:
+        require_positive("plot_spectrogram", highest_hz=highest_hz)
     sampled = evenly_sampled_history(trajectory, quantity, point, component)
     shown = sampled.history
     found = spectrogram(sampled.time, shown.values, piece=piece, overlap=0.9)
@@ -337,9 +341,7 @@ def plot_receptance(
     InputError
         For nothing to draw, another suffix, or a file that cannot be written.
     """
-    require_kind("plot_receptance", (Receptance, Sequence), responses=responses)
-    if isinstance(responses, Receptance):
-        responses = [responses]
+    responses = as_several(responses, Receptance, "plot_receptance", "responses")
     if not responses:
         raise InputError("responses = [] holds nothing to draw; give at least one.")
     if not any(response.values.any() for response in responses):

@@ -1,9 +1,9 @@
 """The report of a run: one HTML page to play, read and send."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from fecontact.analysis.run_facts import notes, run_facts
 from fecontact.analysis.sampling import alias_message
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
+from fecontact.core.tables import parsed
 from fecontact.core.units import UNITS, quantity, round_125
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.frames import LARGEST_DRAWN, drawable
@@ -98,6 +99,11 @@ def run_block(
 ) -> bytes:
     """The data of the report of a run; see :func:`report`."""
     require_kind("report", Sequence, points=points)
+    require_kind("report", str, title=title)
+    require_kind("report", (str, NoneType), study=study)
+    require_kind("report", (Mapping, NoneType), versions=versions)
+    for point in points:
+        run.displacement(point)
     if isinstance(points, str):
         raise InputError(f"report: points = {points!r} must be several points, such as ['B', 0].")
     if scale is not None:
@@ -184,7 +190,7 @@ def study_tables(study: str | None, *also: str) -> list[dict[str, Any]]:
             if isinstance(value, dict):
                 collect(f"{name}.{key}" if name else key, value)
 
-    tables = tomllib.loads(study or "")
+    tables = parsed(study or "", "report: study")
     collect("", {name: table for name, table in tables.items()
                  if name in also or name not in _NOT_OF_RUNS})
     found.sort(key=lambda section: not section["name"])

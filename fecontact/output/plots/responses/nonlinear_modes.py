@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.bifurcation.nonlinear_modes.resonance_curve import ResonanceCurve
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import as_several
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.output.plots.bifurcation_diagram import SPECIAL, runs_of, stable_pieces
@@ -49,9 +49,7 @@ def plot_nonlinear_mode(
         Without modes, for modes of different displacements, another number of names, another
         suffix, or a file that cannot be written.
     """
-    given = [modes] if isinstance(modes, NonlinearMode) else list(modes)
-    for mode in given:
-        require_kind("plot_nonlinear_mode", NonlinearMode, mode=mode)
+    given = as_several(modes, NonlinearMode, "plot_nonlinear_mode", "modes")
     labels = _labels(given, names)
     lossless = all(mode.conservative for mode in given)
     with new_figure(9.0, 6.4, path) as figure:
@@ -101,9 +99,7 @@ def plot_resonance_curve(
         Without curves, for curves over different parameters, another number of names, another
         suffix, or a file that cannot be written.
     """
-    given = [curves] if isinstance(curves, ResonanceCurve) else list(curves)
-    for curve in given:
-        require_kind("plot_resonance_curve", ResonanceCurve, curve=curve)
+    given = as_several(curves, ResonanceCurve, "plot_resonance_curve", "curves")
     if not given:
         raise InputError("plot_resonance_curve: there are no curves; give at least one.")
     over = dict.fromkeys(curve.parameter_name for curve in given)
