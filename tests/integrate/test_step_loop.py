@@ -162,9 +162,9 @@ LOOP = step_loop(Method("runge_kutta", Data, _aim, _attempt, _fill, _go_on, _beg
                         find_end=_find_end, stop_at=_stop_at))
 
 
-def start(kind, end, *, rtol=1e-8, level=-np.inf, outputs=21):
+def start(kind, end, *, rtol=1e-8, level=-np.inf, outputs=21, step=1e-3):
     numbers = np.zeros(2)
-    numbers[STEP] = 1e-3
+    numbers[STEP] = step
     times = np.linspace(0.0, end, outputs)
     return Data(kind, rtol, level, Progress(numbers, np.zeros(5, dtype=np.int64),
                                             np.array([1.0, 0.0])),
@@ -189,16 +189,27 @@ def test_a_method_is_a_list_of_functions():
 
 @pytest.mark.parametrize("piece", [1, 3])
 def test_a_run_in_pieces_is_the_same_to_the_last_bit(piece):
-    whole, parts = start(OSCILLATOR, 20.0), start(OSCILLATOR, 20.0)
+    # The first steps are refused.
+    whole, parts = (start(OSCILLATOR, 20.0, step=20.0) for _ in range(2))
     LOOP(whole, 10**6)
+    assert whole.progress.counts[REJECTIONS] > 1
     ended, calls = RUNNING, 0
     while ended == RUNNING:
+        before = parts.progress.counts[STEPS]
         ended, calls = LOOP(parts, piece), calls + 1
+        # A call that ends amid refused steps would have taken none.
+        assert parts.progress.counts[STEPS] > before
     assert ended == FINISHED
     assert calls >= whole.progress.counts[STEPS] // piece
     for name in ("numbers", "counts", "state"):
         np.testing.assert_array_equal(getattr(parts.progress, name), getattr(whole.progress, name))
     np.testing.assert_array_equal(parts.output.states, whole.output.states)
+
+
+def test_the_next_step_has_the_length_that_the_method_gives():
+    run = start(OSCILLATOR, 20.0)
+    assert LOOP(run, 1) == RUNNING
+    assert run.progress.numbers.tolist() == [1e-3, 5e-3]
 
 
 def test_outputs_have_no_part_in_the_steps():

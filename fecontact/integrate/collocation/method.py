@@ -24,7 +24,7 @@ from fecontact.integrate.collocation.room import (
     WHOLE,
     Collocation,
 )
-from fecontact.integrate.collocation.stages import foretell, solve_stages
+from fecontact.integrate.collocation.stages import extrapolate, solve_stages
 from fecontact.integrate.collocation.tableau import (
     ERROR_POWER,
     POINTS,
@@ -41,7 +41,7 @@ from fecontact.integrate.rodas5p.step_length import (
     next_stop,
     target_of,
 )
-from fecontact.integrate.rodas5p.variational import Vary, begin_anew, keep, write_columns
+from fecontact.integrate.rodas5p.variational import Vary, keep, restart_columns, write_columns
 from fecontact.integrate.small_systems import Sized
 from fecontact.integrate.step_loop import (
     CUT,
@@ -69,8 +69,8 @@ _AT_END = 1e-3
 _LOCATED, _PAST = 1e-9, 1e-11
 # Parts of the time that rounding does not blur.
 _TIME = 1e-12
-# Where a switch is foretold steps end by this part before it, unless it is so near, in parts of the
-# step before, that it is known exactly.
+# Where a switch is found by extrapolation steps end by this part before it, unless it is so near,
+# in parts of the step before, that it is known exactly.
 _SHORT, _NEXT = 1e-4, 1e-2
 # Attempts at a step that end at a switch.
 _MOST_AGAIN = 6
@@ -162,7 +162,7 @@ def _close(step, writes, data):
         keep(variation)
         if writes:
             write_columns(variation, data.vary.transitions[data.progress.counts[OUTPUTS]])
-            begin_anew(variation)
+            restart_columns(variation)
 
 
 @routine
@@ -225,14 +225,14 @@ def _switch(h, near, solved, error, problem, progress, c):
     where the motion before would meet it. Unless that is not known either. Also whether it is
     known only about, as it is too far ahead.
     """
-    foretold = error > 1.0 and c.flags[BEGINS] == 0
-    if foretold:
-        foretell(h, progress, c)
+    extrapolated = error > 1.0 and c.flags[BEGINS] == 0
+    if extrapolated:
+        extrapolate(h, progress, c)
         set_courses(h, progress, c)
     elif not solved:
         return 2.0, False
     part = first_switch(near, problem, c)
-    return part, foretold and part * h > _NEXT * progress.numbers[LAST_STEP]
+    return part, extrapolated and part * h > _NEXT * progress.numbers[LAST_STEP]
 
 
 @routine
@@ -246,7 +246,7 @@ def _attempt(step, last, smallest, data):
     at_end = 0.0 if varies else _AT_END
     exactly = last == CUT
     _set_given(step, np.nextafter(t, output.times[-1]), problem.system, c)
-    foretell(step.h, progress, c)
+    extrapolate(step.h, progress, c)
     before = 2.0 * c.cuts[PAST] if exactly else 0.0
     solved = solve_stages(step.h, before, problem, progress, room, c)
     error = moved = np.inf

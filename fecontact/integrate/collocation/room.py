@@ -43,7 +43,7 @@ class Collocation(NamedTuple):
     tolerance : float
         Error of a step as a part of the scales of the run.
     flags : (3,) integer array
-        Whether the equations may change here, so that nothing is foretold from the step before;
+        Whether the equations may change here, so that nothing is extrapolated from the step before;
         Jacobians so far; iterations of the last step.
     cuts : (3,) array
         Why and by how much the step was cut short.

@@ -17,7 +17,7 @@ _SOLVED, _AT_ONCE = 0.03, 3e-5
 _MOST_ITERATIONS = 8
 # Changes that shrink less from one iteration to the next ask for a new matrix.
 _SLOW = 0.02
-# The acceleration is foretold over steps up to so many times as long as the one before.
+# The acceleration is extrapolated over steps up to so many times as long as the one before.
 _FARTHEST = 3.0
 
 
@@ -60,7 +60,7 @@ def speed_scale(problem, progress):
 
 
 @routine
-def foretell(h, progress, c):
+def extrapolate(h, progress, c):
     """First guess of the accelerations at the stages: what those of the step before go on to."""
     m = c.accelerations.shape[1]
     ratio = 0.0

@@ -47,9 +47,9 @@ from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
     Variation,
     Vary,
-    begin_anew,
     keep,
     propagate_at,
+    restart_columns,
     write_columns,
 )
 from fecontact.integrate.small_systems import Sized, is_small
@@ -369,7 +369,7 @@ def _close(step, writes, data):
         set_creeps(step, problem, progress, room)
     if writes and len(variation.columns) > 0:
         write_columns(variation, vary.transitions[progress.counts[OUTPUTS]])
-        begin_anew(variation)
+        restart_columns(variation)
 
 
 @routine

@@ -449,7 +449,7 @@ def write_columns(v, out):
 
 
 @helper
-def begin_anew(v):
+def restart_columns(v):
     """Let the columns be the unit matrix again."""
     v.columns[:] = 0.0
     for k in range(v.columns.shape[1]):

@@ -372,7 +372,7 @@ def _go_on(step, h, data):
 
 @helper
 def _stop_at(part, step, data):
-    """The same as ``_go_on``: runs end at ends of steps."""
+    """Make the end of the step the state of the run: runs end there only."""
     _go_on(step, 0.0, data)
 
 

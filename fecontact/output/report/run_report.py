@@ -102,10 +102,10 @@ def run_block(
     require_kind("report", str, title=title)
     require_kind("report", (str, NoneType), study=study)
     require_kind("report", (Mapping, NoneType), versions=versions)
-    for point in points:
-        run.displacement(point)
     if isinstance(points, str):
         raise InputError(f"report: points = {points!r} must be several points, such as ['B', 0].")
+    for point in points:
+        run._rows(point)  # says which points there are
     if scale is not None:
         require_scale("report", scale)
     payload = Payload()
