@@ -12,13 +12,17 @@ from systems import two_mass_field, two_mass_system
 import fecontact as fc
 from fecontact import io, plot
 from fecontact.bifurcation import (
+    BranchStatus,
     ContinuationOptions,
     HarmonicBalance,
+    contact_field,
     equilibrium_branch,
     nonlinear_mode,
     orbit_branch,
 )
+from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.nonlinear_modes.linear_start import (
+    XI,
     unforced,
     with_mass_damping,
 )
@@ -106,7 +110,7 @@ def third_of_first(mode):
 def test_mode_goes_through_its_internal_resonance(resonant):
     """The second mode meets a third of its period: the motion turns into it and back."""
     _, mode = resonant
-    assert mode.branch.status is fc.bifurcation.BranchStatus.BOUND
+    assert mode.branch.status is BranchStatus.BOUND
     third = third_of_first(mode)
     inside = third > 1.0
     # One tongue: frequency nearly constant, and the first harmonic passes zero at its end.
@@ -127,6 +131,39 @@ def test_mode_goes_through_its_internal_resonance(resonant):
     assert mode.stable[0]
     assert not mode.stable[-1]
     assert any(point.kind == "branch point" for point in mode.branch.special)
+
+
+def test_energies_at_the_ends_of_the_resonance(resonant):
+    """Largest and smallest energies along the mode, by a cosine series with harmonics up to 41.
+
+    The tongue ends at log10(E) = 3.6703 and returns at 2.4551; 3.3233 and 3.2520 are a second turn.
+    """
+    _, mode = resonant
+    energy = np.log10(mode.energy)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
+    # Points of the mode lie beside the turns.
+    assert energy[turns[:4]] == pytest.approx([3.6703, 2.4551, 3.3233, 3.2520], abs=4e-3)
+
+
+def test_a_stalled_mode_of_springs_blames_no_contact(resonant):
+    """Springs push in one half of the period and pull in the other: no contact opens."""
+    system, mode = resonant
+    field = contact_field(unforced(system), {XI: (0.0, with_mass_damping)})
+    stalled = replace(mode.branch, status=BranchStatus.STALLED)
+    assert stall_reason(field, stalled) == ""
+
+
+def test_modes_without_stability_are_those_with_it():
+    """Multipliers of a mode without losses are left out too where none are asked for."""
+    plain = HarmonicBalance(5, stability=None)
+    found = [nonlinear_mode(masses(first=0.5), (1e-2, 2.0), observe=("b.p", "y"), method=method)
+             for method in (HarmonicBalance(5), plain)]
+    assert np.array_equal(found[0].frequency, found[1].frequency)
+    assert found[0].stable is not None
+    assert found[1].stable is None
+    assert found[1].conservative
+    assert not any({"multipliers", "stable", "trivial_error"} & set(point.values)
+                   for point in found[1].branch.points)
 
 
 @pytest.mark.parametrize("part", [0.3, 1.0])

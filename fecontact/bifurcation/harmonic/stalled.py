@@ -15,6 +15,8 @@ _ENOUGH, _LARGE = 16, 1e-2
 def stall_reason(field: VectorField, branch: Branch) -> str:
     """Message of a branch; of one that stalled with contacts that open and close, with the reason.
 
+    Springs between two points push and pull: they do not open.
+
     A contact phase of few samples makes corners of the branch that are not those of the system, and
     harmonics that are neglected shift what contact excites.
     """
@@ -22,8 +24,11 @@ def stall_reason(field: VectorField, branch: Branch) -> str:
         return branch.message
     last, N = branch.points[-1], int(branch.attributes["samples"])
     motion = last.orbit(samples=N + 1)
-    force = field.system(last.parameter_values(field)).contact_history(
-        motion.times[:-1], motion.states[:-1])[:, :, NORMAL_FORCE]
+    system = field.system(last.parameter_values(field))
+    force = system.contact_history(motion.times[:-1], motion.states[:-1])[:, :, NORMAL_FORCE]
+    nodes = np.arange(force.shape[1])
+    contacts = [nodes[which] for which, _, law in system.law_groups("normal") if not law.bilateral]
+    force = force[:, np.concatenate([nodes[:0], *contacts])]
     closed = np.count_nonzero(force > 0.0, axis=0)
     opens = (closed > 0) & (closed < N)
     error = float(last.values["truncation_error"])

@@ -132,7 +132,7 @@ class ModeProblem(HarmonicProblem):
         square = 0.5 * float(((2.0 * np.pi / T * k * X[1:, :m]) ** 2).sum())
         found = {"period": T, "mean_square_velocity": square, "truncation_error": error,
                  "residual": residual, **observed_values(self.layout, X, T, self.row)}
-        if self.conservative:
+        if self.conservative and self.stability is not None:
             floquet = linearisation.floquet
             found |= {"multipliers": floquet.multipliers, "stable": _none_grows(
                 floquet.multipliers, 1 + len(self.loose)), "trivial_error": floquet.trivial_error}
