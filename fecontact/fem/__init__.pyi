@@ -1,3 +1,4 @@
+from .constraints import Coupling, LinearEquation, Term, Tie
 from .elements.cell_kinds import CellKind
 from .fields import BodyFields
 from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
@@ -9,9 +10,11 @@ from .supports import HingeSupport
 __all__ = [
     "BodyFields",
     "CellKind",
+    "Coupling",
     "Cylinder",
     "HingeSupport",
     "LapStrip",
+    "LinearEquation",
     "Pairing",
     "PairingReport",
     "Plate",
@@ -19,6 +22,8 @@ __all__ = [
     "Rotation",
     "SolidBlock",
     "SphereSegment",
+    "Term",
+    "Tie",
     "TwoPassPairing",
     "finer_face",
     "pair_both_faces",

@@ -1,6 +1,6 @@
 """The elastic body: mesh, material and supports as stiffness and mass."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
@@ -21,9 +21,16 @@ from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, quantity, span
 from fecontact.fem.assembly import assembled
+from fecontact.fem.constraints import (
+    Constraint,
+    LinearEquation,
+    check_constraints,
+    counted,
+)
 from fecontact.fem.elements.cell_kinds import numbered_rows
+from fecontact.fem.equations import expansion
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.supports import HingeSupport, check_supports, expansion, fixed_dofs, hinges
+from fecontact.fem.supports import HingeSupport, check_supports, fixed_dofs, hinges
 
 # Memory per unknown for modes [bytes], by dimension and number of corners.
 _BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 8): 1.2e4}
@@ -105,13 +112,16 @@ class ElasticBody(Summarised):
         Supports on named boundaries or points of the mesh: displacements fixed at zero, or a
         hinge, whose nodes (such as the boundary of a hole) rotate rigidly about their centre. In
         space 'hinge_x', 'hinge_y', 'hinge_z' name the axis; 'hinge' takes that of a round face.
+    constraints : sequence of LinearEquation, Tie or Coupling, optional
+        Linear equations between displacements, see :mod:`fecontact.fem.constraints`; by default
+        those of the mesh, which a file may hold.
 
     Raises
     ------
     InputError
         For values out of range.
     MeshError
-        For names that the mesh does not have, or a mesh in several pieces.
+        For names that the mesh does not have, or a mesh in pieces that no constraint joins.
     """
 
     mesh: Mesh
@@ -120,6 +130,7 @@ class ElasticBody(Summarised):
     plane: Literal["stress", "strain"] = "stress"
     degree: int = 2
     fixed: Mapping[str, str] = field(default_factory=dict)
+    constraints: Sequence[Constraint] | None = None
 
     def __post_init__(self) -> None:
         require_kind("ElasticBody", Mesh, mesh=self.mesh)
@@ -141,10 +152,14 @@ class ElasticBody(Summarised):
                        kind.unknowns(degree) * _BYTES[kind.dimension, kind.corners],
                        f", by a larger element_size, or {plain} or degree = 1")
         check_supports(self.mesh, self.fixed)
-        pieces = _pieces(self.mesh)
+        if self.constraints is not None:
+            require_kind("ElasticBody", Sequence, constraints=self.constraints)
+            check_constraints(self.constraints, self.mesh.boundaries, self.mesh.points,
+                              self.dimension, len(self.mesh.nodes))
+        pieces = self._joined_pieces()
         if pieces > 1:
-            raise MeshError(f"The mesh consists of {pieces} pieces that share no node; a body must "
-                            f"be connected.")
+            raise MeshError(f"The mesh consists of {pieces} pieces that share no node, and no "
+                            f"constraint joins them; a body must be connected.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Mesh, material, kind of elements and supports."""
@@ -159,6 +174,7 @@ class ElasticBody(Summarised):
             ("material", f"{quantity(material.youngs_modulus, 'Pa')}, Poisson ratio "
              f"{material.poisson_ratio:.4g}, {material.density:.4g} kg/m³"),
             ("fixed", listed([f"{name} in {way}" for name, way in self.fixed.items()])),
+            *([("constraints", counted(self.equations))] if self.equations else []),
         ]
 
     @property
@@ -292,10 +308,18 @@ class ElasticBody(Summarised):
         """Degrees of freedom fixed at zero by the supports, ascending."""
         return fixed_dofs(self.dimension, self.fixed, self._supported)
 
+    @property
+    def equations(self) -> Sequence[Constraint]:
+        """Constraints between displacements beside the supports."""
+        return self.mesh.constraints if self.constraints is None else self.constraints
+
     @cached_property
     def expansion(self) -> Any:
-        """All degrees of freedom from the free ones, sparse (d N, f); see the supports."""
-        return expansion(self.nodes, self.fixed_dofs, self.hinges)
+        """All degrees of freedom from the free ones, sparse (d N, f).
+
+        Supports and constraints are eliminated; see :func:`fecontact.fem.equations.expansion`.
+        """
+        return expansion(self)
 
     @cached_property
     def hinges(self) -> list[HingeSupport]:
@@ -304,10 +328,14 @@ class ElasticBody(Summarised):
 
     @cached_property
     def _supported(self) -> dict[str, Integers]:
+        return {name: self.group_nodes(name) for name in self.fixed}
+
+    def group_nodes(self, name: str) -> Integers:
+        """Displacement nodes (k,) of a boundary, or else of points of the mesh."""
         # A group may be both points and a boundary; only the boundary has mid-side nodes.
         boundaries, points = self.mesh.boundaries, self.mesh.points
-        return {name: np.unique(self.facet_nodes(boundaries[name])) if name in boundaries
-                else self._along(np.asarray(points[name])) for name in self.fixed}
+        return (np.unique(self.facet_nodes(boundaries[name])) if name in boundaries
+                else self._along(np.asarray(points[name])))
 
     def _along(self, points: Integers) -> Integers:
         """Nodes of a solid's points, with the middles of edges of the outline between them.
@@ -320,6 +348,41 @@ class ElasticBody(Summarised):
         ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
         ends = np.unique(np.sort(ends[np.isin(ends, points).all(axis=1)], axis=1), axis=0)
         return np.unique(np.concatenate([points, self.edge_nodes(ends)[:, 1]]))
+
+    @cached_property
+    def pieces(self) -> tuple[int, Integers]:
+        """Number of pieces that share no node, and the piece (N,) of each displacement node."""
+        count, piece = self.mesh.pieces
+        members = self.basis.element_dofs.T
+        found = np.empty(len(self.nodes), np.int64)
+        found[members] = piece[self.basis.mesh.t[0]][:, None]
+        return count, found
+
+    def _joined_pieces(self) -> int:
+        """Number of pieces of the mesh that neither nodes nor constraints join."""
+        import scipy.sparse as sp
+        from scipy.sparse.csgraph import connected_components
+
+        mesh = self.mesh
+        pieces, piece = mesh.pieces
+        if pieces == 1 or not self.equations:
+            return pieces
+        groups: dict[Any, int] = {}
+        links = []
+        for number, one in enumerate(self.equations):
+            own = [term.at for term in one.terms] if isinstance(
+                one, LinearEquation) else one.groups
+            for name in own:
+                held = mesh.boundaries.get(name, mesh.points.get(name)) if isinstance(
+                    name, str) else np.array(name)
+                hub = groups.setdefault(number, len(groups))
+                links += [(pieces + hub, int(at)) for at in np.unique(piece[held])] if (
+                    held is not None) else [
+                        (pieces + hub, pieces + groups.setdefault(name, len(groups)))]
+        rows, columns = np.array(links).T
+        graph = sp.coo_array((np.ones(len(links)), (rows, columns)),
+                             shape=(pieces + len(groups),) * 2)
+        return int(connected_components(graph, directed=False, return_labels=False))
 
     def facet_nodes(self, facets: Integers) -> Integers:
         """Displacement nodes (k, n) of mesh edges (k, 2) or of faces (k, 3) or (k, 4).
@@ -355,16 +418,6 @@ class ElasticBody(Summarised):
         ends = np.sort(edges, axis=1)
         middle = size + order[np.searchsorted(keys, ends[:, 0] * size + ends[:, 1])]
         return np.column_stack([edges[:, 0], middle, edges[:, 1]])
-
-
-def _pieces(mesh: Mesh) -> int:
-    import scipy.sparse as sp
-    from scipy.sparse.csgraph import connected_components
-
-    first = np.repeat(mesh.cells[:, :1], mesh.cells.shape[1] - 1, axis=1).ravel()
-    graph = sp.coo_array((np.ones(first.size), (first, mesh.cells[:, 1:].ravel())),
-                         shape=(len(mesh.nodes),) * 2)
-    return int(connected_components(graph, directed=False, return_labels=False))
 
 
 def _turned(places: Array, cells: Integers, corners: Integers) -> Array:

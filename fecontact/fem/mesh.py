@@ -12,6 +12,7 @@ from fecontact.core.errors import InputError, MeshError, choices, nearest
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
+from fecontact.fem.constraints import Constraint, check_constraints, counted
 from fecontact.fem.elements.cell_geometry import (
     curved_volumes,
     facets_of,
@@ -53,10 +54,13 @@ class Mesh(Summarised):
         Nodes of the edges of cells that are curved, each edge once; none by default.
     curved_middles : (k, 2) or (k, 3) array
         Their middles [m]: an edge is the parabola through its ends and this place.
+    constraints : sequence of LinearEquation, Tie or Coupling
+        Constraints between displacements that a file holds, for bodies of this mesh; none by
+        default.
 
     Raises
     ------
-    MeshError
+    MeshError, InputError
         For arrays of wrong shape, unknown nodes, degenerate, folded or overlapping cells, nodes
         without a cell, an empty group, or a boundary edge or face that is not on the outline or is
         named twice.
@@ -68,6 +72,7 @@ class Mesh(Summarised):
     points: Mapping[str, Integers] = field(default_factory=dict)
     curved_edges: Integers = field(default_factory=lambda: np.empty((0, 2), np.int64))
     curved_middles: Array | None = None
+    constraints: Sequence[Constraint] = ()
 
     def __post_init__(self) -> None:
         nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
@@ -132,6 +137,9 @@ class Mesh(Summarised):
         if len(curved):
             self._edges_between(curved, "curved_edges")
             curved_volumes(self.second_order_places(self.curved_cells), kind)
+        require_kind("Mesh", Sequence, constraints=self.constraints)
+        check_constraints(self.constraints, boundaries, points, dimension, len(nodes))
+        object.__setattr__(self, "constraints", tuple(self.constraints))
 
     @property
     def dimension(self) -> int:
@@ -193,6 +201,18 @@ class Mesh(Summarised):
         return facets if self.dimension == 2 else self.outline[rows]
 
     @cached_property
+    def pieces(self) -> tuple[int, Integers]:
+        """Number of pieces that share no node, and the piece (N,) of each node."""
+        import scipy.sparse as sp
+        from scipy.sparse.csgraph import connected_components
+
+        first = np.repeat(self.cells[:, :1], self.cells.shape[1] - 1, axis=1).ravel()
+        graph = sp.coo_array((np.ones(first.size), (first, self.cells[:, 1:].ravel())),
+                             shape=(len(self.nodes),) * 2)
+        count, label = connected_components(graph, directed=False)
+        return int(count), label
+
+    @cached_property
     def edges(self) -> tuple[Integers, Integers]:
         """Distinct edges (E, 2), and the edges (M, e) of each cell in the order of its kind."""
         ends = np.sort(self.cells[:, np.array(self.kind.edges)].reshape(-1, 2), axis=1)
@@ -241,7 +261,7 @@ class Mesh(Summarised):
         Curved edges stay on their parabolas.
         """
         nodes, cells, boundaries, curved, middles = refined(self)
-        return Mesh(nodes, cells, boundaries, self.points, curved, middles)
+        return Mesh(nodes, cells, boundaries, self.points, curved, middles, self.constraints)
 
     def placed(
         self,
@@ -285,7 +305,8 @@ class Mesh(Summarised):
         turn = _turn(float(angles)) if self.dimension == 2 else _turn_in_space(angles)
         nodes, middles = (places * signs @ turn.T + by
                           for places in (self.nodes, np.asarray(self.curved_middles)))
-        return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles)
+        return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles,
+                    [one.turned(turn * signs, by) for one in self.constraints])
 
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""
@@ -299,6 +320,7 @@ class Mesh(Summarised):
             *((f"boundary {name}", count(len(group), "face" if solid else "edge"))
               for name, group in self.boundaries.items()),
             *((f"point {name}", count(len(nodes), "node")) for name, nodes in self.points.items()),
+            *([("constraints", counted(self.constraints))] if self.constraints else []),
         ]
 
     @property

@@ -17,11 +17,10 @@ from fecontact.core.errors import InputError, MeshError, choices, nearest, requi
 from fecontact.core.types import Array, Coordinates, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.faces.mean_motion import TURNS, mean_motion, sampled_rows
 from fecontact.fem.faces.surface import Surface
 from fecontact.fem.interpolation import interpolation
 
-# Axes with the two that follow them.
-_TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 _CURVED = 1e-9  # distance of the middle of an edge from its chord, per length
 _FINE = 24  # parts of a facet along each of its sides
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -101,8 +100,8 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
             return patch_rows(body, whole(body.edge_nodes(mesh.boundaries[place])))
         if place in mesh.points:
             nodes = mesh.points[place]
-            return node_rows(body, int(nodes[0])) if len(nodes) == 1 else _node_set_rows(
-                body, nodes)
+            return node_rows(body, int(nodes[0])) if len(nodes) == 1 else Rows(*mean_motion(
+                len(body.nodes), nodes, body.nodes[nodes], np.ones(len(nodes))))
         known = {*mesh.points, *mesh.boundaries}
         raise MeshError(f"Point {name}: the mesh has no point or boundary '{place}'"
                         f"{nearest(place, known)}; it has: {choices(known)}.")
@@ -128,7 +127,7 @@ def rotating_rows(count: int, nodes: Integers, weights: Array) -> Any:
         column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
         return sp.csr_array(sp.coo_array((data, (row, column)), shape=(3, 2 * count)))
     entries = [(axis, axis, weights[0]) for axis in range(3)]
-    for axis, ahead, last in _TURNS:
+    for axis, ahead, last in TURNS:
         entries += [(3 + axis, last, 0.5 * weights[1 + ahead]),
                     (3 + axis, ahead, -0.5 * weights[1 + last])]
     data = np.concatenate([part for *_, part in entries])
@@ -157,7 +156,7 @@ def node_matrix(body: ElasticBody, nodes: Integers) -> Any:
         parts = [(chosen, np.eye(6, 3).tolist())]
         for direction, slope in enumerate(body.gradients):
             curl = np.zeros((6, 3))
-            for axis, ahead, last in _TURNS:
+            for axis, ahead, last in TURNS:
                 if direction in (ahead, last):
                     # phi_axis = (d u_last / d x_ahead - d u_ahead / d x_last) / 2
                     curl[3 + axis, last if direction == ahead else ahead] = (
@@ -314,50 +313,3 @@ def _centre(body: ElasticBody, at: str | Coordinates, name: str) -> Array:
                             f"{choices(body.mesh.points)}.")
         return np.asarray(body.mesh.nodes[body.mesh.points[at]].mean(axis=0))
     return np.array(as_place(at, f"Point {name}", body.dimension))
-
-
-def _node_set_rows(body: ElasticBody, nodes: Integers) -> Rows:
-    """Rows of several nodes: their best-fitting rigid motion, with equal weights."""
-    import scipy.sparse as sp
-
-    places, count = body.nodes[nodes], len(nodes)
-    if body.dimension == 3:
-        return Rows(*sampled_rows(len(body.nodes), nodes[:, None], np.ones((count, 1)), places,
-                                  np.ones(count)))
-    centre = places.mean(axis=0)
-    arm = (places - centre) / ((places - centre) ** 2).sum()
-    data = np.concatenate([np.full(2 * count, 1.0 / count), -arm[:, 1], arm[:, 0]])
-    row = np.repeat([0, 1, 2, 2], count)
-    column = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * nodes, 2 * nodes + 1])
-    shape = (3, 2 * len(body.nodes))
-    return Rows(sp.csr_array(sp.coo_array((data, (row, column)), shape=shape)), centre)
-
-
-def sampled_rows(
-    count: int, nodes: Integers, values: Array, places: Array, weights: Array
-) -> tuple[Any, Array]:
-    """Rows (6, 3 N) of samples' best-fitting rigid motion, and their centre (3,).
-
-    Sample q is at ``places`` (q, 3), moves as ``values`` (q, n) times the displacements of its
-    ``nodes`` (q, n), and counts with ``weights`` (q,). Samples on a line give no rotation about it.
-    """
-    import scipy.sparse as sp
-
-    share = weights / weights.sum()
-    centre = share @ places
-    arm = places - centre
-    spread = (share[:, None] * arm).T @ arm
-    # [arm]_x turns a displacement into its moment.
-    cross = np.zeros((len(arm), 3, 3))
-    for axis, ahead, last in _TURNS:
-        cross[:, axis, last], cross[:, axis, ahead] = arm[:, ahead], -arm[:, last]
-    turning = np.linalg.pinv(np.trace(spread) * np.eye(3) - spread, rcond=1e-9,
-                             hermitian=True) @ cross
-    each = np.concatenate([np.broadcast_to(np.eye(3), cross.shape), turning], axis=1)
-    data = (share[:, None] * values)[:, :, None, None] * each[:, None]
-    row = np.broadcast_to(np.arange(6)[:, None], data.shape)
-    column = np.broadcast_to(3 * nodes[:, :, None, None] + np.arange(3), data.shape)
-    matrix = sp.csr_array(sp.coo_array((data.ravel(), (row.ravel(), column.ravel())),
-                                       shape=(6, 3 * count)))
-    matrix.eliminate_zeros()
-    return matrix, centre

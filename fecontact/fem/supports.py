@@ -1,7 +1,7 @@
 """Supports: constraints of nodal displacements, and their elimination."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,34 +66,6 @@ def hinges(
                   _axis(mesh, nodes[supported[name]], name, kind))
             for name, kind in fixed.items()
             if kind.startswith("hinge") and len(supported[name]) > 1]
-
-
-def expansion(nodes: Array, fixed_dofs: Integers, turning: list[HingeSupport]) -> Any:
-    """All degrees of freedom from the free ones, sparse (d N, f).
-
-    The free ones are the displacements without a support, then one angle per hinge.
-    """
-    import scipy.sparse as sp
-
-    dimension = nodes.shape[1]
-    size = nodes.size
-    taken = [np.concatenate([dimension * held + axis for axis in range(dimension)])
-             for held, *_ in turning]
-    held = np.concatenate([fixed_dofs, *taken]).astype(np.int64)
-    if len(np.unique(held)) < len(held):
-        raise InputError("Two supports share a node, and one of them is a hinge; separate them.")
-    free = np.setdiff1d(np.arange(size), held)
-    rows, columns, values = [free], [np.arange(len(free))], [np.ones(len(free))]
-    for index, (around, centre, axis) in enumerate(turning):
-        arm = nodes[around] - centre
-        swept = (np.column_stack([-arm[:, 1], arm[:, 0]]) if dimension == 2
-                 else np.cross(axis, arm))
-        for direction in range(dimension):
-            rows.append(dimension * around + direction)
-            values.append(swept[:, direction])
-        columns.append(np.full(dimension * len(around), len(free) + index))
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csc_array(sp.coo_array(entries, shape=(size, len(free) + len(turning))))
 
 
 def _centre(mesh: Mesh, places: Array, name: str) -> Array:

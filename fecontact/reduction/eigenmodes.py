@@ -12,7 +12,8 @@ from fecontact.core.errors import AnalysisError, InputError, choices, nearest
 from fecontact.core.records import Block, IntegerMatrix, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.reduction.solid_motions import solid_rigid_modes, solid_strain_energies
+from fecontact.fem.equations import least_squares
+from fecontact.reduction.solid_motions import allowed_motions, solid_strain_energies
 from fecontact.reduction.solvers.factorisation import Factors, factorised
 from fecontact.reduction.solvers.solid_solver import Eigensolver, SolidSolver, possible, suited
 
@@ -52,15 +53,16 @@ class FreeSystem:
         Raises
         ------
         InputError
-            For an unknown eigensolver, or the iterative one for a plane body or one with a hinge.
+            For an unknown eigensolver, or the iterative one for a plane body or one with a hinge
+            or constraints.
         """
         if eigensolver not in get_args(Eigensolver):
             raise InputError(f"eigensolver = {eigensolver!r} must be one of "
                              f"{choices(get_args(Eigensolver))}"
                              f"{nearest(str(eigensolver), get_args(Eigensolver))}.")
         if eigensolver == "iterative" and not possible(body):
-            raise InputError("eigensolver = 'iterative' is for solids without hinges; leave it "
-                             "out, or take 'direct'.")
+            raise InputError("eigensolver = 'iterative' is for solids without hinges and "
+                             "constraints; leave it out, or take 'direct'.")
         E = body.expansion
         rigid = rigid_modes(body)
         solid = (body if body.dimension == 3 else None, eigensolver)
@@ -70,9 +72,8 @@ class FreeSystem:
             free = E.indices
             K, M = (a[free][:, free].tocsc() for a in (body.stiffness, body.mass))
             return cls(K, M, rigid[free], None, *solid)
-        # The columns of E have disjoint rows, so that E^T E is diagonal.
         return cls((E.T @ body.stiffness @ E).tocsc(), (E.T @ body.mass @ E).tocsc(),
-                   (E.T @ rigid) / E.multiply(E).sum(axis=0)[:, None], None, *solid)
+                   least_squares(E, rigid), None, *solid)
 
     @cached_property
     def held(self) -> Integers:
@@ -184,9 +185,9 @@ def eigenmodes(
 
     The direct solver is inverse Lanczos iteration with the factors of K. The iterative one, LOBPCG
     with multigrid, is several times faster and smaller for large, compact solids; 'auto' takes it
-    for solids of 20,000 unknowns and more without hinges, whose cells are mostly less than five
-    times as long as wide and whose Poisson's ratio is at most 0.45. Where it does not converge, the
-    direct one takes over. Frequencies agree to 1e-8, as far as round-off allows.
+    for solids of 20,000 unknowns and more without hinges and constraints, whose cells are mostly
+    less than five times as long as wide and whose Poisson's ratio is at most 0.45. Where it does
+    not converge, the direct one takes over. Frequencies agree to 1e-8, as far as round-off allows.
 
     Raises
     ------
@@ -203,36 +204,21 @@ def eigenmodes(
 
 
 def rigid_modes(body: ElasticBody) -> Array:
-    """Mass-normalised rigid modes (2 N, r) that the supports allow, r = 0 ... 3.
+    """Mass-normalised rigid modes (d N, r) that supports and constraints allow.
 
-    Translation in x, in y, and a counter-clockwise rotation about the intersection of the lines of
-    the fixed displacements, or about the centre of mass if that is undetermined. Of a solid
-    (3 N, r), r = 0 ... 6, see :mod:`fecontact.reduction.solid_motions`.
+    Translations along the axes, then rotations about them (in the plane counter-clockwise), about
+    the centre of mass for a free body; where supports allow only some, what is left of these, each
+    without the ones before it. Pieces of a body that constraints join may also move against each
+    other, if the constraints allow it; such modes follow.
     """
-    if body.dimension == 3:
-        return solid_rigid_modes(body)
-    M = body.mass
-    x, y = body.nodes.T
-    held_x, held_y = (body.fixed_dofs[body.fixed_dofs % 2 == axis] // 2 for axis in range(2))
-    centres = np.array([centre for _, centre, *_ in body.hinges]).reshape(-1, 2)
-    lines_x = np.concatenate([x[held_y], centres[:, 0]])
-    lines_y = np.concatenate([y[held_x], centres[:, 1]])
-    ones = np.zeros(2 * len(x))
-    ones[0::2] = 1.0
-    inertia = (M @ ones)[0::2] / (ones @ (M @ ones))
-    pivot_x = lines_x.mean() if lines_x.size else inertia @ x
-    pivot_y = lines_y.mean() if lines_y.size else inertia @ y
-    shapes = np.column_stack([ones, np.roll(ones, 1)])[:, [not lines_y.size, not lines_x.size]]
-    off = np.concatenate([lines_x - pivot_x, lines_y - pivot_y])
-    if np.abs(off).max(initial=0.0) <= 1e-9 * body.mesh.extent:
-        rotation = np.column_stack([pivot_y - y, x - pivot_x]).ravel()
-        rotation[body.fixed_dofs] = 0.0
-        shapes = np.column_stack([shapes, rotation])
+    weights = np.asarray(body.component_mass.sum(axis=1)).ravel()
+    centre = weights @ body.nodes / weights.sum()
+    shapes = allowed_motions(body, centre)
     for column in range(shapes.shape[1]):
         for _ in range(2):
             earlier = shapes[:, :column]
-            shapes[:, column] -= earlier @ (earlier.T @ (M @ shapes[:, column]))
-        shapes[:, column] /= np.sqrt(shapes[:, column] @ (M @ shapes[:, column]))
+            shapes[:, column] -= earlier @ (earlier.T @ (body.mass @ shapes[:, column]))
+        shapes[:, column] /= np.sqrt(shapes[:, column] @ (body.mass @ shapes[:, column]))
     return shapes
 
 

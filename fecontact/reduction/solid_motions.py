@@ -1,4 +1,4 @@
-"""Rigid modes of solids from their geometry and supports, and strain energies of their motions."""
+"""Rigid motions that supports and constraints allow, and strain energies of motions of solids."""
 
 import numpy as np
 
@@ -7,6 +7,7 @@ from fecontact.core.records import Array4, Block, IntegerMatrix, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
+from fecontact.fem.equations import least_squares
 
 # Elements whose strains are in memory at once.
 _AT_ONCE = 2000
@@ -15,8 +16,16 @@ _STILL = 1e-9
 
 
 def rigid_motions(places: Array, centre: Array) -> Array:
-    """Displacements (3 N, 6) of places (N, 3) by translations and rotations about a centre."""
-    found = np.zeros((len(places), 3, 6))
+    """Displacements of places by translations and rotations about a centre.
+
+    (3 N, 6) of places (N, 3), (2 N, 3) of places (N, 2).
+    """
+    found = np.zeros((*places.shape, 3 * (places.shape[1] - 1)))
+    if places.shape[1] == 2:
+        found[:, :, :2] = np.eye(2)
+        x, y = (places - centre).T
+        found[:, 0, 2], found[:, 1, 2] = -y, x
+        return found.reshape(-1, 3)
     found[:, :, :3] = np.eye(3)
     x, y, z = (places - centre).T
     found[:, 1, 3], found[:, 2, 3] = -z, y
@@ -25,45 +34,41 @@ def rigid_motions(places: Array, centre: Array) -> Array:
     return found.reshape(-1, 6)
 
 
-def solid_rigid_modes(body: ElasticBody) -> Array:
-    """Mass-normalised rigid modes (3 N, r) that the supports allow, r = 0 ... 6.
+def allowed_motions(body: ElasticBody, centre: Array) -> Array:
+    """Rigid motions (d N, r) of the body and of its pieces that no support or constraint resists.
 
-    Translations in x, y, z and rotations about them, about the centre of mass for a free body;
-    where supports allow only some, what is left of these, each without the ones before it.
+    Motions of the whole body come first: those along the axes and about the centre that are free,
+    in their order, then what is free of the other rotations and translations.
     """
-    weights = np.asarray(body.component_mass.sum(axis=1)).ravel()
-    centre = weights @ body.nodes / weights.sum()
+    G, d = body.expansion, body.dimension
     whole = rigid_motions(body.nodes, centre)
-    shapes = whole @ _allowed(body, whole, centre)
-    shapes[body.fixed_dofs] = 0.0
-    for column in range(shapes.shape[1]):
-        for _ in range(2):
-            earlier = shapes[:, :column]
-            shapes[:, column] -= earlier @ (earlier.T @ (body.mass @ shapes[:, column]))
-        shapes[:, column] /= np.sqrt(shapes[:, column] @ (body.mass @ shapes[:, column]))
-    return shapes
-
-
-def _allowed(body: ElasticBody, whole: Array, centre: Array) -> Array:
-    """Coefficients (6, r) of the rigid motions that move no support."""
-    size = body.mesh.extent
-    scale = np.array([1.0] * 3 + [1.0 / size] * 3)
-    held = [whole[body.fixed_dofs] * scale]
-    for _, pivot, axis in body.hinges:
-        # The axis does not move, and turns about itself alone.
-        turning = np.hstack([np.zeros((3, 3)), (np.eye(3) - np.outer(axis, axis)) * size])
-        held += [rigid_motions(pivot[None], centre) * scale, turning * scale]
-    triangle = np.linalg.qr(np.vstack([*held, np.zeros((6, 6))]), mode="r")
+    size = np.array([1.0] * d + [1.0 / body.mesh.extent] * (whole.shape[1] - d))
+    pieces, piece = body.pieces
+    if G.shape[0] == G.shape[1] and pieces == 1:
+        return whole
+    whole = whole * size
+    count = whole.shape[1]
+    motions = np.zeros((len(whole), count * pieces))
+    for one in range(pieces):
+        rows = np.repeat(piece == one, d)
+        motions[rows, count * one : count * (one + 1)] = whole[rows]
+    unknowns = least_squares(G, motions)
+    resisted = motions - G @ unknowns
+    triangle = np.linalg.qr(np.vstack([resisted, np.zeros((motions.shape[1],) * 2)]), mode="r")
     _, values, directions = np.linalg.svd(triangle)
     free = directions[values <= _STILL * max(float(values[0]), 1.0)].T
-    found = np.zeros((6, 0))
-    # Motions along the axes as far as they are free, in their order.
-    for motion in free @ free.T:
+    found = np.zeros((motions.shape[1], 0))
+    together = np.tile(np.eye(count), (pieces, 1)) / np.sqrt(pieces)
+    wanted = together if pieces == 1 else np.hstack([together, np.eye(motions.shape[1])])
+    parts = free.T @ wanted
+    bound = np.linalg.norm(parts, axis=0) < 1.0 - _STILL
+    order = np.lexsort((np.where(bound, np.arange(len(bound)) % count < d, False), bound))
+    for motion in (free @ parts[:, order]).T:
         rest = motion - found @ (found.T @ motion)
         rest -= found @ (found.T @ rest)
         if found.shape[1] < free.shape[1] and np.linalg.norm(rest) > 1e-6:
             found = np.column_stack([found, rest / np.linalg.norm(rest)])
-    return scale[:, None] * found
+    return np.asarray(G @ (unknowns @ found))
 
 
 def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:

@@ -102,9 +102,13 @@ def numbered_rows(rows: Integers) -> tuple[Integers, Integers, Integers]:
 def shape_functions(dimension: int, count: int, local: Array) -> tuple[Array, Array]:
     """Shape functions (..., k) and their derivatives (..., k, d) at local coordinates (..., d).
 
-    ``count`` is k: 3, 6, 4 or 9 in the plane, 4, 10, 8 or 27 in space. The functions are in
-    scikit-fem's order, that of ``CellKind.places``; coordinates run from 0 to 1.
+    ``count`` is k: 2 or 3 on a line, 3, 6, 4 or 9 in the plane, 4, 10, 8 or 27 in space. The
+    functions are in scikit-fem's order, that of ``CellKind.places``, on a line start, end, middle;
+    coordinates run from 0 to 1.
     """
+    if dimension == 1:
+        value, slope = _line(count == 2, local[..., 0])
+        return value, slope[..., None]
     if count in _SIMPLEX[dimension]:
         return _simplex(dimension, count, local)
     kind = CELL_KINDS[dimension, 2**dimension]

@@ -23,6 +23,7 @@ from fecontact.fem.faces.contact_patches import (
     contact_patches,
     face_surface,
 )
+from fecontact.fem.faces.facets import closest_local
 from fecontact.fem.faces.frames import tangents_of
 from fecontact.fem.faces.surface import Patches, Surface
 from fecontact.fem.pairing_report import PairingReport, closed_gaps
@@ -32,7 +33,6 @@ _COUNT = "pair_faces: nodes"
 _FACING = 0.1  # least cosine between opposed normals: 84 degrees
 _SLACK = 1e-3  # of a facet: how far a place may lie beside the other face
 _NEAREST = 24  # facets among which the closest place is looked for
-_STEPS = 12
 _LEAST = 0.25  # of the points of a facet that must have a partner for it to count
 
 
@@ -90,7 +90,7 @@ def closest_places(other: Surface, places: Array, looks: Array) -> Feet:
         if not len(left):
             break
         facet = order[left, rank]
-        local = _foot(other.places[other.facets[facet]], places[left])
+        local = closest_local(other.places[other.facets[facet]], places[left])
         weights, foot, normal = _at(other.places[other.facets[facet]], local)
         away = places[left] - foot
         gap = (away * normal).sum(axis=1)
@@ -105,31 +105,6 @@ def closest_places(other: Surface, places: Array, looks: Array) -> Feet:
                              ("normals", normal), ("gaps", gap)):
             getattr(found, name)[kept] = values[good]
     return found
-
-
-def _foot(corners: Array, places: Array) -> Array:
-    """Local coordinates (s, 2) of the closest place of each facet (s, n, 3) to a place (s, 3)."""
-    triangle = corners.shape[1] in (3, 6)
-    local = np.full((len(places), 2), 1.0 / 3.0 if triangle else 0.5)
-    for _ in range(_STEPS):
-        values, slopes = shape_functions(2, corners.shape[1], local)
-        away = places - np.einsum("sn,snx->sx", values, corners)
-        along = np.einsum("snd,snx->sdx", slopes, corners)
-        metric = along @ np.swapaxes(along, 1, 2)
-        step = np.linalg.solve(metric, (along @ away[..., None]))[..., 0]
-        before, local = local, _inside(local + step, triangle)
-        if np.abs(local - before).max(initial=0.0) < 1e-13:
-            break
-    return local
-
-
-def _inside(local: Array, triangle: bool) -> Array:
-    """The closest local coordinates within the reference facet."""
-    if triangle:
-        beyond = 0.5 * np.maximum(local.sum(axis=1, keepdims=True) - 1.0, 0.0)
-        local = np.clip(local - beyond, 0.0, 1.0)
-        return np.asarray(local / np.maximum(local.sum(axis=1, keepdims=True), 1.0))
-    return np.clip(local, 0.0, 1.0)
 
 
 def _at(corners: Array, local: Array) -> tuple[Array, Array, Array]:

@@ -41,8 +41,8 @@ _SINGLE = 1e-3
 def suited(body: ElasticBody) -> bool:
     """Whether the iterative solver is the better one for a body.
 
-    It is not for small and plane bodies, hinges, nearly incompressible material, and where a tenth
-    of the cells are longer than five times their width, as in thin plates.
+    It is not for small and plane bodies, hinges, constraints, nearly incompressible material, and
+    where a tenth of the cells are longer than five times their width, as in thin plates.
     """
     return (possible(body) and 3 * len(body.nodes) >= _FEW
             and body.material.poisson_ratio <= _INCOMPRESSIBLE
@@ -50,8 +50,8 @@ def suited(body: ElasticBody) -> bool:
 
 
 def possible(body: ElasticBody) -> bool:
-    """Whether the iterative solver knows such bodies: solids without hinges."""
-    return body.dimension == 3 and not body.hinges
+    """Whether the iterative solver knows such bodies: solids without hinges and constraints."""
+    return body.dimension == 3 and not body.hinges and not body.equations
 
 
 def aspect_ratios(body: ElasticBody) -> Array:

@@ -1,0 +1,316 @@
+"""Constraints between displacements of a body: equations, ties of faces, couplings to a point."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fecontact.core.checks import as_floats, as_place, require_kind
+from fecontact.core.errors import (
+    InputError,
+    MeshError,
+    choices,
+    nearest,
+    require_choice,
+    require_positive,
+    shown,
+)
+from fecontact.core.types import Array, Coordinates, Integers
+from fecontact.core.units import count
+
+
+class Term(NamedTuple):
+    """One term ``a . u + b . phi`` of a linear equation.
+
+    Attributes
+    ----------
+    at : str, int or (int, int)
+        A point of the mesh with one node or the reference point of a coupling, by name; or a node
+        of the mesh; or two nodes, for the middle of the edge between them.
+    displacement : d floats
+        Coefficients a of the displacement u in x, y (, z).
+    rotation : one float, of a solid three, or ()
+        Coefficients b [m] of the rotation phi of a reference point.
+    """
+
+    at: str | int | tuple[int, int]
+    displacement: Sequence[float]
+    rotation: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class LinearEquation:
+    """Linear equation between displacements, ``sum_j (a_j . u_j + b_j . phi_j) = 0``.
+
+    The component of the first term with the largest coefficient is eliminated; where another
+    constraint or a support determines it already, some other component is.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+    name : str
+        For messages.
+
+    Raises
+    ------
+    InputError
+        For no terms, or coefficients that are not finite or all zero.
+    """
+
+    terms: Sequence[Term]
+    name: str = "an equation"
+
+    def __post_init__(self) -> None:
+        require_kind("LinearEquation", Sequence, terms=self.terms)
+        if not self.terms:
+            raise InputError(f"LinearEquation '{self.name}': terms is empty; give at least one.")
+        for term in self.terms:
+            if not isinstance(term, tuple) or len(term) not in (2, 3) or not isinstance(
+                    term[0], str | int | np.integer | tuple):
+                raise InputError(f"LinearEquation '{self.name}': {shown(term)} must be a Term: a "
+                                 f"point or node, and the coefficients of its displacement.")
+        terms = tuple(Term(*term) for term in self.terms)
+        values = [np.concatenate([as_floats(term.displacement, "LinearEquation: displacement"),
+                                  as_floats(term.rotation, "LinearEquation: rotation")])
+                  for term in terms]
+        if not all(np.isfinite(one).all() for one in values) or not any(map(np.any, values)):
+            raise InputError(f"LinearEquation '{self.name}': the coefficients must be finite, and "
+                             f"one of them not zero.")
+        object.__setattr__(self, "terms", terms)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of points of the mesh or of reference points."""
+        return tuple(term.at for term in self.terms if isinstance(term.at, str))
+
+    def turned(self, turn: Array, _: Array) -> "LinearEquation":
+        """Equation of the body turned, and perhaps mirrored, by ``turn`` (d, d)."""
+        terms = []
+        for at, displacement, rotation in self.terms:
+            # Rotations are axial vectors, which a mirror turns round.
+            spin = np.linalg.det(turn) * (turn if len(turn) == 3 else np.eye(1))
+            terms.append(Term(at, tuple(turn @ displacement),
+                              tuple(spin @ rotation) if len(rotation) else ()))
+        return replace(self, terms=terms)
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A face whose nodes move with another face, whose mesh need not match.
+
+    The displacement of a dependent node is that of the closest place x of the independent face,
+
+        u = sum_j (N_j + N_j,a a^a . r) u_j - (n . r) sum_j N_j,a a^a (n . u_j),
+
+    with the shape functions N_j of the facet at x and their slopes N_j,a along its surface vectors,
+    whose reciprocal ones are a^a. r goes from x to the node, n is the normal. Rigid motions strain
+    nothing, also where r is not zero.
+
+    Parameters
+    ----------
+    dependent : str
+        Boundary or points of the mesh.
+    independent : str
+        Boundary of the mesh.
+    tolerance : float, optional
+        Largest distance of a node from the face [m]; by default a twentieth of the mean length of
+        an edge, or of the root of the mean area of a face, on the independent boundary. Nodes that
+        are farther away are left out with a warning.
+    name : str
+        For messages.
+    """
+
+    dependent: str
+    independent: str
+    tolerance: float | None = None
+    name: str = "a tie"
+
+    def __post_init__(self) -> None:
+        require_kind(f"Tie '{self.name}'", str, dependent=self.dependent,
+                     independent=self.independent)
+        if self.tolerance is not None:
+            require_positive(f"Tie '{self.name}'", tolerance=self.tolerance)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the boundaries or points of the mesh."""
+        return self.dependent, self.independent
+
+    def turned(self, _: Array, __: Array) -> "Tie":
+        """The tie itself."""
+        return self
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Nodes coupled to a reference point with displacement u and rotation phi.
+
+    'kinematic': each node moves along the axes as the rigid body, ``u_i = u + phi x r_i`` with r_i
+    from the reference point to the node. 'distributing': the reference point has the mean motion
+    of the nodes,
+
+        u = sum_i w_i u_i - phi x sum_i w_i r_i,      phi = J^-1 sum_i w_i (r_i - c) x u_i,
+
+    with the weights w_i, of sum one, the centroid ``c = sum_i w_i r_i`` and
+    ``J = sum_i w_i (|r_i - c|^2 1 - (r_i - c)(r_i - c)^T)``; forces on the point are spread
+    accordingly.
+
+    Parameters
+    ----------
+    nodes : str
+        Boundary or points of the mesh. Weights are shares of the boundary's length or area, or
+        equal for points.
+    reference : str
+        Name of the reference point, which other couplings and equations may use too.
+    place : d floats, optional
+        Place of the reference point [m]; None if ``reference`` is a point of the mesh.
+    kind : 'kinematic' or 'distributing'
+    axes : k sequences of d floats, optional
+        Independent directions in which the nodes of a kinematic coupling follow; by default all.
+    name : str
+        For messages.
+
+    Raises
+    ------
+    InputError
+        For an unknown kind, a place that is not finite, or dependent axes.
+    """
+
+    nodes: str
+    reference: str
+    place: Coordinates | None = None
+    kind: str = "kinematic"
+    axes: Sequence[Sequence[float]] | None = None
+    name: str = "a coupling"
+
+    def __post_init__(self) -> None:
+        what = f"Coupling '{self.name}'"
+        require_kind(what, str, nodes=self.nodes, reference=self.reference)
+        require_choice(what, "kind", self.kind, ("kinematic", "distributing"))
+        if self.place is not None:
+            object.__setattr__(self, "place", as_place(self.place, f"{what}: place"))
+        if self.axes is None:
+            return
+        axes = as_floats(self.axes, f"{what}: axes")
+        if axes.ndim != 2 or np.linalg.matrix_rank(axes) < len(axes):
+            raise InputError(f"{what}: axes must be independent directions (k, d), not "
+                             f"{axes.tolist()}.")
+        object.__setattr__(self, "axes", tuple(map(tuple, axes.tolist())))
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the nodes and of the reference point."""
+        return self.nodes, self.reference
+
+    def turned(self, turn: Array, shift: Array) -> "Coupling":
+        """Coupling of the body turned by ``turn`` (d, d) and then shifted."""
+        place = None if self.place is None else tuple(turn @ np.asarray(self.place) + shift)
+        axes = None if self.axes is None else (np.asarray(self.axes) @ turn.T).tolist()
+        return replace(self, place=place, axes=axes)
+
+
+Constraint = LinearEquation | Tie | Coupling
+
+
+def check_constraints(
+    constraints: Sequence[Constraint], boundaries: Mapping[str, Integers],
+    points: Mapping[str, Integers], dimension: int, nodes: int,
+) -> None:
+    """Raise unless all constraints name what the mesh has.
+
+    Raises
+    ------
+    MeshError, InputError
+        For unknown boundaries, points and nodes, a reference point without a place or with
+        two, and coefficients, axes or places of another dimension.
+    """
+    for one in constraints:
+        if not isinstance(one, LinearEquation | Tie | Coupling):
+            raise InputError(f"constraints must be LinearEquation, Tie or Coupling, not "
+                             f"{type(one).__name__}.")
+    known = {*boundaries, *points}
+    references = _reference_names(constraints, points)
+    for one in constraints:
+        what = f"{type(one).__name__} '{one.name}'"
+        if isinstance(one, LinearEquation):
+            _check_terms(one, what, references, points, dimension, nodes)
+            continue
+        group = one.nodes if isinstance(one, Coupling) else one.dependent
+        if group not in known:
+            raise MeshError(f"{what}: the mesh has no boundary or points '{group}'"
+                            f"{nearest(group, known)}; it has: {choices(known)}.")
+        if isinstance(one, Tie):
+            if one.independent not in boundaries:
+                raise MeshError(f"{what}: the mesh has no boundary '{one.independent}'"
+                                f"{nearest(one.independent, boundaries)}; its boundaries are: "
+                                f"{choices(boundaries)}.")
+            continue
+        if one.axes is not None and np.shape(one.axes)[1] != dimension:
+            raise InputError(f"{what}: axes must have {dimension} components each.")
+        if one.place is not None and len(one.place) != dimension:
+            raise InputError(f"{what}: place must have {dimension} coordinates.")
+        if len(points.get(one.reference, ())) != 1:
+            reference_place(constraints, one.reference)
+
+
+def _check_terms(
+    one: LinearEquation, what: str, references: set[str], points: Mapping[str, Integers],
+    dimension: int, nodes: int,
+) -> None:
+    """Raise unless the terms of an equation name points, nodes or reference points."""
+    turns = 3 if dimension == 3 else 1
+    for at, displacement, rotation in one.terms:
+        if isinstance(at, str):
+            if at not in references and len(points.get(at, ())) != 1:
+                known = {name for name, held in points.items() if len(held) == 1} | references
+                raise MeshError(f"{what}: '{at}' is neither a point of the mesh with one node nor "
+                                f"a reference point{nearest(at, known)}; these are: "
+                                f"{choices(known)}.")
+        elif np.any(np.less(at, 0)) or np.any(np.greater_equal(at, nodes)):
+            raise MeshError(f"{what} names the node {at} outside 0 ... {nodes - 1}.")
+        if len(displacement) != dimension or len(rotation) not in (0, turns):
+            raise InputError(f"{what}: each term needs {dimension} coefficients of the "
+                             f"displacement, and {turns} or none of the rotation.")
+
+
+def _reference_names(
+    constraints: Iterable[Constraint], points: Mapping[str, Integers]
+) -> set[str]:
+    """Names of reference points: of couplings, or in two equations and no point of the mesh."""
+    found = {one.reference for one in constraints if isinstance(one, Coupling)}
+    seen: set[str] = set()
+    for one in constraints:
+        if isinstance(one, LinearEquation):
+            named = {*one.groups} - points.keys()
+            found |= named & seen
+            seen |= named
+    return found
+
+
+def reference_place(constraints: Iterable[Constraint], name: str) -> Coordinates:
+    """Place of a reference point; InputError if it has none or two."""
+    places = {one.place for one in constraints
+              if isinstance(one, Coupling) and one.reference == name and one.place is not None}
+    if len(places) != 1:
+        raise InputError(f"The reference point '{name}' of a coupling must have one place, but the "
+                         f"couplings give it {len(places)}; give place in one of them.")
+    return next(iter(places))
+
+
+def reference_points(
+    constraints: Sequence[Constraint], points: Mapping[str, Integers]
+) -> tuple[str, ...]:
+    """Names of all reference points, in the order in which the constraints name them."""
+    names = _reference_names(constraints, points)
+    return tuple(dict.fromkeys(
+        name for one in constraints if not isinstance(one, Tie) for name in one.groups
+        if name in names))
+
+
+def counted(constraints: Sequence[Constraint]) -> str:
+    """Number of constraints of each kind, for summaries."""
+    kinds = {LinearEquation: "equation", Tie: "tie", Coupling: "coupling"}
+    counts = {title: sum(isinstance(one, kind) for one in constraints)
+              for kind, title in kinds.items()}
+    return ", ".join(count(number, title) for title, number in counts.items() if number)
