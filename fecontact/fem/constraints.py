@@ -84,6 +84,12 @@ class LinearEquation:
         """Names of points of the mesh or of reference points."""
         return tuple(term.at for term in self.terms if isinstance(term.at, str))
 
+    def renamed(self, new: Mapping[str, str]) -> "LinearEquation":
+        """Equation with new names of some points."""
+        return replace(self, terms=[
+            term._replace(at=new.get(term.at, term.at)) if isinstance(term.at, str) else term
+            for term in self.terms])
+
     def turned(self, turn: Array, _: Array) -> "LinearEquation":
         """Equation of the body turned, and perhaps mirrored, by ``turn`` (d, d)."""
         terms = []
@@ -137,9 +143,18 @@ class Tie:
         """Names of the boundaries or points of the mesh."""
         return self.dependent, self.independent
 
+    def renamed(self, new: Mapping[str, str]) -> "Tie":
+        """Tie with new names of some groups."""
+        return replace(self, dependent=new.get(self.dependent, self.dependent),
+                       independent=new.get(self.independent, self.independent))
+
     def turned(self, _: Array, __: Array) -> "Tie":
         """The tie itself."""
         return self
+
+    def scaled(self, scale: float) -> "Tie":
+        """Tie of a body whose unit of length is ``scale`` of the new one."""
+        return self if self.tolerance is None else replace(self, tolerance=scale * self.tolerance)
 
 
 @dataclass(frozen=True)
@@ -203,11 +218,21 @@ class Coupling:
         """Names of the nodes and of the reference point."""
         return self.nodes, self.reference
 
+    def renamed(self, new: Mapping[str, str]) -> "Coupling":
+        """Coupling with new names of some groups."""
+        return replace(self, nodes=new.get(self.nodes, self.nodes),
+                       reference=new.get(self.reference, self.reference))
+
     def turned(self, turn: Array, shift: Array) -> "Coupling":
         """Coupling of the body turned by ``turn`` (d, d) and then shifted."""
         place = None if self.place is None else tuple(turn @ np.asarray(self.place) + shift)
         axes = None if self.axes is None else (np.asarray(self.axes) @ turn.T).tolist()
         return replace(self, place=place, axes=axes)
+
+    def scaled(self, scale: float) -> "Coupling":
+        """Coupling of a body whose unit of length is ``scale`` of the new one."""
+        return self if self.place is None else replace(
+            self, place=tuple(scale * np.asarray(self.place)))
 
 
 Constraint = LinearEquation | Tie | Coupling

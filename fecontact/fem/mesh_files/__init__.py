@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path, require_kind, require_regular_file
-from fecontact.core.errors import InputError, MeshError
+from fecontact.core.errors import InputError, MeshError, ModelWarning
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.resources.memory import available_memory, shown_memory
 from fecontact.core.types import ArrayLike, Coordinates, Integers
+from fecontact.fem.constraints import counted
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.abaqus import read_inp
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
-from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_points
+from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_constraints, named_points
 from fecontact.fem.mesh_files.med import read_med
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
 
@@ -44,7 +45,8 @@ def read_mesh(
     solids those of surfaces: physical groups (Gmsh), surfaces, element sets and node sets on the
     outline (Abaqus, MED), elements by property number (Nastran). Points are physical points, node
     sets, groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
-    second-order elements are kept, coincident nodes merged, nodes without a cell left out.
+    second-order elements are kept, coincident nodes merged, nodes without a cell left out. Ties,
+    couplings and equations of Abaqus files become ``mesh.constraints``; their nodes are not merged.
 
     Parameters
     ----------
@@ -82,7 +84,8 @@ def read_mesh(
         return Mesh(mesh.nodes, mesh.cells,
                     named_boundaries(mesh, groups, boundaries or {}),
                     named_points(mesh, groups, points or {}),
-                    mesh.curved_edges, mesh.curved_middles)
+                    mesh.curved_edges, mesh.curved_middles,
+                    named_constraints(groups, boundaries or {}, points or {}))
     except (MeshError, InputError) as error:
         raise type(error)(f"{path}: {error}") from None
 
@@ -90,8 +93,8 @@ def read_mesh(
 def write_mesh(mesh: Mesh, path: str | Path) -> None:
     """Write a mesh as Gmsh 4.1 text, boundaries and points as physical groups.
 
-    Coordinates are written with all digits, so that :func:`read_mesh` restores the same mesh. The
-    file is written whole or not at all.
+    Coordinates are written with all digits, so that :func:`read_mesh` restores the same mesh, but
+    for constraints, of which a warning tells. The file is written whole or not at all.
 
     Raises
     ------
@@ -107,6 +110,9 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
     for name in (*mesh.boundaries, *mesh.points):
         if not name.strip() or '"' in name or "\n" in name:
             raise InputError(f"{path}: Gmsh cannot store a group named {name!r}; rename it.")
+    if mesh.constraints:
+        warnings.warn(f"{path}: Gmsh cannot store constraints, so that {counted(mesh.constraints)} "
+                      f"are not written; give them to the body anew.", ModelWarning, stacklevel=2)
     with replaced(path) as part, part.open("w", encoding="utf-8", newline="\n") as stream:
         write_msh(mesh, stream)
 

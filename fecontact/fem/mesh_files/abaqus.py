@@ -7,6 +7,7 @@ sets named on *ELEMENT, surfaces, local coordinate systems, displaced instances 
 import re
 import warnings
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 from fecontact.core.checks import whole_number
 from fecontact.core.errors import MeshError, ModelWarning, choices, nearest, shown
 from fecontact.core.types import Array, Integers
+from fecontact.fem.constraints import Constraint, LinearEquation
+from fecontact.fem.mesh_files.abaqus_constraints import READ, Block, Names, constraints_of
 from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
@@ -31,10 +34,9 @@ _FACES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
           8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))}
 
 # Keywords that stiffen or load the mesh by other means than its plane and solid elements.
-_CONSTRAINTS = ("TIE", "COUPLING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING",
-                "SHELL TO SOLID COUPLING", "EQUATION", "MPC", "RIGID BODY", "EMBEDDED ELEMENT",
-                "PRE-TENSION SECTION", "FASTENER", "CONNECTOR SECTION", "JOINT", "SPRING",
-                "DASHPOT", "MASS", "ROTARY INERTIA")
+_UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT",
+           "PRE-TENSION SECTION", "FASTENER", "CONNECTOR SECTION", "JOINT", "SPRING", "DASHPOT",
+           "MASS", "ROTARY INERTIA")
 _GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
 _KINDS = {"NSET": "nodes", "ELSET": "elements"}
 _PARALLEL = 1e-9  # sine of the angle between directions that span no plane
@@ -81,8 +83,8 @@ def read_inp(path: Path) -> RawMesh:
     Warns
     -----
     ModelWarning
-        If the file ends with elements and some nodes belong to none of them, or holds constraints,
-        springs or masses, which are not read.
+        If the file ends with elements and some nodes belong to none of them, or holds springs,
+        masses or constraints of kinds that are not read.
     """
     deck, assembly = Deck(path), _Assembly()
     try:
@@ -96,19 +98,103 @@ def read_inp(path: Path) -> RawMesh:
     if not bodies:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
     deck.require_end()
-    joined = _joined({body.title or body.name: body.raw_mesh() for body in bodies})
+    joined, constraints, unread = _constrained(assembly, bodies)
+    count = sum(len(body.numbered.places) for body in bodies)
     unused = sum(body.part.unused_nodes for body in bodies) if deck.ends_with_elements else 0
     if unused:
         cut = deck.ends_with_elements[0]
         name = "" if cut == path.name else f" {cut}"
         warnings.warn(f"{path}: the file{name} ends with *ELEMENT data, and {unused} of "
-                      f"{len(joined.points)} nodes belong to no element; if the file is cut off, "
+                      f"{count} nodes belong to no element; if the file is cut off, "
                       f"elements are missing.", ModelWarning, stacklevel=4)
-    if unread := [f"{deck.keywords[name]} *{name}" for name in _CONSTRAINTS if deck.keywords[name]]:
+    unread = [f"{deck.keywords[name]} *{name}" for name in _UNREAD if deck.keywords[name]] + unread
+    if unread:
         warnings.warn(f"{path}: the file holds {', '.join(unread)}, which are not read; the mesh "
                       f"has none of their stiffness or mass, so give supports, links and welds "
                       f"beside it.", ModelWarning, stacklevel=4)
+    joined.constraints = constraints
     return joined
+
+
+def _constrained(
+    assembly: "_Assembly", bodies: list["_Instance"]
+) -> tuple[RawMesh, list[Constraint], list[str]]:
+    """Mesh of all bodies, its constraints, and what constrains it by keywords that are not read.
+
+    Nodes of reference points, which belong to no body, follow those of the bodies.
+    """
+    parts = {body.title or body.name: body.raw_mesh() for body in bodies}
+    joined = _joined(parts)
+    if not assembly.constraints:
+        return joined, [], []
+    owners = [*bodies, *assembly.reference_points()]
+    places = [*(raw.points for raw in parts.values()),
+              *(one.placed(one.numbered.places) for one in owners[len(bodies):])]
+    first = np.cumsum([0, *map(len, places)])
+    joined.points = np.concatenate(places)
+
+    def nodes(kind: str, word: str) -> Integers | None:
+        found = []
+        for one, start in zip(owners, first, strict=False):
+            members = one.find(kind, word)
+            if members is None and whole_number(word) is not None and one.takes_numbers:
+                members = [np.array([int(word)])]
+            if members is not None:
+                found.append(start + one.numbered.nodes_of(
+                    members if kind == "nodes" else [_NodesOf(members)]))
+        return np.unique(np.concatenate(found)) if found else None
+
+    def group(word: str, faces: bool) -> str | None:
+        for name in (*joined.faces, *joined.edges, *(() if faces else joined.nodes)):
+            if name.upper() == word.upper():
+                return name
+        # Of an instance: a surface, or a set of nodes, that other instances have too.
+        for (title, raw), one, start in zip(parts.items(), bodies, first, strict=False):
+            prefix = f"{one.name or title}."
+            for name in ([] if not word.upper().startswith(prefix.upper())
+                         else [*raw.faces, *raw.edges]):
+                if name.upper() == word[len(prefix):].upper():
+                    if name in raw.faces:
+                        joined.faces[word] = [block + start for block in raw.faces[name]]
+                    else:
+                        joined.edges[word] = raw.edges[name] + start
+                    return word
+        if not faces and (held := nodes("nodes", word)) is not None and len(held):
+            joined.nodes[word] = held
+            return word
+        return None
+
+    constraints, unread = constraints_of(assembly.constraints, Names(
+        joined.points, nodes, group, joined.nodes, not joined.is_solid, assembly.unsorted))
+    joined.apart = bool(constraints)
+    joined.separate &= not _connected(joined, constraints, first[: len(bodies)])
+    return joined, constraints, unread
+
+
+def _connected(raw: RawMesh, constraints: list[Constraint], first: Integers) -> bool:
+    """Whether constraints join all bodies, whose nodes begin at ``first``."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    size = len(raw.points)
+    links = []
+    for number, one in enumerate(constraints):
+        if isinstance(one, LinearEquation):
+            held = [np.array([term.at for term in one.terms], np.int64)]
+        else:
+            held = [nodes for name in one.groups for nodes in (
+                *(block.ravel() for block in raw.faces.get(name, ())),
+                raw.edges.get(name, np.empty(0, np.int64)).ravel(),
+                raw.nodes.get(name, np.empty(0, np.int64)))]
+        links += [(size + number, int(node)) for node in np.unique(np.concatenate(held))]
+    for start, end in zip(first, [*first[1:], len(raw.points)], strict=True):
+        of_cells = np.concatenate([block.ravel() for _, block in raw.cells])
+        own = np.unique(of_cells[(of_cells >= start) & (of_cells < end)])
+        links += [(int(own[0]), int(node)) for node in own]
+    rows, columns = np.array(links).T
+    graph = coo_array((np.ones(len(links)), (rows, columns)), shape=(size + len(constraints),) * 2)
+    label = connected_components(graph, directed=False)[1]
+    return len(np.unique(label[[int(block[0, 0]) for _, block in raw.cells if len(block)]])) == 1
 
 
 def _joined(parts: dict[str, RawMesh]) -> RawMesh:
@@ -259,14 +345,17 @@ class _Assembly:
     def __init__(self) -> None:
         self.parts: dict[str, _Part] = {"": _Part("")}
         self.instances: list[_Instance] = []
-        # Nodes and elements of the assembly itself, which are reference points, are not read.
+        # Nodes of the assembly itself are reference points; elements of it are not read.
         self.current: _Part | None = self.parts[""]
+        self.own = _Instance("", _Part(""))
+        self.constraints: list[Block] = []
+        self.unsorted: set[str] = set()
 
     def add(self, keyword: str, options: Options, lines: list[str]) -> None:
         part = self.current
         match keyword:
-            case "NODE" if part is not None:
-                part.add_nodes(options, lines)
+            case "NODE":
+                (part or self.own.part).add_nodes(options, lines)
             case "ELEMENT" if part is not None:
                 part.add_elements(options, lines)
             case "SYSTEM" if part is not None:
@@ -275,6 +364,9 @@ class _Assembly:
                 self._add_set(keyword, options, lines)
             case "SURFACE" if options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
                 self._add_surface(options["NAME"], lines)
+            case "SURFACE" if options["TYPE"].upper() == "NODE":
+                sets = [",".join(_words(line)[:1]) for line in lines]
+                self._add_set("NSET", {**options, "NSET": options["NAME"]}, sets)
             case "PART":
                 name = options["NAME"]
                 self.current = self.parts[name.upper()] = _Part(name)
@@ -284,6 +376,8 @@ class _Assembly:
                 self.current = None
             case "INSTANCE":
                 self._add_instance(options, lines)
+            case _ if keyword in READ:
+                self.constraints.append((keyword, options, lines))
             case _ if keyword in _GENERATING:
                 raise MeshError(f"The file makes nodes or elements by *{keyword}, which is not "
                                 f"read; write all nodes and elements as data of *NODE and "
@@ -308,6 +402,12 @@ class _Assembly:
                 one.title = self.parts[key].name
         return [one for one in found if one.part.node_blocks and one.part.element_blocks]
 
+    def reference_points(self) -> list["_Instance"]:
+        """Return the assembly itself, instances and parts that hold nodes without elements."""
+        parts = [_Instance(part.name, part) for part in self.parts.values() if part.name]
+        return [one for one in (self.own, *self.instances, *([] if self.instances else parts))
+                if one.part.node_blocks and not one.part.element_blocks]
+
     def _add_instance(self, options: Options, lines: list[str]) -> None:
         name, source = options["NAME"], options.get("PART", "").upper()
         if any(one.name.upper() == name.upper() for one in self.instances):
@@ -331,6 +431,8 @@ class _Assembly:
                                         source if held else ""))
 
     def _add_set(self, keyword: str, options: Options, lines: list[str]) -> None:
+        if "UNSORTED" in options:
+            self.unsorted.add(options[keyword].upper())
         if "INSTANCE" in options:
             _add_set(self._instance(options["INSTANCE"], options[keyword]), keyword, options, lines)
         elif self.current is not None:
@@ -342,6 +444,10 @@ class _Assembly:
                 own = [word for word in words if one.find(_KINDS[keyword], word) is not None]
                 if own or one.find("elements", of_elements) is not None:
                     _add_set(one, keyword, options, [",".join(own)])
+            if keyword == "NSET" and self.own.part.node_blocks:
+                known = self.own.part.sets.nodes
+                _add_set(self.own, keyword, options, lines if "GENERATE" in options else [
+                    word for word in words if whole_number(word) is not None or word in known])
 
     def _add_surface(self, name: str, lines: list[str]) -> None:
         rows = [(words[0], int(words[1][1])) for words in map(_words, lines)
@@ -482,6 +588,20 @@ class _Instance:
     title: str = ""  # name as a body, if not that of the instance
     sets: _Sets = field(default_factory=_Sets)
 
+    @cached_property
+    def numbered(self) -> "_NumberedMesh":
+        """Nodes and elements by Abaqus' numbers."""
+        return _NumberedMesh(self.part)
+
+    @property
+    def takes_numbers(self) -> bool:
+        """Whether numbers without the name of an instance are those of its nodes."""
+        return not self.name
+
+    def placed(self, places: Array) -> Array:
+        """Places of the part where the instance puts them."""
+        return places if self.placement is None else self.placement.moved(places)
+
     def find(self, kind: str, word: str) -> Members | None:
         """Members that ``set``, ``instance.set`` or ``instance.number`` names; None for others."""
         prefix = f"{self.name}."
@@ -495,7 +615,7 @@ class _Instance:
         return self.part.find(kind, word) if found is None else found
 
     def raw_mesh(self) -> RawMesh:
-        mesh = _NumberedMesh(self.part)
+        mesh = self.numbered
         node_sets = self._named(self.part.sets.nodes, self.sets.nodes)
         element_sets = self._named(self.part.sets.elements, self.sets.elements)
         surfaces = self._named(self.part.sets.surfaces, self.sets.surfaces)
@@ -514,9 +634,8 @@ class _Instance:
                  for name, blocks in sides.items()}
         parts = {name: [(kind, rows) for kind, rows in cells
                         if not kind.startswith(("line", "solid"))] for name, cells in held.items()}
-        places = mesh.places
         return RawMesh(
-            places if self.placement is None else self.placement.moved(places),
+            self.placed(mesh.places),
             [(kind, rows) for kind, rows in mesh.cells.items() if not kind.startswith("line")],
             edges=edges,
             nodes={name: mesh.nodes_of(members) for name, members in node_sets.items()},
@@ -540,7 +659,8 @@ class _NumberedMesh:
         last = _last_of_each(numbers)
         self.places = np.concatenate([places for _, places in part.node_blocks])[last]
         self.nodes = _Index(numbers[last])
-        last = _last_of_each(np.concatenate([numbers for _, numbers, _ in part.element_blocks]))
+        last = _last_of_each(np.concatenate(
+            [np.empty(0, np.int64), *(numbers for _, numbers, _ in part.element_blocks)]))
         blocks: dict[str, list[tuple[Integers, Integers]]] = {}
         for kind, numbers, nodes in part.element_blocks:
             kept, last = last[:len(numbers)], last[len(numbers):]
@@ -550,7 +670,8 @@ class _NumberedMesh:
             blocks.setdefault(kind, []).append((numbers[kept], rows))
         self.cells = {kind: np.concatenate([rows for _, rows in found])
                       for kind, found in blocks.items()}
-        numbers = np.concatenate([numbers for found in blocks.values() for numbers, _ in found])
+        numbers = np.concatenate([np.empty(0, np.int64), *(
+            numbers for found in blocks.values() for numbers, _ in found)])
         self.elements = _Index(numbers)
         others = np.array(part.other_elements, np.int64)
         self.known = {"node": self.nodes,

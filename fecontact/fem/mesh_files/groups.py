@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest
 from fecontact.core.types import Array, Coordinates, Integers
+from fecontact.fem.constraints import Constraint
 from fecontact.fem.interpolation import interpolation
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.raw import Groups, on_outline
@@ -76,6 +77,15 @@ def named_points(
             raise _no_group("point", name, source, groups,
                             {**groups.points, **groups.boundaries})
     return found
+
+
+def named_constraints(
+    groups: Groups, boundaries: Mapping[str, Any], points: Mapping[str, Any]
+) -> tuple[Constraint, ...]:
+    """Constraints of the file with the new names of its groups."""
+    new = {source: name for name, source in (*points.items(), *boundaries.items())
+           if isinstance(source, str)}
+    return tuple(one.renamed(new) for one in groups.constraints)
 
 
 def _no_group(

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
+from fecontact.fem.constraints import Constraint
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind
 from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files.raw_constraints import constraints_of_mesh
 
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 SOLID = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8}
@@ -48,6 +50,12 @@ class RawMesh:
         Groups of elements of two and three dimensions, as ``cells``.
     separate : bool
         Whether the parts are bodies of their own, which cannot be read as one mesh.
+    constraints : list of LinearEquation, Tie or Coupling
+        In the unit of the file; equations name nodes by their rows in ``points``.
+    apart : bool
+        Whether nodes at one place are different ones.
+    chosen : str
+        Name of the part that was chosen, if any.
     """
 
     points: Array
@@ -58,6 +66,9 @@ class RawMesh:
     sets_are_boundaries: bool = False
     parts: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
     separate: bool = False
+    constraints: list[Constraint] = field(default_factory=list)
+    apart: bool = False
+    chosen: str = ""
 
     def part(self, name: str | None) -> "RawMesh":
         """The elements of one part, with the groups of the file; all elements for None.
@@ -86,11 +97,11 @@ class RawMesh:
                                 f"{choices(sorted(self._solid_parts))}.")
             cells = solid
         corners = [block.ravel() for _, block in cells]
-        points = np.full(np.shape(self.points), np.nan)
+        points = np.array(self.points, float)
         if all(not len(block) or block.max() < len(points) for block in corners):
-            used = np.unique(np.concatenate(corners))
-            points[used] = np.asarray(self.points, float)[used]
-        return replace(self, points=points, cells=cells)
+            all_cells = np.concatenate([block.ravel() for _, block in self.cells])
+            points[np.setdiff1d(all_cells, np.concatenate(corners))] = np.nan
+        return replace(self, points=points, cells=cells, chosen=name)
 
     @property
     def is_solid(self) -> bool:
@@ -112,13 +123,14 @@ class Groups:
     """Named groups of a mesh.
 
     ``empty`` are the names of groups without nodes, edges or faces of the body, ``cells`` those of
-    groups of cells.
+    groups of cells. ``constraints`` are in metres, with nodes of the mesh.
     """
 
     boundaries: dict[str, Integers]
     points: dict[str, Integers]
     empty: tuple[str, ...]
     cells: tuple[str, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
 
 
 def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
@@ -157,7 +169,8 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     kind = CELL_KINDS[points.shape[1], corners.shape[1]]
     curves = [_curved_edges(points, cells, kind, size) for cells in second_order]
 
-    first = _first_of_coincident(points, _COINCIDENT * size)
+    first = (np.arange(len(points)) if raw.apart
+             else _first_of_coincident(points, _COINCIDENT * size))
     used = np.unique(first[corners])
     number = np.full(len(points), -1, np.int64)
     number[used] = np.arange(len(used))
@@ -169,7 +182,17 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     middles = np.concatenate([np.empty((0, points.shape[1])), *(places for _, places in curves)])
     _, once = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
     mesh = Mesh(points[used], cells[np.sort(distinct)], {}, {}, ends[once], middles[once])
-    return mesh, _groups(raw, mesh, number)
+    groups = _groups(raw, mesh, number)
+    if not raw.constraints:
+        return mesh, groups
+    middles_of: dict[int, tuple[int, int]] = {}
+    for cells in second_order:
+        order = kind.corners + _edge_order(points, cells, kind)
+        pairs = number[cells[:, np.array(kind.edges)]].reshape(-1, 2)
+        middles_of |= dict(zip(cells[:, order].ravel().tolist(),
+                               ((a, b) for a, b in pairs.tolist()), strict=True))
+    return mesh, replace(groups, constraints=constraints_of_mesh(
+        raw, groups.boundaries, groups.points, number, middles_of, points, scale))
 
 
 def on_outline(mesh: Mesh, chosen: NDArray[np.bool_]) -> Integers:
