@@ -622,7 +622,9 @@ def nodes_and(cells: str) -> str:
         ("a.msh", nodes_and("1 2 2 1 1 1 2 3\n2 2 2 1 1 2 4 3\n"),
          r"holds surfaces only, in space \(z runs from 0 to 2 m\); a solid needs tetrahedra or"),
         ("a.msh", nodes_and("1 6 2 1 1 1 2 3 4 2 3\n"),
-         r"holds solid elements that are not read \(solid\); mesh with tetrahedra or hexahedra"),
+         r"1 wedges have no volume, or are folded or inverted, the first at \(0\.5, "),
+        ("a.msh", nodes_and("1 14 2 1 1 1 2 3 4 1 2 3 4 1 2 3 4 1 2\n"),
+         r"holds solid elements that are not read \(solid\); mesh with tetrahedra, hexahedra or"),
         ("a.msh", nodes_and("1 1 2 1 1 1 2\n"), "holds no triangles or quadrilaterals"),
         ("a.msh", nodes_and("1 2 2 1 1 1 2 3\n2 3 2 1 1 1 2 4 3\n"),
          "mixes 1 triangles and 1 quadrilaterals; mesh with one kind only"),
@@ -635,7 +637,8 @@ def nodes_and(cells: str) -> str:
          "elements name nodes that the file does not hold"),
         ("a.inp", "*NODE\n1,0,0\n*ELEMENT, TYPE=CAX3\n1,1,2,3\n", r"axisymmetric elements \(CAX3"),
         ("a.inp", "*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n1,1,1,1,1\n", "have no volume"),
-        ("a.inp", "*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D6\n1,1,1,1,1,1,1\n", "that are not read"),
+        ("a.inp", "*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D6\n1,1,1,1,1,1,1\n", "1 wedges have no vol"),
+        ("a.inp", "*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D7\n1,1,1,1,1,1,1,1\n", "that are not read"),
         ("a.inp", "*NODE, SYSTEM=T\n1,0,0\n",
          r"SYSTEM=T names an unknown system; it may be R \(rectangular\), C \(cylindrical\) or S"),
         ("a.inp", "*SYSTEM\n0,0,0,1,1,0\n2,2,0\n*NODE\n1,0,0\n",
@@ -789,8 +792,8 @@ def test_elements_of_other_kinds_are_named(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"elements that are not read \(polygon\)"):
         read_mesh(path)
     cube = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], float)
-    meshio.write(path, meshio.Mesh(cube[:6], [("wedge", [np.arange(6)])]))
-    with pytest.raises(MeshError, match=r"solid elements that are not read \(wedge\)"):
+    meshio.write(path, meshio.Mesh(np.tile(cube, (3, 1)), [("wedge18", [np.arange(18)])]))
+    with pytest.raises(MeshError, match=r"solid elements that are not read \(wedge18\)"):
         read_mesh(path)
 
 

@@ -41,10 +41,11 @@ def read_mesh(
     """Read the mesh of a plane body or of a solid, with named boundaries and points, from a file.
 
     Formats: Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Nastran (.bdf, .nas, .fem), MED (.med), VTK
-    (.vtk, .vtu). Files with tetrahedra or hexahedra hold solids. Boundaries are groups of lines, of
-    solids those of surfaces: physical groups (Gmsh), surfaces, element sets and node sets on the
-    outline (Abaqus, MED), elements by property number (Nastran). Points are physical points, node
-    sets, groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
+    (.vtk, .vtu). Files with tetrahedra, hexahedra, wedges or pyramids hold solids; with wedges or
+    pyramids all elements are cut into tetrahedra. Boundaries are groups of lines, of solids those
+    of surfaces: physical groups (Gmsh), surfaces, element sets and node sets on the outline
+    (Abaqus, MED), elements by property number (Nastran). Points are physical points, node sets,
+    groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
     second-order elements are kept, coincident nodes merged, nodes without a cell left out. Ties,
     couplings and equations of Abaqus files become ``mesh.constraints``; their nodes are not merged.
 

@@ -28,10 +28,14 @@ _LINE = re.compile(r"(?:T[23]D|R2D)([23])|B[23]([123])")
 _LINE_KINDS = {("2", None): "line", ("3", None): "line3",
                (None, "1"): "line", (None, "2"): "line3", (None, "3"): "line"}
 _SOLID = re.compile(r"(?:C3D|DC3D|AC3D|SC)(\d+)")
-_SOLID_KINDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
+_SOLID_KINDS = {4: "tetra", 10: "tetra10", 5: "pyramid", 13: "pyramid13", 6: "wedge", 15: "wedge15",
+                8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
 # Corners of the faces S1, S2, ...
-_FACES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-          8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))}
+_FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+    4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    5: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    6: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))}
 
 # Keywords that stiffen or load the mesh by other means than its plane and solid elements.
 _UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT",
@@ -477,7 +481,7 @@ class _Part:
     name: str
     node_blocks: list[tuple[Integers, Array]] = field(default_factory=list)
     element_blocks: list[tuple[str, Integers, Integers]] = field(default_factory=list)
-    # Numbers of the elements that are not read (masses, springs, wedges), and of their nodes.
+    # Numbers of the elements that are not read (masses, springs), and of their nodes.
     other_elements: list[int] = field(default_factory=list)
     other_nodes: list[int] = field(default_factory=list)
     sets: _Sets = field(default_factory=_Sets)

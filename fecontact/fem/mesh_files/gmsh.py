@@ -18,9 +18,10 @@ from fecontact.fem.mesh_files.raw import NODES, PLANE, RawMesh
 
 _KINDS = {15: "vertex", 1: "line", 8: "line3", 2: "triangle", 9: "triangle6",
           3: "quad", 16: "quad8", 10: "quad9", 4: "tetra", 11: "tetra10", 5: "hexahedron",
-          17: "hexahedron20", 12: "hexahedron27"}
+          17: "hexahedron20", 12: "hexahedron27", 6: "wedge", 18: "wedge15", 7: "pyramid",
+          19: "pyramid13"}
 # Solid elements that are not read, with their numbers of nodes.
-_SOLIDS = {6: 6, 7: 5, 13: 18, 14: 14, 18: 15, 19: 13}
+_SOLIDS = {13: 18, 14: 14}
 
 # Elements of one kind with their physical groups (2.2: one or none, 4.1: those of the entity).
 _Block = tuple[str, Integers, list[int]]
@@ -173,7 +174,7 @@ def _kind(code: int) -> tuple[str, int]:
     if code in _SOLIDS:
         return "solid", _SOLIDS[code]
     raise MeshError(f"The mesh holds elements of Gmsh's type {code}, which are not read; mesh with "
-                    f"triangles, quadrilaterals, tetrahedra or hexahedra.")
+                    f"triangles, quadrilaterals, tetrahedra, hexahedra or wedges.")
 
 
 def _raw_mesh(

@@ -16,7 +16,8 @@ from fecontact.fem.mesh_files.raw import RawMesh
 
 _KINDS = {"PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
           "QU4": "quad", "QU8": "quad8", "QU9": "quad9", "TE4": "tetra", "T10": "tetra10",
-          "HE8": "hexahedron", "H20": "hexahedron20", "H27": "hexahedron27"}
+          "HE8": "hexahedron", "H20": "hexahedron20", "H27": "hexahedron27", "PE6": "wedge",
+          "P15": "wedge15", "PY5": "pyramid", "P13": "pyramid13"}
 
 
 def read_med(path: Path) -> RawMesh:

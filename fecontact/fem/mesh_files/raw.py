@@ -10,14 +10,24 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind
 from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files.cut_cells import (
+    PYRAMID,
+    SHAPES,
+    WEDGE,
+    cut_faces,
+    cut_into_tetrahedra,
+    diagonals,
+)
 from fecontact.fem.mesh_files.raw_constraints import constraints_of_mesh
 
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-SOLID = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8}
+SOLID = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8,
+         "wedge": 6, "wedge15": 6, "pyramid": 5, "pyramid13": 5}
 CORNERS = {**PLANE, **SOLID}
 NODES = {"vertex": 1, "line": 2, "line3": 3,
          "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9,
-         "tetra": 4, "tetra10": 10, "hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27}
+         "tetra": 4, "tetra10": 10, "hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27,
+         "wedge": 6, "wedge15": 15, "pyramid": 5, "pyramid13": 13}
 
 _UNREAD_SOLIDS = ("wedge", "penta", "pyramid", "polyhedron", "voxel", "solid", "tetra", "hexa",
                   "VTK_LAGRANGE_TETRA", "VTK_LAGRANGE_HEXA", "VTK_LAGRANGE_WEDGE",
@@ -140,18 +150,19 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     ------
     MeshError
         If the elements are neither a plane mesh of triangles or of quadrilaterals, nor a solid of
-        tetrahedra or of hexahedra.
+        tetrahedra or of hexahedra, or of both with wedges or pyramids.
     """
     blocks = _blocks_of_one_kind(raw.cells)
-    corners = np.concatenate([block[:, :CORNERS[kind]] for kind, block in blocks])
-    second_order = [block for kind, block in blocks if block.shape[1] > CORNERS[kind]]
+    of_corners = [block[:, :CORNERS[kind]] for kind, block in blocks]
+    corners = np.concatenate([block.ravel() for block in of_corners])
     points = np.asarray(raw.points, float) * scale
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise MeshError(f"The nodes have coordinates of shape {points.shape}, not (N, 2) or "
                         f"(N, 3).")
     if corners.min() < 0 or corners.max() >= len(points):
         raise MeshError("The elements name nodes that the file does not hold.")
-    named = [*second_order, *raw.nodes.values(), *(group[:, :2] for group in raw.edges.values()),
+    named = [*(block for _, block in blocks), *raw.nodes.values(),
+             *(group[:, :2] for group in raw.edges.values()),
              *(block for groups in raw.faces.values() for block in groups)]
     if any(group.size and (group.min() < 0 or group.max() >= len(points)) for group in named):
         raise MeshError("A group, or the middle of a side, names nodes that the file does not "
@@ -166,8 +177,12 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     elif points.shape[1] == 2:
         raise MeshError("The file holds solid elements, but its nodes have two coordinates; save "
                         "all three.")
-    kind = CELL_KINDS[points.shape[1], corners.shape[1]]
-    curves = [_curved_edges(points, cells, kind, size) for cells in second_order]
+    dimension = points.shape[1]
+    kinds = [SHAPES[block.shape[1]] if dimension == 3 else CELL_KINDS[2, block.shape[1]]
+             for block in of_corners]
+    second_order = [(kind, block) for kind, (_, block) in zip(kinds, blocks, strict=True)
+                    if block.shape[1] > kind.corners]
+    orders = [kind.corners + _edge_order(points, cells, kind) for kind, cells in second_order]
 
     first = (np.arange(len(points)) if raw.apart
              else _first_of_coincident(points, _COINCIDENT * size))
@@ -176,18 +191,24 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     number[used] = np.arange(len(used))
     number = number[first]
     _require_one_body(raw, number)
-    cells = number[corners]
+    curves = [_curved_edges(points, cells, kind, order, size)
+              for (kind, cells), order in zip(second_order, orders, strict=True)]
+    if any(kind in (WEDGE, PYRAMID) for kind in kinds):
+        of_corners = [cut_into_tetrahedra(points, number, block, kind)
+                      for block, kind in zip(of_corners, kinds, strict=True)]
+        curves += [_curved(points, *diagonals(points, number, cells, kind, order), size)
+                   for (kind, cells), order in zip(second_order, orders, strict=True)]
+    cells = number[np.concatenate(of_corners)]
     _, distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
     ends = number[np.concatenate([np.empty((0, 2), np.int64), *(ends for ends, _ in curves)])]
-    middles = np.concatenate([np.empty((0, points.shape[1])), *(places for _, places in curves)])
+    middles = np.concatenate([np.empty((0, dimension)), *(places for _, places in curves)])
     _, once = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
     mesh = Mesh(points[used], cells[np.sort(distinct)], {}, {}, ends[once], middles[once])
     groups = _groups(raw, mesh, number)
     if not raw.constraints:
         return mesh, groups
     middles_of: dict[int, tuple[int, int]] = {}
-    for cells in second_order:
-        order = kind.corners + _edge_order(points, cells, kind)
+    for (kind, cells), order in zip(second_order, orders, strict=True):
         pairs = number[cells[:, np.array(kind.edges)]].reshape(-1, 2)
         middles_of |= dict(zip(cells[:, order].ravel().tolist(),
                                ((a, b) for a, b in pairs.tolist()), strict=True))
@@ -226,6 +247,8 @@ def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
         for block in blocks:
             facets = number[block]
             facets = facets[(facets >= 0).all(axis=1)]
+            if mesh.dimension == 3 and mesh.kind.simplex and facets.shape[1] == 4:
+                facets = cut_faces(facets)
             facets = facets[(np.diff(np.sort(facets, axis=1), axis=1) > 0).all(axis=1)]
             rows += [row.get(frozenset(facet)) for facet in facets.tolist()]
             met.append(facets.ravel())
@@ -255,13 +278,16 @@ def _faces(raw: RawMesh) -> dict[str, list[Integers]]:
 
 
 def _blocks_of_one_kind(cells: list[tuple[str, Integers]]) -> list[tuple[str, Integers]]:
-    """The solid elements of a file, or the plane ones if there are no others."""
+    """The solid elements of a file, or the plane ones if there are no others.
+
+    Of one kind, unless there are wedges or pyramids, with which all are cut into tetrahedra.
+    """
     present = [(kind, block) for kind, block in cells if len(block)]
     solid = [(kind, block) for kind, block in present if kind in SOLID]
     other = sorted({kind for kind, _ in present if kind not in CORNERS})
     if other and (solid or any(kind.startswith(_UNREAD_SOLIDS) for kind in other)):
         raise MeshError(f"The mesh holds solid elements that are not read ({', '.join(other)}); "
-                        f"mesh with tetrahedra or hexahedra of first or second order.")
+                        f"mesh with tetrahedra, hexahedra or wedges of first or second order.")
     if other:
         raise MeshError(f"The mesh holds elements that are not read ({', '.join(other)}); mesh "
                         f"with first-order triangles or quadrilaterals.")
@@ -269,6 +295,8 @@ def _blocks_of_one_kind(cells: list[tuple[str, Integers]]) -> list[tuple[str, In
         raise MeshError("The mesh holds no triangles or quadrilaterals, and no tetrahedra or "
                         "hexahedra; save these elements too.")
     chosen = solid or present
+    if any(CORNERS[kind] in (5, 6) for kind, _ in solid):
+        return chosen
     names = {3: "triangles", 4: "tetrahedra" if solid else "quadrilaterals", 8: "hexahedra"}
     counts: dict[int, int] = {}
     for kind, block in chosen:
@@ -302,12 +330,18 @@ def _require_plane(points: Array, size: float) -> None:
 
 
 def _curved_edges(
-    points: Array, cells: Integers, kind: CellKind, size: float
+    points: Array, cells: Integers, kind: CellKind, order: Integers, size: float
 ) -> tuple[Integers, Array]:
-    """Ends (k, 2) of the curved edges of second-order cells, and their middles (k, d)."""
-    ends = cells[:, np.array(kind.edges)]
-    middles = cells[:, kind.corners + _edge_order(points, cells, kind)]
-    at, middle = points[ends], points[middles]
+    """Ends (k, 2) of the curved edges of second-order cells, and their middles (k, d).
+
+    ``order`` are the columns of the middles of the edges.
+    """
+    return _curved(points, cells[:, np.array(kind.edges)], points[cells[:, order]], size)
+
+
+def _curved(points: Array, ends: Integers, middle: Array, size: float) -> tuple[Integers, Array]:
+    """Of edges (M, e, 2) with middles (M, e, d) those that are not straight."""
+    at = points[ends]
     chord = at[:, :, 1] - at[:, :, 0]
     length = np.linalg.norm(chord, axis=2)
     along = chord / np.maximum(length, np.finfo(float).tiny)[..., None]
