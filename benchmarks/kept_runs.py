@@ -26,18 +26,27 @@ from solids import solid
 
 import fecontact as fc
 from fecontact.core.types import Array
-from fecontact.integrate import CVODE, Rodas5P, Scipy, SetValued
+from fecontact.integrate import (
+    CVODE,
+    EventDriven,
+    PowerSeries,
+    Radau,
+    Rodas5P,
+    Scipy,
+    SetValued,
+    TimeStepping,
+)
 from fecontact.integrate.events import ContactEvents
 
 OUTPUTS, WITHIN = 20, 1e-9
 SYSTEMS, QUICK = 24, 2
 # Solvers and their tolerances.
 SOLVERS: dict[str, tuple[Any, float]] = {
-    "rodas5p": (Rodas5P(series="never", collocation="never"), 1e-6),
-    "series": (Rodas5P(series="always"), 1e-6),
-    "collocation": (Rodas5P(collocation="always"), 1e-9),
-    "events": (SetValued(scheme="events"), 1e-6),
-    "stepping": (SetValued(scheme="stepping"), 1e-4),
+    "rodas5p": (Rodas5P(), 1e-6),
+    "series": (PowerSeries(), 1e-6),
+    "collocation": (Radau(), 1e-9),
+    "events": (EventDriven(), 1e-6),
+    "stepping": (TimeStepping(), 1e-4),
     "rigid": (SetValued(restitution=0.5), 1e-6),
     "scipy": (Scipy(), 1e-6),
     "cvode": (CVODE(), 1e-6),

@@ -47,12 +47,12 @@ QUICK_PART, QUICK_TOLERANCES = 0.25, (4.0, 7.0)
 FINEST, PATIENCE = 1e-11, 60.0
 
 
-def by_scheme(problem: Problem, scheme: str) -> Prepared:
+def by_method(problem: Problem, method: str) -> Prepared:
     """Set-valued runs."""
 
     def prepare(rtol: float) -> Callable[[], Array]:
         run = set_valued.start(problem.system, problem.state, problem.times, rtol=rtol,
-                               scheme=scheme)
+                               method=method)
 
         def solve() -> Array:
             while run.advance(10**9) == RUNNING:
@@ -104,7 +104,8 @@ def siconos(problem: Problem, wanted: Array, quick: bool) -> list[Point]:
 
 def measure(problem: Problem, quick: bool) -> list[str]:
     """Print what was measured on a problem; rows of a table of times at equal errors."""
-    solvers = {EVENTS: by_scheme(problem, "events"), STEPPING: by_scheme(problem, "stepping"),
+    solvers = {EVENTS: by_method(problem, "event-driven"),
+               STEPPING: by_method(problem, "time-stepping"),
                SMOOTHED: by_smoothing(problem)}
     exact = solvers[EVENTS](FINEST)()
     wanted = {EVENTS: exact, STEPPING: exact, SMOOTHED: solvers[SMOOTHED](FINEST)()}

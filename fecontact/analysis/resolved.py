@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import SetValued
+from fecontact.integrate.solvers import SOLVERS, SetValued, solver_by_name
 from fecontact.integrate.trajectory import Status, Trajectory
 
 Flags = NDArray[np.bool_]
@@ -264,8 +264,8 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
     used = run.statistics
     options: dict[str, Any] = {"rtol": min(float(used.get("rtol", 1e-6)), 1e-2)}
     try:
-        if used["solver"] == SetValued().name:
-            options["solver"] = SetValued(**{
+        if _set_valued(run):
+            options["solver"] = solver_by_name(used["solver"], {
                 entry.name: used[entry.name] for entry in fields(SetValued) if entry.name in used})
         with warnings.catch_warnings():
             # The original run has already issued these warnings.
@@ -282,13 +282,17 @@ def _again(run: Trajectory, first: int, times: Array) -> Trajectory | None:
     return again
 
 
+def _set_valued(run: Trajectory) -> bool:
+    return isinstance(SOLVERS.get(run.statistics["solver"]), SetValued)
+
+
 def _limit(run: Trajectory, times: Array) -> Callable[[float], None] | None:
     """Function of the progress that ends a repeated set-valued run that takes far too long.
 
     Where a node is at the border of stick and slip, steps from a state within them can become very
     short.
     """
-    if run.statistics["solver"] != SetValued().name:
+    if not _set_valued(run):
         return None
     part = (times[-1] - times[0]) / (run.time[-1] - run.time[0])
     left = _REPORTS + _REPORTS_MORE * part * float(run.statistics.get("seconds", 0.0))

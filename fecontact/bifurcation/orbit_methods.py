@@ -9,7 +9,7 @@ from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbits.collocation import require_mesh
 from fecontact.bifurcation.orbits.mesh import require_segments
 from fecontact.core.errors import InputError, require_positive
-from fecontact.integrate.solvers import RODAS5P, Rodas5P, SetValued, Solver
+from fecontact.integrate.solvers import AUTO, Solver, require_solver
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Shooting:
         Relative tolerance of the derivatives, as for :func:`fecontact.sensitivity`. With many
         fast modes that the motion hardly excites, 1e-2 saves most of the time and affects only
         their small multipliers; with impacts it makes all multipliers inaccurate.
-    solver : Rodas5P or SetValued
+    solver : Auto, Rodas5P, Radau or SetValued
         What runs the segments. With SetValued orbits have friction without smoothing, from a motion
         of the same solver; they go from event to event, whatever ``segments`` says, where their
         events are known (docs/set-valued.md), else derivatives are differences of its runs.
@@ -89,13 +89,11 @@ class Shooting:
     segments: int = 4
     rtol: float = 1e-9
     derivative_rtol: float | None = None
-    solver: Solver = RODAS5P
+    solver: Solver = AUTO
 
     def __post_init__(self) -> None:
         require_segments(self.segments)
-        if not isinstance(self.solver, Rodas5P | SetValued):
-            raise InputError(f"Shooting: solver = {self.solver!r} must be Rodas5P() or "
-                             f"SetValued().")
+        require_solver(self.solver, "derivatives")
         require_positive("Shooting", rtol=self.rtol)
         if self.derivative_rtol is not None:
             require_positive("Shooting", derivative_rtol=self.derivative_rtol)

@@ -4,19 +4,35 @@ from .field_runs.field_run import FieldRun
 from .initial_state import PointStart, initial_state
 from .sensitivities import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
-from .solvers import CVODE, Rodas5P, Scipy, SetValued, Solver, Task
+from .solvers import (
+    CVODE,
+    Auto,
+    EventDriven,
+    PowerSeries,
+    Radau,
+    Rodas5P,
+    Scipy,
+    SetValued,
+    Solver,
+    Task,
+    TimeStepping,
+)
 from .trajectory import Energies, Solution
 from .wear import WearHistory, wear_history
 
 __all__ = [
     "CVODE",
+    "Auto",
     "ContactEvents",
     "Crossing",
     "Energies",
     "Ensemble",
+    "EventDriven",
     "Events",
     "FieldRun",
     "PointStart",
+    "PowerSeries",
+    "Radau",
     "Rodas5P",
     "Scipy",
     "Sensitivity",
@@ -25,6 +41,7 @@ __all__ = [
     "Solution",
     "Solver",
     "Task",
+    "TimeStepping",
     "WearHistory",
     "initial_state",
     "smoothing_cost",

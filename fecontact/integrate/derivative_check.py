@@ -11,7 +11,7 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensembles import ensemble
-from fecontact.integrate.reference.scipy import largest_motions
+from fecontact.integrate.run_limits import largest_motions
 from fecontact.integrate.solvers import Solver
 from fecontact.system.contact_system import ContactSystem
 

@@ -32,11 +32,17 @@ from fecontact.integrate.lanes.driver import SideBySide, side_by_side
 from fecontact.integrate.rodas5p.driver import again
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.simulate import (
+    require_fields,
     require_max_step,
     require_resolved_span,
-    require_rodas,
 )
-from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
+from fecontact.integrate.solvers import (
+    AUTO,
+    CompiledSolver,
+    Solver,
+    Task,
+    require_solver,
+)
 from fecontact.integrate.step_loop import RUNNING
 from fecontact.integrate.step_runs import ENDS
 from fecontact.integrate.trajectory import Status
@@ -95,7 +101,7 @@ def ensemble(
     times: ArrayLike,
     *,
     initial: Initial | Sequence[Any] = "rest",
-    solver: Solver = RODAS5P,
+    solver: Solver = AUTO,
     rtol: float = 1e-6,
     max_step: float | None = None,
     chain: int = 1,
@@ -105,11 +111,11 @@ def ensemble(
 ) -> Ensemble:
     """Run many systems or fields, or one from many initial states; keep states at a few times.
 
-    The results are those of :func:`fecontact.simulate`, except that Rodas5P does not integrate
-    powers, which do not limit its steps. Threads share the cores. On each, eight runs of plane
-    systems of one node and up to three modes, or two of each, go side by side: on level and even
-    ground, with common laws without memory, constant or harmonic excitation, no events, and not
-    by collocation, unless it is 'always'. They differ by rounding from single runs without it.
+    The results are those of :func:`fecontact.simulate`, except that compiled solvers do not
+    integrate powers, which do not limit their steps. Threads share the cores. On each, eight runs
+    of plane systems of one node and up to three modes, or two of each, go side by side: on level
+    and even ground, with common laws without memory, constant or harmonic excitation, no events,
+    by Rodas5P, or Auto at any tolerance. They differ by rounding from single runs without it.
 
     Parameters
     ----------
@@ -120,7 +126,7 @@ def ensemble(
         Start of each run and the times to keep states at, ascending [s].
     initial : (E, size) array, sequence of E, or one for all
         Initial states, or anything that :func:`fecontact.integrate.initial_state` takes.
-    solver : Rodas5P, SetValued, Scipy or CVODE
+    solver : Auto, Rodas5P, Radau, PowerSeries, SetValued, Scipy or CVODE
         Solver of all runs; see :func:`fecontact.simulate`.
     rtol : float
         Relative tolerance.
@@ -154,19 +160,16 @@ def ensemble(
     status = [Status.INTERRUPTED] * count
     steps = np.zeros(count, dtype=np.int64)
     watched = as_events(events)
-    if watched and not solver.locates_events:
-        raise InputError(f"Events are located only by Rodas5P() and SetValued(), not by "
-                         f"{solver!r}; leave them out.")
+    require_solver(solver, *(["events"] if watched else []))
     seen = [Events.none(state_size(members[0]))] * count
     if not all(isinstance(member, ContactSystem) for member in members):
-        require_rodas(solver)
-    if isinstance(solver, Rodas5P) and solver.checkpoint is not None:
+        require_fields(solver)
+    if isinstance(solver, CompiledSolver) and solver.checkpoint is not None:
         raise InputError(f"solver = {solver!r}: runs of an ensemble keep no checkpoint; leave it "
                          f"out.")
     done, leave = [0], [False]
 
-    series, collocation = (solver.series, solver.collocation) if isinstance(
-        solver, Rodas5P) else ("never", "never")
+    method = solver.method if isinstance(solver, CompiledSolver) else None
 
     def compiled(index: int, state: Array, before: "_Before") -> None:
         system = members[index]
@@ -175,7 +178,7 @@ def ensemble(
             run: Any = again(before.run, before.system, state)
         else:
             run = start_any(system, state, instants[index], rtol=float(rtol), max_step=max_step,
-                            events=watched, series=series, collocation=collocation)
+                            events=watched, method=method or "rodas5p")
         before.keep(system, run)
         result = RUNNING
         while result == RUNNING:
@@ -204,10 +207,10 @@ def ensemble(
             seen[index] = found.events
         status[index], steps[index] = found.status, found.statistics.get("steps", 0)
 
-    run_one = compiled if isinstance(solver, Rodas5P) else other
+    run_one = compiled if method else other
     together: list[SideBySide] = []
-    if isinstance(solver, Rodas5P) and collocation != "always" and not watched:
-        together = side_by_side(members, starts, instants, float(rtol), max_step, series,
+    if method in ("auto", "rodas5p") and not watched:
+        together = side_by_side(members, starts, instants, float(rtol), max_step, method,
                                 int(chain))
     apart = set(range(count)).difference(*(one.numbers for one in together))
     firsts, turn = iter([first for first in range(0, count, chain) if first in apart]), Lock()

@@ -22,7 +22,7 @@ from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.rodas5p.driver import start
 from fecontact.integrate.rodas5p.variational import MOVE
 from fecontact.integrate.simulate import output_times, require_max_step
-from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, require_solver
+from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_solver
 from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Status
 from fecontact.system import kernels
@@ -114,14 +114,14 @@ def sensitivity(
     initial: Initial = "rest",
     outputs: int | ArrayLike = 2,
     parameter: Parameter | None = None,
-    solver: Solver = RODAS5P,
+    solver: Solver = AUTO,
     rtol: float = 1e-8,
     derivative_rtol: float | None = None,
     max_step: float | None = None,
 ) -> Sensitivity:
     """Integrate a motion and its derivatives with respect to initial state and a parameter.
 
-    Runs by collocation (see Rodas5P) solve its derivative at the stages of each step. Else the
+    Runs by collocation (see Radau) solve its derivative at the stages of each step. Else the
     computed steps are differentiated, at fixed step sizes, with second derivatives of laws by
     differences; with more than four modes or two nodes, and no memory, the linear equation of the
     derivatives is solved along the motion. Where a node touches down with a force that jumps, as
@@ -141,7 +141,7 @@ def sensitivity(
     parameter : str, or (function, value), optional
         Dotted name of a number of the system, ``"ground.speed"``; or a function that returns the
         system for a value, and the value.
-    solver : Rodas5P or SetValued
+    solver : Auto, Rodas5P, Radau or SetValued
         Whose steps, or runs, are differentiated.
     rtol : float
         Relative tolerance of the run.
@@ -169,11 +169,11 @@ def sensitivity(
                                             and 1e-13 <= derivative_rtol <= 1.0):
         raise InputError(f"derivative_rtol = {derivative_rtol!r} must be a number from 1e-13 to 1.")
     require_max_step(max_step)
-    require_solver(solver)
+    require_solver(solver, "derivatives")
     state = initial_state(system, initial, t_start)
     found = differentiated(system, times, state, parameter, solver, float(rtol), derivative_rtol,
                            max_step)
-    if isinstance(solver, Rodas5P):
+    if isinstance(solver, CompiledSolver):
         at = None if parameter is None else _function_of(system, parameter)
         found = replace(found, note=doubts(system, times, found.states, found.transitions,
                                            found.forced, at, solver, float(rtol), max_step))
@@ -188,15 +188,16 @@ def differentiated(
     rtol: float, derivative_rtol: float | None = None, max_step: float | None = None,
 ) -> Sensitivity:
     """As :func:`sensitivity`, from a state and without its warning."""
-    if not isinstance(solver, Rodas5P):
+    if not isinstance(solver, CompiledSolver):
         return _differences(system, times, state, parameter, solver, rtol, max_step)
     vary = True if parameter is None else _moved(system, parameter, times, state)
     passed: list[Passage] = []
-    if chosen_collocation(system, rtol, (), solver.collocation) is None:
+    if solver.method == "rodas5p" or chosen_collocation(
+            system, rtol, (), solver.method == "radau") is None:
         passed = passages(system, state, times, rtol, max_step,
                           None if isinstance(vary, bool) else vary)
     run = start(system, state, with_passages(times, passed), rtol=rtol, max_step=max_step,
-                work=False, vary=vary, vary_rtol=derivative_rtol, collocation=solver.collocation)
+                work=False, vary=vary, vary_rtol=derivative_rtol, method=solver.method)
     result = finish(run)
     if result != step_loop.FINISHED:
         raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = "

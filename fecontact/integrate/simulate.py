@@ -18,7 +18,7 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.events import AnyEvent, ContactEvents, Event, as_events
 from fecontact.integrate.field_runs.field_run import FieldRun, field_state, run_field
 from fecontact.integrate.initial_state import Initial, initial_state
-from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver, Task, require_solver
+from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, Task, require_solver
 from fecontact.integrate.trajectory import Solution, Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time
@@ -43,7 +43,7 @@ _GIVEN = 1e-3
 @overload
 def simulate(
     system: ContactSystem, t_end: float, *, t_start: float | None = None,
-    initial: Initial = "rest", outputs: int | ArrayLike = 1001, solver: Solver = RODAS5P,
+    initial: Initial = "rest", outputs: int | ArrayLike = 1001, solver: Solver = AUTO,
     rtol: float = 1e-6, max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     progress: bool | Callable[[float], None] | None = None,
@@ -52,7 +52,7 @@ def simulate(
 def simulate(
     system: VectorField, t_end: float, *, t_start: float | None = None,
     initial: Initial | FieldRun | ArrayLike, outputs: int | ArrayLike = 1001,
-    solver: Solver = RODAS5P, rtol: float = 1e-6, max_step: float | None = None,
+    solver: Solver = AUTO, rtol: float = 1e-6, max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> FieldRun: ...
@@ -63,7 +63,7 @@ def simulate(
     t_start: float | None = None,
     initial: Any = "rest",
     outputs: int | ArrayLike = 1001,
-    solver: Solver = RODAS5P,
+    solver: Solver = AUTO,
     rtol: float = 1e-6,
     max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
@@ -81,15 +81,16 @@ def simulate(
         Initial state; see :func:`fecontact.integrate.initial_state`. Of a field a state, or a run.
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or ascending times [s].
-    solver : Rodas5P, SetValued, Scipy or CVODE
-        Default integrator; set-valued friction and rigid stops; stiff reference solvers.
+    solver : Auto, Rodas5P, Radau, PowerSeries, SetValued, EventDriven, TimeStepping, Scipy or CVODE
+        The default takes one of the three that follow; set-valued friction and rigid stops; stiff
+        reference solvers.
     rtol : float
         Relative tolerance; absolute ones follow from it and the scales of laws, or of states.
     max_step : float, optional
         Longest step [s]; at most a fraction of the shortest period of drive, loads and waves.
         What acts briefly in a field without a period needs a ``max_step``.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        Located within the steps of Rodas5P or SetValued and stored in :attr:`Trajectory.events`.
+        Located within the steps and stored in :attr:`Trajectory.events`.
     progress : bool or callable, optional
         True for a progress bar; a function is called with the time reached [s].
 
@@ -118,10 +119,7 @@ def simulate(
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_max_step(max_step)
-    require_solver(solver)
-    if events is not None and not solver.locates_events:
-        raise InputError(f"Events are located only by Rodas5P() and SetValued(), not by "
-                         f"{solver!r}; leave them out, or evaluate the outputs of the run.")
+    require_solver(solver, *(["events"] if events is not None else []))
     watched = as_events(events)
     if isinstance(system, VectorField):
         if isinstance(moving, ContactSystem):
@@ -130,7 +128,7 @@ def simulate(
                            progress=progress)
             return FieldRun(system.parameters, system.state_names, run.time, run.states, run.status,
                             run.statistics, run.events)
-        require_rodas(solver)
+        require_fields(solver)
         state = field_state(system, initial)
         with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:
             return run_field(system, state, times, rtol=float(rtol), max_step=max_step,
@@ -257,12 +255,12 @@ def _depth_at_rest(system: ContactSystem, time: float) -> float:
         return 0.0
 
 
-def require_rodas(solver: Solver) -> None:
-    """Raise InputError unless a solver runs vector fields."""
-    if (not isinstance(solver, Rodas5P) or solver.checkpoint is not None
-            or "always" in (solver.series, solver.collocation)):
-        raise InputError(f"solver = {solver!r}: vector fields are run by Rodas5P() without a "
-                         f"checkpoint, collocation = 'always' or series = 'always'.")
+def require_fields(solver: Solver) -> None:
+    """Raise InputError unless a solver runs vector fields, which keep no checkpoint."""
+    require_solver(solver, "fields")
+    if isinstance(solver, CompiledSolver) and solver.checkpoint is not None:
+        raise InputError(f"solver = {solver!r}: runs of vector fields keep no checkpoint; leave it "
+                         f"out.")
 
 
 def require_max_step(max_step: Any) -> None:

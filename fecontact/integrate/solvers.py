@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -34,7 +35,7 @@ class Task:
     max_step : float or None
         Longest step [s].
     events : sequence of ContactEvents, Crossing and Event
-        Events to locate; empty unless the solver ``locates_events``.
+        Events to locate; empty unless that is among its ``abilities``.
     progress : callable or None
         Called occasionally with the time reached [s].
     """
@@ -48,18 +49,24 @@ class Task:
     progress: Callable[[float], None] | None = None
 
 
+# What some solvers can do and others cannot, and how a sentence says it.
+ABILITIES = {"events": "locates events", "fields": "runs vector fields",
+             "derivatives": "carries derivatives of the motion along"}
+
+
 class Solver(ABC):
     """Base class of solvers: frozen dataclasses of their options.
 
     Attributes
     ----------
-    locates_events : bool
-        Whether it locates the ``events`` of :func:`fecontact.simulate`.
+    abilities : frozenset of str
+        Those of ``events``, located within steps; ``fields``, runs of vector fields; and
+        ``derivatives`` of the motion, that it has.
     smooth : bool
         Whether forces are functions of the state, so that energy growth without work is an error.
     """
 
-    locates_events: ClassVar[bool] = False
+    abilities: ClassVar[frozenset[str]] = frozenset()
     smooth: ClassVar[bool] = True
 
     @property
@@ -73,27 +80,11 @@ class Solver(ABC):
 
 
 @dataclass(frozen=True)
-class Rodas5P(Solver):
-    """The compiled Rosenbrock method of order 5, for smooth laws of contact and friction.
-
-    Between two switches of contacts whose laws are polynomials piece by piece, without friction,
-    the motion is a power series in time, whose coefficients follow from one another: such systems
-    are integrated by these series instead, to nearly round-off and several times faster.
+class CompiledSolver(Solver):
+    """Base class of the compiled solvers of smooth laws of contact and friction.
 
     Parameters
     ----------
-    series : 'auto', 'always' or 'never'
-        Whether to use power series: by default for up to four modes and nodes, where no mode is
-        several hundred times faster than the slowest motion. They need flat ground, no friction,
-        :class:`~fecontact.laws.RoughSurface` or
-        :class:`~fecontact.laws.LinearContact`, or :class:`~fecontact.laws.PowerContact` or
-        :class:`~fecontact.laws.TwoSidedStop` with exponents 1 or 2, constant or harmonic drives
-        and loads, and no events other than ContactEvents. Sensitivities are those of Rodas5P.
-    collocation : 'auto', 'always' or 'never'
-        Whether to take steps of order 9 instead, which are longer where little error is allowed: by
-        default if ``rtol`` is 1e-7 or less, for plane systems of up to four modes and two nodes
-        on flat ground, of laws without memory, without events; with derivatives or without. A run
-        by series stays one.
     checkpoint : path, optional
         File to which the run is saved every minute and on interruption. If it exists, the run is
         resumed from it with bit-for-bit the same results; it is removed at the end.
@@ -103,39 +94,24 @@ class Rodas5P(Solver):
     Raises
     ------
     InputError
-        If the checkpoint is not a path, or for other values; in a run, if series or collocation
-        are 'always' to be used, and cannot be.
-
-    References
-    ----------
-    G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P, BIT 63 (2023) 27.
+        If the checkpoint is not a path, or for other values; in a run, for a system that the
+        solver cannot run.
     """
 
     checkpoint: str | Path | None = None
     keep_checkpoint: bool = False
-    series: str = "auto"
-    collocation: str = "auto"
 
-    locates_events: ClassVar[bool] = True
-    uses: ClassVar[tuple[str, ...]] = ("auto", "always", "never")
+    method: ClassVar[str]
 
     def __post_init__(self) -> None:
-        for name in ("series", "collocation"):
-            use = getattr(self, name)
-            if use not in self.uses:
-                raise InputError(f"Rodas5P: {name} = {use!r} must be one of "
-                                 f"{choices(self.uses)}{nearest(str(use), self.uses)}.")
-        if self.series == self.collocation == "always":
-            raise InputError("Rodas5P: series and collocation = 'always' exclude each other; leave "
-                             "one of them out.")
         if self.checkpoint is not None:
             as_path(self.checkpoint, "a checkpoint")
-        require_kind("Rodas5P", bool, keep_checkpoint=self.keep_checkpoint)
+        require_kind(type(self).__name__, bool, keep_checkpoint=self.keep_checkpoint)
 
     @property
     def name(self) -> str:
-        """``rodas5p``."""
-        return "rodas5p"
+        """The name of the method."""
+        return self.method
 
     def run(self, task: Task) -> Solution:
         """See :meth:`Solver.run`; InputError for a checkpoint of another run."""
@@ -147,11 +123,69 @@ class Rodas5P(Solver):
                              f"{path.parent}.")
         found = integrate(task.system, task.state, task.times, rtol=task.rtol,
                           max_step=task.max_step, progress=task.progress, checkpoint=path,
-                          events=task.events, series=self.series,
-                          collocation=self.collocation)
+                          events=task.events, method=self.method)
         if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
             path.unlink(missing_ok=True)
         return found
+
+
+@dataclass(frozen=True)
+class Auto(CompiledSolver):
+    """The fastest of the compiled solvers for a system and a tolerance; the default.
+
+    It takes :class:`PowerSeries` where they can be used, with up to four modes and nodes, unless a
+    mode is several hundred times faster than the slowest motion; else :class:`Radau` where it can
+    be used, if ``rtol`` is 1e-7 or less; else :class:`Rodas5P`. Runs that carry derivatives along
+    are not by series; vector fields are run by Rodas5P. ``statistics["method"]`` of a run says
+    which one it was.
+    """
+
+    method: ClassVar[str] = "auto"
+    abilities: ClassVar[frozenset[str]] = frozenset(ABILITIES)
+
+
+@dataclass(frozen=True)
+class Rodas5P(CompiledSolver):
+    """The compiled Rosenbrock method of order 5, for all smooth laws of contact and friction.
+
+    References
+    ----------
+    G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P, BIT 63 (2023) 27.
+    """
+
+    method: ClassVar[str] = "rodas5p"
+    abilities: ClassVar[frozenset[str]] = frozenset(ABILITIES)
+
+
+@dataclass(frozen=True)
+class Radau(CompiledSolver):
+    """Compiled collocation of order 9 (Radau IIA), with long steps where little error is allowed.
+
+    For plane systems of up to four modes and two nodes on flat ground, of laws without memory,
+    without events. Steps end where forces switch.
+
+    References
+    ----------
+    E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., Springer 1996, IV.5.
+    """
+
+    method: ClassVar[str] = "radau"
+    abilities: ClassVar[frozenset[str]] = frozenset({"derivatives"})
+
+
+@dataclass(frozen=True)
+class PowerSeries(CompiledSolver):
+    """Power series in time between switches of contacts, exact to nearly round-off.
+
+    Where laws are polynomials piece by piece, the coefficients of the motion follow from one
+    another. They need a plane system on flat ground without friction, with
+    :class:`~fecontact.laws.RoughSurface` or :class:`~fecontact.laws.LinearContact`, or
+    :class:`~fecontact.laws.PowerContact` or :class:`~fecontact.laws.TwoSidedStop` with exponents 1
+    or 2, constant or harmonic drives and loads, and no events other than ContactEvents.
+    """
+
+    method: ClassVar[str] = "power-series"
+    abilities: ClassVar[frozenset[str]] = frozenset({"events"})
 
 
 class _Coefficients(dict[str, Any]):
@@ -161,7 +195,7 @@ class _Coefficients(dict[str, Any]):
         return hash(frozenset(self.items()))
 
 
-def _coefficient(name: str, given: Any, most: float) -> Any:
+def _coefficient(owner: str, name: str, given: Any, most: float) -> Any:
     """A coefficient as a number, a tuple, or a mapping of these by interfaces.
 
     Raises
@@ -170,13 +204,13 @@ def _coefficient(name: str, given: Any, most: float) -> Any:
         For what is no number from 0 to ``most``.
     """
     if isinstance(given, Mapping):
-        return _Coefficients((str(key), _coefficient(f"{name}.{key}", value, most))
+        return _Coefficients((str(key), _coefficient(owner, f"{name}.{key}", value, most))
                              for key, value in given.items())
-    values = None if isinstance(given, str | bool) else as_floats(given, f"SetValued: {name}")
+    values = None if isinstance(given, str | bool) else as_floats(given, f"{owner}: {name}")
     if values is None or values.ndim > 1 or not ((values >= 0.0) & (values <= most)
                                                  & np.isfinite(values)).all():
         limits = "a number from 0 to 1" if most == 1.0 else "a number, zero or above"
-        raise InputError(f"SetValued: {name} = {shown(given)} must be {limits}, one for each "
+        raise InputError(f"{owner}: {name} = {shown(given)} must be {limits}, one for each "
                          f"contact node, or a mapping from interfaces to such numbers.")
     # Tuples make the solver hashable, and plain numbers go into files.
     return float(values) if values.ndim == 0 else tuple(values.tolist())
@@ -192,7 +226,9 @@ class SetValued(Solver):
         R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
 
     This is the limit of infinite ``smoothing_slope``, which friction laws must have. On solids R
-    and v are vectors along the tangents, R is in the direction of v, and the set is a disc.
+    and v are vectors along the tangents, R is in the direction of v, and the set is a disc. Plane
+    bodies of up to eight independent slip velocities, and all with rigid stops, are run by
+    :class:`EventDriven`, others by :class:`TimeStepping`; ``statistics["method"]`` says which.
 
     Parameters
     ----------
@@ -202,8 +238,6 @@ class SetValued(Solver):
         that are not named have 0.
     static_coefficient : float, (n,) sequence or mapping, optional
         Limit of \|R\|/F in stick [-], given in the same ways; default that of the law.
-    scheme : 'auto', 'events' or 'stepping'
-        Event-driven, for few nodes, or time-stepping, for any number of nodes and for solids.
     impact_law : 'newton' or 'poisson'
         Whether restitution is a ratio of velocities or of impulses. With friction, Newton's law
         gains energy in some impacts unless both coefficients are equal; the status of a run
@@ -220,56 +254,76 @@ class SetValued(Solver):
 
     restitution: Coefficient | None = None
     static_coefficient: Coefficient | None = None
-    scheme: str = "auto"
     impact_law: str = "newton"
     tangential_restitution: Coefficient = 0.0
 
-    locates_events: ClassVar[bool] = True
+    method: ClassVar[str] = "set-valued"
+    abilities: ClassVar[frozenset[str]] = frozenset({"events", "derivatives"})
     smooth: ClassVar[bool] = False
-    schemes: ClassVar[tuple[str, ...]] = ("auto", "events", "stepping")
     impact_laws: ClassVar[tuple[str, ...]] = ("newton", "poisson")
 
     def __post_init__(self) -> None:
+        owner = type(self).__name__
         for name, most in (("restitution", 1.0), ("tangential_restitution", 1.0),
                            ("static_coefficient", np.inf)):
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, _coefficient(name, value, most))
+                object.__setattr__(self, name, _coefficient(owner, name, value, most))
         if self.impact_law not in self.impact_laws:
-            raise InputError(f"SetValued: impact_law = {self.impact_law!r} must be one of "
+            raise InputError(f"{owner}: impact_law = {self.impact_law!r} must be one of "
                              f"{choices(self.impact_laws)}"
                              f"{nearest(str(self.impact_law), self.impact_laws)}.")
         if self.impact_law == "poisson" and self.tangential_restitution != 0.0:
-            raise InputError(f"SetValued: tangential_restitution = {self.tangential_restitution!r} "
-                             f"is for impact_law = 'newton' alone; leave it out.")
+            raise InputError(f"{owner}: tangential_restitution = "
+                             f"{self.tangential_restitution!r} is for impact_law = 'newton' "
+                             f"alone; leave it out.")
         if self.restitution is None and (self.impact_law != "newton"
                                          or self.tangential_restitution != 0.0):
-            raise InputError("SetValued: impact_law and tangential_restitution are for rigid "
-                             "stops; give a restitution too.")
-        if self.scheme not in self.schemes:
-            raise InputError(f"SetValued: scheme = {self.scheme!r} must be one of "
-                             f"{choices(self.schemes)}{nearest(str(self.scheme), self.schemes)}.")
+            raise InputError(f"{owner}: impact_law and tangential_restitution are for "
+                             f"rigid stops; give a restitution too.")
 
     @property
     def name(self) -> str:
-        """``set-valued``."""
-        return "set-valued"
+        """The name of the method."""
+        return self.method
 
     def run(self, task: Task) -> Solution:
         """See :meth:`Solver.run`; InputError for a system that it cannot run."""
         from fecontact.integrate.nonsmooth.driver import integrate_set_valued
-        from fecontact.integrate.reference.scipy import longest_step
+        from fecontact.integrate.run_limits import longest_step
 
         found = integrate_set_valued(
             task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
             impact_law=self.impact_law, tangential_restitution=self.tangential_restitution,
-            static_coefficient=self.static_coefficient, scheme=self.scheme,
+            static_coefficient=self.static_coefficient, method=self.method,
             longest=longest_step(task.system, task.times, task.max_step), max_step=task.max_step,
             events=task.events, progress=task.progress)
         # Options in the statistics make the run reproducible.
         told = {name: getattr(self, name) for name in (
             "restitution", "impact_law", "tangential_restitution", "static_coefficient")}
         return replace(found, statistics=found.statistics | told)
+
+
+@dataclass(frozen=True)
+class EventDriven(SetValued):
+    """:class:`SetValued` from event to event, by steps of order 8 that end at stick and slip.
+
+    For plane bodies whose nodes have independent slip velocities, equal ones counted once.
+    """
+
+    method: ClassVar[str] = "event-driven"
+
+
+@dataclass(frozen=True)
+class TimeStepping(SetValued):
+    """:class:`SetValued` by implicit steps of order 3, for any number of nodes and for solids.
+
+    Steps do not end where nodes begin to stick or slip: there they are of first order. Rigid stops
+    are for solids alone, with Moreau's impacts at the ends of steps; events are not located.
+    """
+
+    method: ClassVar[str] = "time-stepping"
+    abilities: ClassVar[frozenset[str]] = frozenset({"derivatives"})
 
 
 @dataclass(frozen=True)
@@ -290,6 +344,7 @@ class Scipy(Solver):
     method: str = "Radau"
 
     methods: ClassVar[tuple[str, ...]] = ("Radau", "BDF", "LSODA")
+    abilities: ClassVar[frozenset[str]] = frozenset({"events"})
 
     def __post_init__(self) -> None:
         if self.method not in self.methods:
@@ -298,20 +353,22 @@ class Scipy(Solver):
 
     @property
     def name(self) -> str:
-        """The method in small letters."""
-        return self.method.lower()
+        """``scipy-`` and the method in small letters."""
+        return f"scipy-{self.method.lower()}"
 
     def run(self, task: Task) -> Solution:
         """See :meth:`Solver.run`."""
-        from fecontact.integrate.reference.scipy import integrate
+        from fecontact.integrate.reference.driver import integrate
+        from fecontact.integrate.reference.scipy import ScipySteps
 
-        return integrate(task.system, task.state, task.times, method=self.method, rtol=task.rtol,
-                         max_step=task.max_step, progress=task.progress)
+        return integrate(task, partial(ScipySteps, self.method))
 
 
 @dataclass(frozen=True)
 class CVODE(Solver):
     """CVODE of SUNDIALS, as a reference; requires scikit-sundae."""
+
+    abilities: ClassVar[frozenset[str]] = frozenset({"events"})
 
     @property
     def name(self) -> str:
@@ -320,17 +377,18 @@ class CVODE(Solver):
 
     def run(self, task: Task) -> Solution:
         """See :meth:`Solver.run`; MissingLibraryError without scikit-sundae."""
-        from fecontact.integrate.reference.cvode import integrate
+        from fecontact.integrate.reference.cvode import CvodeSteps
+        from fecontact.integrate.reference.driver import integrate
 
-        return integrate(task.system, task.state, task.times, rtol=task.rtol,
-                         max_step=task.max_step, progress=task.progress)
+        return integrate(task, CvodeSteps)
 
 
-# Default solver of all functions.
-RODAS5P, SET_VALUED = Rodas5P(), SetValued()
+# Default solvers.
+AUTO, SET_VALUED = Auto(), SetValued()
 
 SOLVERS: dict[str, Solver] = {solver.name: solver for solver in (
-    RODAS5P, SET_VALUED, *(Scipy(method) for method in Scipy.methods), CVODE())}
+    AUTO, Rodas5P(), Radau(), PowerSeries(), SET_VALUED, EventDriven(), TimeStepping(),
+    *(Scipy(method) for method in Scipy.methods), CVODE())}
 
 
 def solver_by_name(name: str, options: Mapping[str, Any]) -> Solver:
@@ -357,9 +415,19 @@ def _options(solver: Any) -> set[str]:
     return {entry.name for entry in fields(solver)}
 
 
-def require_solver(solver: Any) -> None:
-    """Raise InputError for anything but a solver, such as its name or class."""
+def require_solver(solver: Any, *needed: str) -> None:
+    """Raise InputError for anything but a solver, such as its name, and for one that lacks a need.
+
+    Needs are names of :data:`ABILITIES`.
+    """
     if not isinstance(solver, Solver):
         shown = solver.__name__ if isinstance(solver, type) else repr(solver)
-        raise InputError(f"solver = {shown} must be Rodas5P(), SetValued(), Scipy('Radau') or "
-                         f"CVODE(), with their options.")
+        names = list(dict.fromkeys(type(one).__name__ for one in SOLVERS.values()))
+        raise InputError(f"solver = {shown} must be a solver with its options: one of "
+                         f"{', '.join(f'{name}()' for name in names)}.")
+    for need in needed:
+        if need not in solver.abilities:
+            others = [f"{type(one).__name__}()" for one in SOLVERS.values()
+                      if need in one.abilities]
+            raise InputError(f"solver = {solver!r} is not one that {ABILITIES[need]}; take one of "
+                             f"{', '.join(others)}.")

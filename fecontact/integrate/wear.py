@@ -20,7 +20,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import RODAS5P, Solver
+from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.system.contact_system import ContactSystem
@@ -114,7 +114,7 @@ def wear_history(
     period: float | None = None,
     initial: Initial = "rest",
     outputs: int = 401,
-    solver: Solver = RODAS5P,
+    solver: Solver = AUTO,
     rtol: float = 1e-6,
     progress: bool = False,
 ) -> WearHistory:

@@ -21,7 +21,7 @@ from fecontact.fem.mesh import Mesh
 from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import PointStart, RigidStart
-from fecontact.integrate.solvers import Solver, solver_by_name
+from fecontact.integrate.solvers import SOLVERS, Solver, solver_by_name
 from fecontact.laws.base import PerNode
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
@@ -221,8 +221,9 @@ class SimulationSettings:
     outputs : int
         Number of equally spaced output times, both ends included.
     solver : str
-        'rodas5p', compiled; 'set-valued' friction; 'radau', 'bdf' and 'lsoda' of scipy; 'cvode'
-        of scikit-sundae.
+        'auto', the fastest of 'rodas5p', 'radau' and 'power-series'; 'set-valued' friction,
+        'event-driven' or by 'time-stepping'; 'scipy-radau', 'scipy-bdf', 'scipy-lsoda'; 'cvode' of
+        scikit-sundae.
     rtol : float
         Relative tolerance.
     max_step : float, optional
@@ -239,17 +240,9 @@ class SimulationSettings:
     static_coefficient : float, tuple of float or mapping, optional
         For 'set-valued': limit of R/F in stick [-], given as ``restitution``; default that of the
         law.
-    scheme : str, optional
-        For 'set-valued': 'auto', 'events' for few nodes, or 'stepping'.
-    series : str, optional
-        For 'rodas5p': 'auto', 'always' or 'never'; whether the motion is expanded in power series
-        where forces are polynomials between switches of contacts.
-    collocation : str, optional
-        For 'rodas5p': 'auto', 'always' or 'never'; whether steps are of order 9, which are longer
-        where little error is allowed.
     events : bool
-        For 'rodas5p' and 'set-valued': locate touch-down, lift-off, stick and slip of every
-        contact node and store them with the run.
+        Locate touch-down, lift-off, stick and slip of every contact node and store them with the
+        run.
     stop : list of str
         Events that end the run when they first occur: 'touch-down', 'lift-off', 'stick', 'slip'.
     initial : 'rest', 'sliding', 'preload', RigidStart or PointStart
@@ -262,16 +255,13 @@ class SimulationSettings:
     t_end: Annotated[float | None, Unit("s")] = None
     t_start: Annotated[float, Unit("s")] = 0.0
     outputs: int = 1001
-    solver: str = "rodas5p"
+    solver: str = "auto"
     rtol: float = 1e-6
     max_step: Annotated[float | None, Unit("s")] = None
     restitution: PerNode | dict[str, PerNode] | None = None
     impact_law: str | None = None
     tangential_restitution: PerNode | dict[str, PerNode] | None = None
     static_coefficient: PerNode | dict[str, PerNode] | None = None
-    scheme: str | None = None
-    series: str | None = None
-    collocation: str | None = None
     events: bool = False
     stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding", "preload"] | RigidStart | PointStart = "rest"
@@ -290,19 +280,19 @@ class SimulationSettings:
             self.initial.require_writable("SimulationSettings: initial")
         if self.max_step is not None:
             require_positive("SimulationSettings", max_step=self.max_step)
-        with located("SimulationSettings:", "SetValued", "Rodas5P"):
+        with located("SimulationSettings:", "SetValued", "EventDriven", "TimeStepping"):
             solver = self.chosen_solver()
-        if (self.events or self.stop) and not solver.locates_events:
-            raise InputError(f"SimulationSettings: events and stop are for solver = 'rodas5p' "
-                             f"or 'set-valued', not '{self.solver}'; leave them out.")
+        if (self.events or self.stop) and "events" not in solver.abilities:
+            able = [name for name, one in SOLVERS.items() if "events" in one.abilities]
+            raise InputError(f"SimulationSettings: events and stop are for solver = "
+                             f"{choices(able)}, not '{self.solver}'; leave them out.")
 
     def chosen_solver(self) -> Solver:
         """The solver object with its options."""
         return solver_by_name(self.solver, {
             "restitution": self.restitution, "impact_law": self.impact_law,
             "tangential_restitution": self.tangential_restitution,
-            "static_coefficient": self.static_coefficient, "scheme": self.scheme,
-            "series": self.series, "collocation": self.collocation})
+            "static_coefficient": self.static_coefficient})
 
 
 @dataclass(frozen=True)

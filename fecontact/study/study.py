@@ -27,7 +27,7 @@ from fecontact.core.units import Summarised, listed, quantity
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import Rodas5P
+from fecontact.integrate.solvers import CompiledSolver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.integrate.wear import WearHistory, wear_history
 from fecontact.laws.base import FrictionLaw, NormalLaw
@@ -402,7 +402,7 @@ class Study(Summarised, StudyModels):
         """
         settings, t_end, system = self.simulation, self.t_end, self.system()
         solver = settings.chosen_solver()
-        if isinstance(solver, Rodas5P):
+        if isinstance(solver, CompiledSolver):
             solver = replace(solver, checkpoint=checkpoint, keep_checkpoint=True)
         with located(f"{_title(self.path)}: [output]:"):
             # Check names before the run: an error after a long run would come too late.

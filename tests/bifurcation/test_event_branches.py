@@ -25,7 +25,7 @@ from fecontact.bifurcation import (
     with_normal_form,
 )
 from fecontact.bifurcation.continuation.follow import regular
-from fecontact.integrate import SetValued
+from fecontact.integrate import SetValued, TimeStepping
 from fecontact.laws import ConstantFriction, LinearContact
 
 GRAZING = 4.0 / gain(0.8)
@@ -70,7 +70,7 @@ def test_orbits_of_either_impact_law_are_those_of_runs(law):
 
 def test_time_stepping_is_differenced():
     """Above the largest speed of the mass it slips all the time: a linear oscillator."""
-    solver = SetValued(scheme="stepping")
+    solver = TimeStepping()
     system = forced(speed=3.0)
     motion = periodic_motion(system, solver=solver, rtol=1e-8)
     branch = orbit_branch(
@@ -86,7 +86,7 @@ def test_time_stepping_is_differenced():
 
 
 @pytest.mark.parametrize(("nodes", "instead"), [
-    (1, r"SetValued\(scheme='events'\)"), (2, r"smoothing_slope and Rodas5P\(\)")])
+    (1, r"EventDriven\(\)"), (2, r"smoothing_slope and Auto\(\)")])
 def test_time_stepping_of_stick_slip_names_what_to_take(nodes, instead):
     """Its runs know transitions to first order: Newton's method finds no orbit."""
     system = forced(speed=0.45)
@@ -96,7 +96,7 @@ def test_time_stepping_of_stick_slip_names_what_to_take(nodes, instead):
         basis = fc.basis_from_matrices([[1.0]], [[0.5]], {
             "contact": rows, "B": rows[0], "C": rows[0]}, damping=[[2.0 * DAMPING]])
         system = system.with_(basis=basis)
-    solver = SetValued(scheme="stepping")
+    solver = TimeStepping()
     with pytest.raises(fc.AnalysisError, match=f"runs by time stepping .* take .*{instead}"):
         orbit_branch(contact_field(system, "ground.speed"), motion,
                      method=Shooting(1, solver=solver), bounds=(0.4, 0.5))

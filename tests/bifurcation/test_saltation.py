@@ -37,7 +37,7 @@ from fecontact.laws import (
 W = 90.0
 T = 2.0 * np.pi / W
 DAMPED = LinearContact(2e4, 20.0)
-NEVER = Rodas5P(collocation="never")
+NEVER = Rodas5P()
 START = np.array([5e-3, 0.0, 0.0, 0.0])
 
 

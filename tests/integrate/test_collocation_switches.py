@@ -10,7 +10,7 @@ from systems import friction_oscillator, mass_in_plane, mass_in_y
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, simulate
-from fecontact.integrate import Rodas5P, step_loop
+from fecontact.integrate import Radau, Rodas5P, step_loop
 from fecontact.integrate.collocation import tableau
 from fecontact.integrate.collocation.courses import first_switch
 from fecontact.integrate.rodas5p import driver
@@ -34,15 +34,15 @@ from fecontact.laws import (
     normal_law,
 )
 
-NEVER = Rodas5P(series="never", collocation="never")
+NEVER = Rodas5P()
 # Attempts after which a run counts as one that never ends.
 ENOUGH = 20_000
 
 
-def ended(system, state, times, rtol=1e-8, collocation="always", **options):
+def ended(system, state, times, rtol=1e-8, method="radau", **options):
     """A run that must end by itself, and how it did."""
-    run = driver.start(system, np.array(state), np.array(times), rtol=rtol, series="never",
-                       collocation=collocation, **options)
+    run = driver.start(system, np.array(state), np.array(times), rtol=rtol, method=method,
+                       **options)
     return run, run.advance(ENOUGH)
 
 
@@ -53,14 +53,14 @@ def loaded(*begins):
         PointLoad("B", "x", signal=Step(begin, 1.0)) for begin in begins)))
 
 
-@pytest.mark.parametrize("collocation", ["always", "never"])
+@pytest.mark.parametrize("method", ["radau", "rodas5p"])
 @pytest.mark.parametrize("later", [0.1 + 0.2, 0.3 + 8 * np.spacing(0.3)])
-def test_breaks_a_rounding_apart_are_one(later, collocation):
+def test_breaks_a_rounding_apart_are_one(later, method):
     times = np.linspace(0.0, 0.6, 13)
     system = loaded(0.3, later)
     assert len(system.breakpoints(0.0, 1.0)) == 2
-    run, status = ended(system, np.zeros(4), times, collocation=collocation)
-    same, _ = ended(loaded(0.3, 0.3), np.zeros(4), times, collocation=collocation)
+    run, status = ended(system, np.zeros(4), times, method=method)
+    same, _ = ended(loaded(0.3, 0.3), np.zeros(4), times, method=method)
     assert status == step_loop.FINISHED
     scale = np.abs(same.states).max(axis=0)
     assert np.abs(run.states - same.states).max() < 1e-6 * scale.max()
@@ -154,10 +154,10 @@ RESTS = {
 def test_rounding_does_not_switch(name):
     system, state, end = RESTS[name]
     times = np.linspace(0.0, end, 101)
-    run, status = ended(system, state, times, collocation="auto")
+    run, status = ended(system, state, times, method="radau")
     assert run.collocation is not None
     assert status == step_loop.FINISHED
-    steps, _ = ended(system, state, times, collocation="never")
+    steps, _ = ended(system, state, times, method="rodas5p")
     assert run.attempts < 1.5 * steps.attempts + 20
     tight = simulate(system, end, initial=np.array(state), outputs=times, solver=NEVER, rtol=1e-11)
     scale = np.maximum(np.abs(tight.states).max(axis=0), 1e-12)
@@ -172,10 +172,10 @@ def test_runs_beyond_all_numbers(stiffness, start, work):
     """Steps by collocation and of Rodas5P say the same of a motion beyond all numbers."""
     system = mass_in_y(normal=LinearContact(stiffness), load=Load(9.81),
                        friction=ExponentialFriction(0.8, 0.55, 1000.0, 1e4))
-    for collocation in ("auto", "never"):
+    for method in ("radau", "rodas5p"):
         run, status = ended(system, [start, 0.0], np.linspace(0.0, 1e-3, 11), work=work,
-                            collocation=collocation)
-        assert (run.collocation is not None) == (collocation == "auto")
+                            method=method)
+        assert (run.collocation is not None) == (method == "radau")
         assert status == step_loop.NOT_FINITE
 
 
@@ -223,7 +223,7 @@ def test_what_is_not_a_number_is_an_error(work):
     assert run.progress.counts[REJECTIONS] == 0
     # Where a step in the middle of that run begins.
     part = driver.start(quiet, np.array([0.0, -1.0]), np.array(times), rtol=1e-8, work=work,
-                        series="never", collocation="always", max_step=h)
+                        method="radau", max_step=h)
     part.advance(100)
     begin = part.time
     torn = quiet.with_(normal=Torn(begin + (place - 0.01) * h, begin + (place + 0.01) * h))
@@ -244,7 +244,7 @@ def test_nodes_in_a_gap_end_no_steps(normal, speed):
         stiffness_x=100.0, stiffness_y=100.0, amplitude_x=0.01, amplitude_y=0.01,
         angular_frequency=7.0))
     run = simulate(system, 20.0, initial=np.array([0.1, 0.05, 0.0, 0.0]), outputs=21, rtol=1e-8,
-                   solver=Rodas5P(series="never", collocation="always"))
+                   solver=Radau())
     share = 0.01 * 100.0 / (100.0 - 49.0)
     for start, x in zip((0.1, 0.05), run.displacement("B").T, strict=False):
         wanted = (start * np.cos(10.0 * run.time) + share * (
@@ -261,7 +261,7 @@ def test_force_that_vanishes_and_returns_within_a_step():
     c, d, u, begin, width, beyond = 1e4, 100.0, 1e-3, 0.625, 0.05, 1e-3
     system = mass_in_y(normal=LinearContact(c, d), friction=Frictionless(), load=Load(10.0))
     run = driver.start(system, np.array([-u, 0.0]), np.linspace(0.0, 1.0, 3), rtol=1e-8,
-                       series="never", collocation="always")
+                       method="radau")
     # By powers of x = 2 s - 1: y = -u and y' = c u / d + beyond (1 - ((x - middle) / width)^2).
     middle = 2.0 * begin - 1.0 + width
     step, bend = run.collocation, beyond / width**2

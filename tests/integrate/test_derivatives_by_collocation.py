@@ -12,7 +12,7 @@ from test_small_systems import system as block
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, sensitivity
-from fecontact.integrate import Rodas5P, step_loop
+from fecontact.integrate import Radau, Rodas5P, step_loop
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.sensitivities import _moved
 from fecontact.laws import (
@@ -31,14 +31,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "laws"))
 from test_friction_laws import every_law
 from test_normal_laws import LAWS as NORMAL_LAWS
 
-LONG, STEPS = Rodas5P(collocation="always"), Rodas5P(series="never", collocation="never")
+LONG, STEPS = Radau(), Rodas5P()
 GRAVITY = 9.81
 
 
 def run_over(system, state, times, rtol, vary=False, pieces=10**9, **options):
     """A run by collocation, in pieces of so many steps."""
     run = driver.start(system, np.asarray(state, dtype=float), np.asarray(times, dtype=float),
-                       rtol=rtol, work=False, vary=vary, collocation="always", **options)
+                       rtol=rtol, work=False, vary=vary, method="radau", **options)
     while (status := run.advance(pieces)) == step_loop.RUNNING:
         pass
     assert status == step_loop.FINISHED
@@ -50,7 +50,7 @@ def run_over(system, state, times, rtol, vary=False, pieces=10**9, **options):
 def one_step(system, state, h, vary=False):
     """End of a step of exactly this length, and its derivatives; None where it is cut short."""
     run = driver.start(system, state, np.array([BEGIN, BEGIN + h]), rtol=1e-10, work=False,
-                       vary=vary, vary_rtol=1e8, collocation="always")
+                       vary=vary, vary_rtol=1e8, method="radau")
     run.progress.numbers[step_loop.STEP] = h
     run.advance(1)
     if run.outputs < 2 or run.attempts != 1:

@@ -41,7 +41,7 @@ def oscillator(**parts):
 def one_step(system, state, h, vary=False):
     """End of a step of exactly this length, and its derivatives; None where it is cut short."""
     run = driver.start(system, state, np.array([BEGIN, BEGIN + h]), rtol=1e8, work=False,
-                       vary=vary, vary_rtol=1e8, series="never")
+                       vary=vary, vary_rtol=1e8, method="rodas5p")
     run.progress.numbers[step_loop.STEP] = h
     run.advance(1)
     if run.outputs < 2 or run.attempts != 1:

@@ -13,7 +13,7 @@ from fecontact.integrate.trajectory import Status
 from fecontact.laws import Frictionless, LinearContact
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
-STEPS = Rodas5P(series="never", collocation="never")
+STEPS = Rodas5P()
 GRAVITY = 9.81
 # Error over the height of the drop.
 BOUNCES = 5e-4
@@ -64,7 +64,7 @@ def test_bounces_side_by_side():
     for w, drop in STARTS[::4]:
         times = bounces(drop)
         alone = driver.start(bouncing(w), np.array([drop, 0.0]), times, rtol=1e-6, work=False,
-                             series="never", collocation="never")
+                             method="rodas5p")
         alone.advance(10**9)
         runs = ensemble(bouncing(w), times, initial=[[drop, 0.0]] * 3, solver=STEPS)
         for states, steps in zip(runs.states, runs.steps, strict=True):

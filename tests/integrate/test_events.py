@@ -15,7 +15,16 @@ from fecontact import (
     simulate,
     write_case,
 )
-from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
+from fecontact.integrate import (
+    CVODE,
+    Auto,
+    ContactEvents,
+    Crossing,
+    PowerSeries,
+    Radau,
+    Rodas5P,
+    Scipy,
+)
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.driver import start
 from fecontact.laws import JenkinsFriction, LinearContact
@@ -29,32 +38,39 @@ def drop():
 
 
 START = np.array([0.0, -1.0])
+# Solvers that locate events, and the error of their times at rtol = 1e-10.
+LOCATING = pytest.mark.parametrize(("solver", "error"), [
+    (Rodas5P(), 1e-9), (PowerSeries(), 1e-10), (Scipy("Radau"), 1e-7), (Scipy("BDF"), 1e-7),
+    (Scipy("LSODA"), 1e-7), (CVODE(), 1e-7)], ids=lambda one: getattr(one, "name", None))
 
 
-def test_drop_on_a_spring():
-    run = simulate(drop(), 1.1, initial=START, outputs=3, events=ContactEvents(), rtol=1e-10)
-    assert run.events.only("touch-down").time == pytest.approx([0.54031242374328], abs=1e-9)
-    assert run.events.only("lift-off").time == pytest.approx([0.88545615307643], abs=1e-9)
-    assert run.events.states[0, 0] == pytest.approx(-2.0, abs=1e-8)
+@LOCATING
+def test_drop_on_a_spring(solver, error):
+    run = simulate(drop(), 1.1, initial=START, outputs=3, events=ContactEvents(), rtol=1e-10,
+                   solver=solver)
+    assert run.events.only("touch-down").time == pytest.approx([0.54031242374328], abs=error)
+    assert run.events.only("lift-off").time == pytest.approx([0.88545615307643], abs=error)
+    assert run.events.states[0, 0] == pytest.approx(-2.0, abs=10.0 * error)
     assert (run.events.node == 0).all()
     assert run.status is Status.FINISHED
     # Frictionless: x never moves, so the node sticks while it touches.
     assert run.events.kind == ("touch-down", "stick", "lift-off")
 
 
+@LOCATING
 @pytest.mark.parametrize(("stop", "when"), [
     ("touch-down", 0.54031242374328), ("lift-off", 0.88545615307643)])
-def test_a_run_stops_at_an_event(stop, when):
+def test_a_run_stops_at_an_event(stop, when, solver, error):
     run = simulate(drop(), 1.1, initial=START, outputs=111, events=ContactEvents(stop=stop),
-                   rtol=1e-10)
+                   rtol=1e-10, solver=solver)
     assert run.status is Status.EVENT
-    assert run.time[-1] == pytest.approx(when, abs=1e-9)
+    assert run.time[-1] == pytest.approx(when, abs=error)
     assert run.events.time[-1] == run.time[-1]
     assert run.states[-1] == pytest.approx(run.events.states[-1])
     assert len(run.time) == 2 + int(when / 0.01)
-    assert run.energies.imbalance < 1e-8
+    assert run.energies.imbalance < 10.0 * error
     whole = simulate(drop(), 1.1, initial=START, outputs=111, rtol=1e-10)
-    assert run.states[:-1] == pytest.approx(whole.states[: len(run.time) - 1], abs=1e-9)
+    assert run.states[:-1] == pytest.approx(whole.states[: len(run.time) - 1], abs=10.0 * error)
 
 
 def test_turning_points_are_crossings():
@@ -74,12 +90,14 @@ def _energy(t, y, p):
     return 0.5 * y[1] ** 2 - p[0]
 
 
-def test_own_events():
+@pytest.mark.parametrize("solver", [Auto(), Scipy("Radau"), Scipy("BDF"), Scipy("LSODA"), CVODE()],
+                         ids=lambda one: one.name)
+def test_own_events(solver):
     """Free fall with 10 m/s2 from rest: 2 J of kinetic energy at t = 0.2 s."""
-    run = simulate(drop(), 0.5, initial=np.zeros(2), rtol=1e-10,
+    run = simulate(drop(), 0.5, initial=np.zeros(2), rtol=1e-10, solver=solver,
                    events=[Event(_energy, [2.0], stop=True), Crossing("B", "y", value=-0.05)])
     assert run.events.kind == ("event 1", "event 0")
-    assert run.events.time == pytest.approx([0.1, 0.2], abs=1e-10)
+    assert run.events.time == pytest.approx([0.1, 0.2], abs=1e-10 if solver == Auto() else 1e-8)
     assert run.status is Status.EVENT
 
 
@@ -97,6 +115,34 @@ def test_stick_and_slip_of_the_belt_oscillator():
     assert len(found) == len(changed)
     assert (run.time[changed] <= found).all()
     assert (found <= run.time[changed + 1]).all()
+
+
+@pytest.mark.parametrize("solver", [Scipy("Radau"), Scipy("BDF"), CVODE()],
+                         ids=lambda one: one.name)
+@pytest.mark.parametrize(("parts", "end"), [
+    ({"drive.amplitude_x": 0.0}, 3.0), ({"friction": JenkinsFriction(2e5, 0.4)}, 1.0)],
+    ids=["Stribeck", "Jenkins"])
+def test_other_solvers_find_the_events_of_the_compiled_one(solver, parts, end):
+    """Stick and slip, and passages either way, with elements that end to slide within steps."""
+    system = friction_oscillator(2, **parts)
+    settings = {"rtol": 1e-7, "outputs": 11,
+                "events": [ContactEvents(), Crossing("B", "x", of="velocity")]}
+    own = simulate(system, end, **settings).events
+    other = simulate(system, end, solver=solver, **settings).events
+    assert {"stick", "slip", "event 0"} <= set(own.kind)
+    assert other.kind == own.kind
+    assert (other.node == own.node).all()
+    assert other.time == pytest.approx(own.time, abs=2e-5)
+    assert other.states[:, :2] == pytest.approx(own.states[:, :2], abs=2e-6)
+
+
+@pytest.mark.parametrize("solver", [Scipy("BDF"), CVODE()], ids=lambda one: one.name)
+def test_events_do_not_change_the_steps_of_other_solvers(solver):
+    settings = {"initial": START, "outputs": 23, "rtol": 1e-7, "solver": solver}
+    alone = simulate(drop(), 1.1, **settings)
+    watched = simulate(drop(), 1.1, **settings, events=[ContactEvents(), Crossing("B", "y")])
+    np.testing.assert_array_equal(watched.states, alone.states)
+    assert watched.statistics["steps"] == alone.statistics["steps"]
 
 
 def test_friction_with_memory_by_the_same_definition_as_plots():
@@ -148,15 +194,14 @@ def test_bad_input():
         Crossing("B", "x", value=float("nan"))
     with pytest.raises(InputError, match="events: 'touch-down' must be"):
         simulate(drop(), 1.0, initial=START, events=["touch-down"])
-    with pytest.raises(InputError, match=r"SetValued\(\), not by Scipy\(method='Radau'\)"):
-        simulate(drop(), 1.0, initial=START, events=ContactEvents(),
-                 solver=Scipy("Radau"))
+    with pytest.raises(InputError, match=r"Radau\(.*\) is not one that locates events; take"):
+        simulate(drop(), 1.0, initial=START, events=ContactEvents(), solver=Radau())
 
 
 def test_events_of_the_piece_that_is_interrupted_are_kept():
     """A signal that comes while compiled code runs shows when that has returned."""
     given = impact_oscillator(2, 9.845), np.zeros(4), np.linspace(0.0, 30.0, 301)
-    run, whole = (start(*given, rtol=1e-6, events=[ContactEvents()], series="never")
+    run, whole = (start(*given, rtol=1e-6, events=[ContactEvents()], method="rodas5p")
                   for _ in range(2))
     step = run._loop
 
@@ -177,17 +222,17 @@ def test_events_survive_a_checkpoint(tmp_path):
     """A run that is interrupted and taken up again finds the same events."""
     system, file = impact_oscillator(2, 9.845), tmp_path / "run.checkpoint"
     whole = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(),
-                     solver=Rodas5P(series="never"))
+                     solver=Rodas5P())
 
     def stop(time):
         if time > 5.0:
             raise KeyboardInterrupt
 
     part = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(),
-                    solver=Rodas5P(file, series="never"), progress=stop)
+                    solver=Rodas5P(file), progress=stop)
     assert part.status is Status.INTERRUPTED
     rest = simulate(system, 30.0, initial=np.zeros(4), events=ContactEvents(),
-                    solver=Rodas5P(file, series="never"))
+                    solver=Rodas5P(file))
     assert 0 < len(part.events) < len(whole.events)
     assert (rest.events.time == whole.events.time).all()
     assert rest.events.kind == whole.events.kind

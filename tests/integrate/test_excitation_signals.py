@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import fecontact as fc
-from fecontact.integrate import Scipy
-from fecontact.integrate.reference import scipy
+from fecontact.integrate import Scipy, run_limits
 from fecontact.integrate.rodas5p import driver
 from fecontact.laws import (
     Constant,
@@ -157,8 +156,8 @@ def test_longest_steps_resolve_what_is_given_in_time():
     for period, system in cases.items():
         assert driver.longest_step(system, times) == pytest.approx(min(10.0, period / 4.0))
         assert driver.longest_step(system, times, 0.06) == pytest.approx(min(0.06, period / 4.0))
-        assert scipy.longest_step(system, times) == pytest.approx(min(0.2, period / 20.0))
-        assert scipy.longest_step(system, times, 0.02) == pytest.approx(
+        assert run_limits.longest_step(system, times) == pytest.approx(min(0.2, period / 20.0))
+        assert run_limits.longest_step(system, times, 0.02) == pytest.approx(
             min(0.02, period / 20.0))
     ramp = point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02,
                                   motion=SpeedRamp(0.8, start=1.0, duration=1.0)))

@@ -14,7 +14,7 @@ from fecontact.bifurcation import (
     periodic_motion,
     vector_field,
 )
-from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
+from fecontact.integrate import ContactEvents, Crossing, PowerSeries, Rodas5P, Scipy
 from fecontact.integrate.field_runs.stepper import start_field
 
 
@@ -302,9 +302,9 @@ def test_parts_of_runs():
     ({}, "no place at rest"),
     ({"initial": [1.0, 2.0]}, "must be 3 finite numbers, x, y, z"),
     ({"initial": [1.0, 2.0, np.nan]}, "must be 3 finite numbers"),
-    ({"initial": np.ones(3), "solver": Scipy("Radau")}, "run by Rodas5P"),
-    ({"initial": np.ones(3), "solver": Rodas5P(checkpoint="a.npz")}, "without a checkpoint"),
-    ({"initial": np.ones(3), "solver": Rodas5P(series="always")}, "or series = 'always'"),
+    ({"initial": np.ones(3), "solver": Scipy("Radau")}, "not one that runs vector fields"),
+    ({"initial": np.ones(3), "solver": Rodas5P(checkpoint="a.npz")}, "keep no checkpoint"),
+    ({"initial": np.ones(3), "solver": PowerSeries()}, r"take one of Auto\(\), Rodas5P\(\)\."),
     ({"initial": np.ones(3), "events": ContactEvents()}, "no contact nodes"),
     ({"initial": np.ones(3), "events": Crossing("w")}, "no state 'w'"),
     ({"initial": np.ones(3), "events": Crossing("x", "y")}, "the name of one alone"),
@@ -318,8 +318,8 @@ def test_errors_of_runs(arguments, told):
 def test_ensembles_keep_no_checkpoint():
     with pytest.raises(fc.InputError, match="keep no checkpoint; leave it out"):
         fc.ensemble(impact_oscillator(2), [0.0, 0.1], solver=Rodas5P(checkpoint="a.npz"))
-    with pytest.raises(fc.InputError, match="or series = 'always'"):
-        fc.ensemble(LORENZ, [0.0, 0.1], initial=np.ones(3), solver=Rodas5P(series="always"))
+    with pytest.raises(fc.InputError, match="not one that runs vector fields"):
+        fc.ensemble(LORENZ, [0.0, 0.1], initial=np.ones(3), solver=PowerSeries())
 
 
 def test_contact_systems_need_a_component():

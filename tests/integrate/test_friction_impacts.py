@@ -400,7 +400,8 @@ def test_compliant_stops_approach_rigid_ones():
     _, exact = go(rigid, [0.0, 0.5, 0.0], [3.0, 0.0, 0.0], times, restitution=1.0, **kinds)
     for stiffness in (1e6, 1e8):
         soft = body([(0.0, 0.0)], 0.1, load=Load(10.0), normal=LinearContact(stiffness))
-        _, motion = go(soft, [0.0, 0.5, 0.0], [3.0, 0.0, 0.0], times, scheme="events", **kinds)
+        _, motion = go(soft, [0.0, 0.5, 0.0], [3.0, 0.0, 0.0], times, method="event-driven",
+                       **kinds)
         errors.append(np.abs(motion[:, 1] - exact[:, 1]).max())
         assert motion[-1, 3] == pytest.approx(exact[-1, 3], rel=1e-2)
     assert errors[0] / errors[1] == pytest.approx(10.0, rel=0.05)

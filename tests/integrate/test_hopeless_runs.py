@@ -9,11 +9,11 @@ from systems import friction_oscillator, impact_oscillator
 
 import fecontact as fc
 from fecontact.core.errors import InputError
-from fecontact.integrate import Rodas5P, Scipy, SetValued
+from fecontact.integrate import Auto, Radau, Rodas5P, Scipy, SetValued
 from fecontact.integrate.nonsmooth import driver
 from fecontact.integrate.step_loop import MINIMUM_STEP, RUNNING, STEP
 
-SOLVERS = (Rodas5P(), Rodas5P(series="never"), Rodas5P(collocation="always"), Scipy("LSODA"))
+SOLVERS = (Auto(), Rodas5P(), Radau(), Scipy("LSODA"))
 
 
 @pytest.mark.parametrize("frequency", [1e12, 1e30, 1e60])
@@ -54,12 +54,12 @@ def test_short_runs_of_fast_drives_end():
     assert np.abs(run.modal_coordinates - run.modal_coordinates[0]).max() < 1e-12
 
 
-@pytest.mark.parametrize("scheme", ["events", "stepping"])
-def test_set_valued_runs_whose_steps_stay_too_short_end_with_a_status(scheme):
+@pytest.mark.parametrize("method", ["event-driven", "time-stepping"])
+def test_set_valued_runs_whose_steps_stay_too_short_end_with_a_status(method):
     """Steps of at most 1e-14 s, as where impacts follow each other ever closer."""
     system = friction_oscillator()
     run = driver.start(system, np.zeros(system.size), np.linspace(0.0, 1.0, 11), rtol=1e-6,
-                       scheme=scheme)
+                       method=method)
     data, = run.loop.args
     slow = data._replace(limits=data.limits._replace(longest=1e-13))
     run = replace(run, loop=partial(run.loop.func, slow))

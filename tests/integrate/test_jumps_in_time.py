@@ -64,10 +64,10 @@ def test_step_response(solver, dashpot, kind):
     assert np.abs(energies.imbalance).max() < 1e-4 * STIFFNESS * static**2
 
 
-@pytest.mark.parametrize("scheme", ["events", "stepping"])
-def test_step_response_of_set_valued_schemes(scheme):
+@pytest.mark.parametrize("method", ["event-driven", "time-stepping"])
+def test_step_response_of_set_valued_schemes(method):
     system = point(10.0, load=Step(AT, FORCE))
-    run = integrate_set_valued(system, np.zeros(2), TIMES, rtol=1e-6, scheme=scheme)
+    run = integrate_set_valued(system, np.zeros(2), TIMES, rtol=1e-6, method=method)
     x = run.states[:, 0] * system.basis.T[0, 0, 0] * STIFFNESS / FORCE
     assert x == pytest.approx(response(TIMES, 10.0), abs=1e-4)
     m = system.basis.modes
@@ -82,8 +82,8 @@ def test_a_sticking_mass_breaks_away_at_the_step():
     system = fc.ContactSystem(
         basis, normal=PrescribedForce(2.0), friction=ConstantFriction(0.5),
         load=fc.Load(0.0, (fc.PointLoad("C", "x", signal=Step(AT, 3.0)),)))
-    for scheme in ("events", "stepping"):
-        run = integrate_set_valued(system, np.zeros(2), TIMES, rtol=1e-8, scheme=scheme)
+    for method in ("event-driven", "time-stepping"):
+        run = integrate_set_valued(system, np.zeros(2), TIMES, rtol=1e-8, method=method)
         since = np.maximum(TIMES - AT, 0.0)
         assert run.states[:, 0] == pytest.approx(since**2, abs=1e-8)
         assert run.statistics["steps"] < 300

@@ -47,7 +47,7 @@ from fecontact.laws import (
 
 UP, ALONG = np.array([[0.0], [1.0]]), np.array([[1.0], [0.0]])
 HERTZ = 0.5 / np.pi
-LANES_ONLY = Rodas5P(series="never")
+LANES_ONLY = Rodas5P()
 
 
 @normal_law
@@ -81,7 +81,8 @@ def slider(**parts):
 
 
 def single(system, state, times, rtol, **options):
-    run = driver.start(system, state, times, rtol=rtol, work=False, series="never", **options)
+    run = driver.start(system, state, times, rtol=rtol, work=False,
+                       **{"method": "rodas5p"} | options)
     run.advance(10**9)
     assert run.outputs == len(times)
     return run
@@ -126,7 +127,7 @@ def test_each_run_is_that_of_a_single_one(name):
     assert (found.states[:, 0] == 0.0).all()
     for system, states, steps in zip(systems, found.states, found.steps, strict=True):
         exact = single(system, state, times, 1e-11).states
-        own = single(system, state, times, 1e-7, collocation="never")
+        own = single(system, state, times, 1e-7, method="rodas5p")
         size = np.abs(exact).max(axis=0) + 1e-300
         off = (np.abs(states - exact) / size).max()
         assert off < max(2e-5, 3.0 * (np.abs(own.states - exact) / size).max())

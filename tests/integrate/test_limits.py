@@ -18,7 +18,7 @@ from fecontact import (
     simulate,
     static_equilibrium,
 )
-from fecontact.integrate import CVODE, SetValued, initial_state, smoothing_cost
+from fecontact.integrate import CVODE, EventDriven, initial_state, smoothing_cost
 from fecontact.laws import (
     Constant,
     ConstantFriction,
@@ -80,13 +80,13 @@ def test_users_are_told_what_smoothing_costs():
 def test_options_of_set_valued_runs():
     system = friction_oscillator(2, **{"drive.amplitude_x": 0.0})
     run = simulate(system, 2.3, outputs=2301,
-                   solver=SetValued(static_coefficient=0.9, scheme="events"))
+                   solver=EventDriven(static_coefficient=0.9))
     assert run.status is Status.FINISHED
     # The belt stretches the spring of 5610 N/m by 1 mm/s until the contact holds no longer.
     pull = np.abs(run.friction_force[:, 0]) / run.normal_force[:, 0]
     assert pull.max() == pytest.approx(0.9, rel=1e-3)
     assert run.time[np.argmax(pull)] == pytest.approx(0.9 * 14.0 / 5.61, rel=1e-3)
-    assert run.statistics["solver"] == "set-valued"
+    assert run.statistics["solver"] == run.statistics["method"] == "event-driven"
     assert run.statistics["static_coefficient"] == 0.9
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import fecontact as fc
-from fecontact.integrate import SetValued
+from fecontact.integrate import SetValued, TimeStepping
 from fecontact.laws import ConstantFriction, PrescribedForce
 
-STEPPING = SetValued(scheme="stepping")
+STEPPING = TimeStepping()
 
 
 def block(**parts):

@@ -167,4 +167,4 @@ def test_bad_input():
         _ = sensitivity(system, 0.01).parameter_derivative
     with pytest.raises(AnalysisError, match="before t_end"):
         sensitivity(mass_in_y(normal=PowerContact(1e6, exponent=6.0)), 0.1, initial=[0.0, -9e59],
-                    solver=Rodas5P(collocation="never"))
+                    solver=Rodas5P())

@@ -12,7 +12,7 @@ from fecontact import ContactSystem, Drive, Load, ModalBasis, PointLoad, Status,
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import InputError
 from fecontact.core.records import Matrix, Vector
-from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
+from fecontact.integrate import Auto, ContactEvents, Crossing, PowerSeries, Rodas5P, Scipy
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.series import polynomials
 from fecontact.integrate.series.branches import MOST_MODES
@@ -29,7 +29,8 @@ from fecontact.laws import (
 )
 from fecontact.laws.pieces import DAMPING, ELASTIC, LOWER, RELEASE, UPPER
 
-SERIES, STEPS = Rodas5P(series="always"), Rodas5P(series="never")
+SERIES, STEPS = PowerSeries(), Rodas5P()
+SOLVERS = {solver.name: solver for solver in (Auto(), SERIES, STEPS)}
 
 
 @kernel
@@ -80,8 +81,8 @@ def assert_as_by_steps(seed):
     system, state, end = random_system(np.random.default_rng(seed))
     times = np.linspace(0.0, end, 41)
     runs = []
-    for rtol, series in ((1e-9, "always"), (1e-8, "never"), (1e-11, "never")):
-        run = driver.start(system, state, times, rtol=rtol, series=series,
+    for rtol, method in ((1e-9, "power-series"), (1e-8, "rodas5p"), (1e-11, "rodas5p")):
+        run = driver.start(system, state, times, rtol=rtol, method=method,
                            events=(ContactEvents(),))
         while run.advance(10_000) == 0:
             pass
@@ -213,7 +214,7 @@ def test_errors_follow_the_tolerance(rtol):
         stiffness_y=50.0, amplitude_y=1e-3, angular_frequency=40.0))
     state = np.array([1e-3, -2e-4, 0.1, 0.0])
     times = np.linspace(0.0, 1.0, 301)
-    run = driver.start(system, state, times, rtol=rtol, work=False, series="always")
+    run = driver.start(system, state, times, rtol=rtol, work=False, method="power-series")
     run.advance(10**6)
     s = system.arrays
     A = np.block([[np.zeros((2, 2)), np.eye(2)], [-s.stiffness, -s.damping]])
@@ -279,7 +280,7 @@ def graze(rng, depth):
                         gap=-top.fun * (1.0 - depth))
     state = np.concatenate([a * np.sin(phases), w * a * np.cos(phases)])
     run = driver.start(system, state, np.array([0.0, end]), rtol=1e-11, work=False,
-                       events=(ContactEvents(),), series="always")
+                       events=(ContactEvents(),), method="power-series")
     run.advance(10**5)
     return "touch-down" in run.events.kind
 
@@ -347,7 +348,7 @@ def test_runs_go_on_bit_for_bit():
 
 def test_a_checkpoint_of_series(tmp_path):
     system, file = impact_oscillator(2, 9.845), tmp_path / "run.checkpoint"
-    solver = Rodas5P(file, series="always")
+    solver = PowerSeries(file)
     options = {"initial": np.zeros(4), "events": ContactEvents(), "outputs": 20001}
     whole = simulate(system, 400.0, **options, solver=SERIES)
 
@@ -358,7 +359,7 @@ def test_a_checkpoint_of_series(tmp_path):
     part = simulate(system, 400.0, **options, solver=solver, progress=stop)
     assert part.status is Status.INTERRUPTED
     with pytest.raises(InputError, match="checkpoint of another run"):
-        simulate(system, 400.0, **options, solver=Rodas5P(file, series="never"))
+        simulate(system, 400.0, **options, solver=Rodas5P(file))
     rest = simulate(system, 400.0, **options, solver=solver)
     assert 0 < len(part.events) < len(whole.events)
     assert (rest.states == whole.states).all()
@@ -421,7 +422,7 @@ def test_the_tolerance_holds_on_another_integrator():
 def test_what_series_are_not_for(changes, events, said):
     system = oscillator(**changes)
     options = {"initial": np.zeros(4), "outputs": 11, "events": events}
-    with pytest.raises(InputError, match=f"series = 'always' is for .* but {said}.*leave it out"):
+    with pytest.raises(InputError, match=rf"PowerSeries\(\) is for .* but {said}.*take Auto\(\)"):
         simulate(system, 0.01, **options, solver=SERIES)
     taken, steps = (simulate(system, 0.01, **options, solver=solver)
                     for solver in (Rodas5P(), STEPS))
@@ -443,18 +444,16 @@ def test_when_they_are_taken():
     assert not takes(oscillator((10.0, 3e3), (0.0, 0.9)))
     assert takes(oscillator((10.0, 3e3), (0.0, 0.01)))
     assert not takes(oscillator((10.0, 1e4), (0.0, 0.01)))
-    with pytest.raises(InputError, match="Rodas5P: series = 'allways' must be one of 'always'"):
-        Rodas5P(series="allways")
 
 
 def test_ensembles_and_derivatives():
     systems = [impact_oscillator(2, w) for w in (20.0, 64.32)]
     times = np.linspace(0.0, 0.5, 6)
-    found = {use: fc.ensemble(systems, times, initial=np.zeros(4), solver=Rodas5P(series=use),
-                              rtol=1e-9) for use in ("auto", "always", "never")}
-    assert (found["auto"].states == found["always"].states).all()
-    assert found["auto"].states == pytest.approx(found["never"].states, rel=1e-5, abs=1e-8)
-    assert (found["auto"].steps < found["never"].steps).all()
+    found = {use: fc.ensemble(systems, times, initial=np.zeros(4), solver=solver,
+                              rtol=1e-9) for use, solver in SOLVERS.items()}
+    assert (found["auto"].states == found["power-series"].states).all()
+    assert found["auto"].states == pytest.approx(found["rodas5p"].states, rel=1e-5, abs=1e-8)
+    assert (found["auto"].steps < found["rodas5p"].steps).all()
     run = driver.start(systems[0], np.zeros(4), times, rtol=1e-6, vary=True)
     assert run.series is None
 
@@ -465,7 +464,7 @@ def test_what_small_systems_take_for_granted(modes, nodes):
     system = oscillator(np.linspace(5.0, 300.0, modes), np.full(modes, 0.01),
                         rng.normal(size=(nodes, modes)), load=Load(1.0))
     state = 1e-3 * rng.normal(size=2 * modes)
-    runs = [driver.start(system, state, np.linspace(0.0, 0.2, 11), rtol=1e-8, series="always")
+    runs = [driver.start(system, state, np.linspace(0.0, 0.2, 11), rtol=1e-8, method="power-series")
             for _ in range(2)]
     said = SMALL.values(modes, nodes)
     for values in (runs[0].problem, runs[0].progress, runs[0].output, runs[0].watch,

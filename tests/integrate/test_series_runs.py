@@ -5,11 +5,11 @@ import pytest
 from systems import impact_oscillator, mass_in_y
 
 from fecontact import ContactSystem, Ground, Load, ModalBasis, Status, simulate
-from fecontact.integrate import ContactEvents, Rodas5P, step_loop
+from fecontact.integrate import Auto, ContactEvents, PowerSeries, Rodas5P, step_loop
 from fecontact.integrate.rodas5p import driver
 from fecontact.laws import ConstantFriction, LinearContact, SpeedRamp, TwoSidedStop
 
-SERIES, STEPS = Rodas5P(series="always"), Rodas5P(series="never")
+SERIES, STEPS = PowerSeries(), Rodas5P()
 FRICTIONLESS = ConstantFriction(0.0)
 
 
@@ -25,7 +25,7 @@ def bouncing(nodes):
 
 def test_more_nodes_than_coefficients():
     times, start = np.linspace(0.0, 0.5, 51), np.array([0.01, 0.0])
-    runs = [driver.start(bouncing(nodes), start, times, rtol=1e-8, series="always")
+    runs = [driver.start(bouncing(nodes), start, times, rtol=1e-8, method="power-series")
             for nodes in (1, 60)]
     assert runs[1].series.line.shape[1] >= 60
     for run in runs:
@@ -33,11 +33,11 @@ def test_more_nodes_than_coefficients():
     assert runs[1].states == pytest.approx(runs[0].states, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("use", ["auto", "never"])
-def test_slip_on_ground_that_starts_late(use):
+@pytest.mark.parametrize("solver", [Auto(), STEPS])
+def test_slip_on_ground_that_starts_late(solver):
     system = mass_in_y(normal=LinearContact(1e5), friction=FRICTIONLESS, load=Load(normal=9.81),
                        ground=Ground(speed=0.0, motion=SpeedRamp(1.0, 2.0, 0.5)))
-    run = simulate(system, 4.0, solver=Rodas5P(series=use), events=ContactEvents(stop="slip"))
+    run = simulate(system, 4.0, solver=solver, events=ContactEvents(stop="slip"))
     assert run.status is Status.EVENT
     assert run.time[-1] == pytest.approx(2.0, abs=1e-3)
     # A run that ends before the ground moves has no slip to look for.
@@ -51,7 +51,7 @@ def test_a_first_step_that_is_short_for_the_run(end):
     mass, stiffness, depth = 1e-3, 1e6, 1e-3
     system = mass_in_y(mass, normal=LinearContact(stiffness), friction=FRICTIONLESS)
     start = np.array([-depth * np.sqrt(mass), 0.0])
-    run = driver.start(system, start, np.array([0.0, end]), rtol=1e-8, series="always")
+    run = driver.start(system, start, np.array([0.0, end]), rtol=1e-8, method="power-series")
     assert run.advance(10**5) == step_loop.FINISHED
     speed = depth * np.sqrt(stiffness / mass) * np.sqrt(mass)
     assert run.states[-1, 1] == pytest.approx(speed, rel=1e-9)

@@ -17,7 +17,7 @@ from fecontact import (
     simulate,
     static_equilibrium,
 )
-from fecontact.integrate import SetValued, smoothing_cost
+from fecontact.integrate import EventDriven, SetValued, TimeStepping, smoothing_cost
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.laws import (
     Constant,
@@ -33,8 +33,8 @@ from fecontact.laws import (
 )
 from fecontact.system.powers import CONTACT_DAMPING, FRICTION, LOAD
 
-BOTH = pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
-    ("events", 1e-11, 1e-11), ("stepping", 1e-6, 2e-6)])
+BOTH = pytest.mark.parametrize(("method", "rtol", "tolerance"), [
+    ("event-driven", 1e-11, 1e-11), ("time-stepping", 1e-6, 2e-6)])
 
 
 def block(mass=1.0, spring=1.0, nodes=1, **parts):
@@ -77,11 +77,11 @@ def period(system, run, place):
 
 @BOTH
 @pytest.mark.parametrize("nodes", [1, 3])
-def test_coulomb_decay(nodes, scheme, rtol, tolerance):
+def test_coulomb_decay(nodes, method, rtol, tolerance):
     """Code_Aster SDND100; equal nodes share the force in proportion to their limits."""
     system = block(1.0, 1e4, nodes, friction=ConstantFriction(0.5), load=Load(2.0))
     times = np.pi / 100.0 * np.arange(7)
-    run = integrate_set_valued(system, start(system, 0.85e-3), times, rtol=rtol, scheme=scheme)
+    run = integrate_set_valued(system, start(system, 0.85e-3), times, rtol=rtol, method=method)
     assert run.status is Status.FINISHED
     x, rate = along(system, run)
     assert x == pytest.approx(1e-3 * np.array([0.85, -0.65, 0.45, -0.25, 0.05, 0.05, 0.05]),
@@ -95,14 +95,14 @@ def test_coulomb_decay(nodes, scheme, rtol, tolerance):
 
 
 @BOTH
-def test_belt_with_falling_friction(scheme, rtol, tolerance):
+def test_belt_with_falling_friction(method, rtol, tolerance):
     """Leine's oscillator."""
     system = block(friction=HyperbolicFriction(1.0, 0.0, 1.0 / 3.0), load=Load(1.0),
                    ground=Ground(speed=0.2))
     run = integrate_set_valued(system, start(system, 0.5, 0.2), np.linspace(0.0, 40.0, 8001),
-                               rtol=rtol, scheme=scheme)
+                               rtol=rtol, method=method)
     assert period(system, run, 0.5) == pytest.approx(
-        12.0010312948, rel=1e-9 if scheme == "events" else 1e-4)
+        12.0010312948, rel=1e-9 if method == "event-driven" else 1e-4)
     assert along(system, run)[0].max() == pytest.approx(1.1339446764, rel=1e-5)
     assert imbalance(system, run) < 1e-5
 
@@ -173,7 +173,7 @@ def test_den_hartog_stops(ratio, limit):
 
 
 @BOTH
-def test_two_independent_nodes_against_two_single_masses(scheme, rtol, tolerance):
+def test_two_independent_nodes_against_two_single_masses(method, rtol, tolerance):
     """Uncoupled masses on one belt, sticking and slipping each for itself."""
     single = [block(mass, spring, friction=ConstantFriction(0.5), load=Load(2.0),
                     ground=Ground(speed=0.02)) for mass, spring in ((1.0, 100.0), (2.0, 300.0))]
@@ -190,13 +190,14 @@ def test_two_independent_nodes_against_two_single_masses(scheme, rtol, tolerance
     T = basis.T[2:, :2].reshape(4, 4)
     depth = [(one.basis.T[2, :2] @ static_equilibrium(one))[1] for one in single]
     state = np.concatenate([np.linalg.solve(T, [0.03, depth[0], 0.03, depth[1]]), np.zeros(4)])
-    run = integrate_set_valued(both, state, times, rtol=rtol, scheme=scheme)
+    run = integrate_set_valued(both, state, times, rtol=rtol, method=method)
     found = (run.states[:, :4] @ basis.T[2:, 0].T).T
-    assert np.abs(found - expected).max() < (1e-9 if scheme == "events" else 1e-3) * 0.03
+    assert np.abs(found - expected).max() < (1e-9 if method == "event-driven" else 1e-3) * 0.03
 
 
-@pytest.mark.parametrize(("scheme", "longest", "order"), [("events", 0.6, 8), ("stepping", 0.1, 3)])
-def test_order_while_nothing_changes(scheme, longest, order):
+@pytest.mark.parametrize(("method", "longest", "order"), [
+    ("event-driven", 0.6, 8), ("time-stepping", 0.1, 3)])
+def test_order_while_nothing_changes(method, longest, order):
     """Sliding all the time under a driven spring; linear, with a closed form."""
     row = [[1.0], [0.0], [0.0]]
     basis = basis_from_matrices([[1.0]], [[0.5]], {"contact": [row], "B": row, "C": row})
@@ -206,7 +207,7 @@ def test_order_while_nothing_changes(scheme, longest, order):
     end, errors = 12.0, []
     state = np.array([0.5, 0.0])
     for part in (1.0, 0.5, 0.25):
-        run = integrate_set_valued(system, state, np.array([0.0, end]), rtol=1e-2, scheme=scheme,
+        run = integrate_set_valued(system, state, np.array([0.0, end]), rtol=1e-2, method=method,
                                    longest=part * longest)
         # x'' + x = 1/2 + sin(2 t) / 2 from x = 1/2 at rest.
         errors.append(abs(run.states[-1, 0]
@@ -287,9 +288,8 @@ def test_cost_of_smoothing():
 
 @pytest.mark.parametrize(("options", "message"), [
     ({"restitution": 1.5}, r"restitution = 1\.5"), ({"restitution": "hard"}, "= 'hard'"),
-    ({"static_coefficient": -1.0}, "static_coefficient"), ({"scheme": "event"}, "mean 'events'"),
+    ({"static_coefficient": -1.0}, "static_coefficient"),
     ({"static_coefficient": (1.0, 2.0)}, "1 contact nodes"),
-    ({"restitution": 0.5, "scheme": "stepping"}, "'stepping' has no rigid stops"),
 ])
 def test_options_are_checked(options, message):
     system = block(friction=ConstantFriction(0.5), load=Load(1.0))
@@ -297,15 +297,21 @@ def test_options_are_checked(options, message):
         simulate(system, 1.0, initial=start(system, 0.0), outputs=3, solver=SetValued(**options))
 
 
-@pytest.mark.parametrize("scheme", ["events", "stepping"])
-def test_bodies_without_friction_swing_on(scheme):
+def test_plane_rigid_stops_are_not_for_time_stepping():
+    system = block(friction=ConstantFriction(0.5), load=Load(1.0))
+    with pytest.raises(InputError, match=r"TimeStepping\(\) has no rigid stops for plane bodies"):
+        simulate(system, 1.0, initial=start(system, 0.0), solver=TimeStepping(restitution=0.5))
+
+
+@pytest.mark.parametrize("solver", [EventDriven(), TimeStepping()])
+def test_bodies_without_friction_swing_on(solver):
     """A mass on a spring that is pressed on a belt: cos(w t), whatever moves below it."""
     rows = [[1.0], [0.0], [0.0]]
     system = ContactSystem(
         basis_from_matrices([[1.0]], [[9.0]], {"contact": [rows]}), normal=PrescribedForce(10.0),
         friction=Frictionless(), ground=Ground(speed=0.5))
     run = simulate(system, 5.0, initial=[1.0, 0.0], outputs=51, rtol=1e-9,
-                   solver=SetValued(scheme=scheme))
+                   solver=solver)
     assert run.states[:, 0] == pytest.approx(np.cos(3.0 * run.time), abs=1e-5)
     assert not run.friction_force.any()
 
@@ -316,14 +322,14 @@ def test_friction_with_memory_has_no_set_valued_limit():
         integrate_set_valued(system, np.zeros(4), np.linspace(0.0, 1.0, 3))
 
 
-@pytest.mark.parametrize("scheme", ["events", "stepping"])
-def test_steps_end_where_the_speed_of_the_ground_has_a_kink(scheme):
+@pytest.mark.parametrize("method", ["event-driven", "time-stepping"])
+def test_steps_end_where_the_speed_of_the_ground_has_a_kink(method):
     """Sticking to a belt that speeds up from 0.1 to 0.4 m/s, the block travels with it."""
     ramp = SpeedRamp(0.4, start=0.513, duration=0.2)
     system = block(friction=ConstantFriction(0.5), load=Load(10.0),
                    ground=Ground(speed=0.1, motion=ramp))
     times = np.linspace(0.0, 1.2, 13)
-    run = integrate_set_valued(system, start(system, 0.0, 0.1), times, scheme=scheme, rtol=1e-6)
+    run = integrate_set_valued(system, start(system, 0.0, 0.1), times, method=method, rtol=1e-6)
     x, rate = along(system, run)
     since = np.clip(times - 0.513, 0.0, 0.2)
     after = np.maximum(times - 0.713, 0.0)
@@ -349,7 +355,7 @@ def test_from_rest_under_point_loads():
         stiffness_x=1e-6, motion_x=Constant(2e7), stiffness_y=1e-6, motion_y=Constant(-1.4e7)),
                             **parts)
     times = np.linspace(0.0, 10.0, 101)
-    run, other = (integrate_set_valued(each, np.zeros(4), times, scheme="stepping")
+    run, other = (integrate_set_valued(each, np.zeros(4), times, method="time-stepping")
                   for each in (system, springs))
     assert run.status is Status.FINISHED
     assert run.statistics["steps"] < 1.5 * other.statistics["steps"]
@@ -357,6 +363,6 @@ def test_from_rest_under_point_loads():
     w = np.sqrt(1e8 + 1e4)
     cycles = np.log(1e6) / 100.0 * w / (2.0 * np.pi)
     assert run.statistics["steps"] < 200 * cycles
-    sharp = integrate_set_valued(system, np.zeros(4), times, rtol=1e-10, scheme="events")
+    sharp = integrate_set_valued(system, np.zeros(4), times, rtol=1e-10, method="event-driven")
     assert run.states[-1, :2] == pytest.approx(sharp.states[-1, :2], rel=1e-5)
     assert run.states[-1, 1] == pytest.approx(-14.0 / w**2, rel=1e-6)

@@ -57,7 +57,7 @@ def test_run_and_balance(basis, reference):
     _, run = reference
     system, m = beam(basis), basis.modes
     assert run.status is Status.FINISHED
-    assert run.statistics["scheme"] == "stepping"
+    assert run.statistics["method"] == "time-stepping"
     trajectory = Trajectory(system, run.time, run.states[:, :m], run.states[:, m:], run.work)
     assert trajectory.energies.imbalance < 1e-4
     # Friction is within the limit of stick, in its sense, and slip only takes energy.
@@ -91,4 +91,4 @@ def test_smoothed_runs_approach_it(basis, reference):
 
 def test_events_need_independent_slip_velocities(basis, reference):
     with pytest.raises(InputError, match="40 different ones depend on fewer modes"):
-        integrate_set_valued(beam(basis), reference[0], TIMES, scheme="events")
+        integrate_set_valued(beam(basis), reference[0], TIMES, method="event-driven")

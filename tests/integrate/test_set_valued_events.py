@@ -158,7 +158,7 @@ def test_basins_of_stick_slip_and_steady_sliding():
 
 
 @pytest.mark.parametrize(("system", "end", "options"), [
-    (belt(), 30.0, {"scheme": "events"}), (belt(), 30.0, {"scheme": "stepping"}),
+    (belt(), 30.0, {"method": "event-driven"}), (belt(), 30.0, {"method": "time-stepping"}),
     (ball(), 3.0, {"restitution": 0.6}),
 ])
 def test_runs_in_pieces_are_the_same_to_the_last_bit(system, end, options):

@@ -147,15 +147,15 @@ def belt(**parts):
                 friction=ExponentialFriction(1.0, 0.5, 2.0), **parts)
 
 
-@pytest.mark.parametrize(("scheme", "rtol", "tolerance"), [
-    ("events", 1e-10, 1e-8), ("stepping", 1e-7, 1e-4)])
+@pytest.mark.parametrize(("method", "rtol", "tolerance"), [
+    ("event-driven", 1e-10, 1e-8), ("time-stepping", 1e-7, 1e-4)])
 @pytest.mark.parametrize("end", [20.0, 60.0])
-def test_a_short_reversal_of_slip(scheme, rtol, tolerance, end):
+def test_a_short_reversal_of_slip(method, rtol, tolerance, end):
     """The slip velocity comes up to zero within a step, to 1.3e-4 m/s beyond it without stick."""
     times = np.linspace(0.0, 20.0, 101)
     wanted, changes = belt_reference([1.0 - 0.1 * V, V], lambda t: V, times)
     run = integrate_set_valued(belt(ground=fc.Ground(speed=V)), np.array([1.0 - 0.1 * V, V]),
-                               np.append(times, end + 1.0), rtol=rtol, scheme=scheme)
+                               np.append(times, end + 1.0), rtol=rtol, method=method)
     assert run.states[:-1, 0] == pytest.approx(wanted, abs=tolerance)
     assert len(changes) > 3
 

@@ -6,7 +6,7 @@ from scipy.special import ellipk
 
 import fecontact as fc
 from fecontact import Interface
-from fecontact.integrate import ContactEvents, SetValued
+from fecontact.integrate import ContactEvents, EventDriven, SetValued, TimeStepping
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,
@@ -75,7 +75,7 @@ def test_mass_thrown_across_a_belt(solver):
     t = np.minimum(run.time, stop)[:, None]
     path = [0.5, 0.0] * run.time[:, None] + relative * t - 0.5 * MU * G * t**2 * way
     assert run.status is fc.Status.FINISHED
-    assert run.statistics["scheme"] == "stepping"
+    assert run.statistics["method"] == "time-stepping"
     assert run.displacement(0)[:, :2] == pytest.approx(path, abs=5e-6)
     assert run.displacement(0)[-1, 1] == pytest.approx(0.1899480, abs=5e-8)
     assert run.displacement(0)[-1, 0] - 0.5 * (0.6 - stop) == pytest.approx(0.0949740, abs=5e-8)
@@ -105,7 +105,7 @@ def line(axes, speed, stiffness, rtol, solver):
 
 def test_straight_paths_are_those_of_the_plane():
     # While it slides, step for step.
-    solver = SetValued(scheme="stepping")
+    solver = TimeStepping()
     plane, space = (line(axes, 2.0, 800.0, 1e-7, solver) for axes in ("xy", "xyz"))
     assert set(np.unique(plane.contact_state)) == {2}
     assert space.statistics["steps"] == plane.statistics["steps"]
@@ -122,7 +122,7 @@ def test_straight_paths_are_those_of_the_plane():
 
 def test_straight_stick_and_slip_are_those_of_the_plane():
     # Transitions are of first order, and solids stick in a stiffer grip.
-    solver = SetValued(scheme="stepping", static_coefficient=0.6)
+    solver = TimeStepping(static_coefficient=0.6)
     plane, space = (line(axes, 0.2, 800.0, 1e-7, solver) for axes in ("xy", "xyz"))
     assert {1, 2} == set(np.unique(plane.contact_state))
     assert space.statistics["steps"] == pytest.approx(plane.statistics["steps"], rel=2e-3)
@@ -335,8 +335,8 @@ def test_runs_are_read_as_they_were_written(tmp_path):
 
 
 @pytest.mark.parametrize(("solver", "events", "message"), [
-    (SetValued(scheme="events"), None, r"scheme = 'events' is for plane bodies.*'stepping'"),
-    (SetValued(restitution=0.5, scheme="events"), None, "is for plane bodies"),
+    (EventDriven(), None, r"EventDriven\(\) is for plane bodies.*take SetValued\(\)"),
+    (EventDriven(restitution=0.5), None, "is for plane bodies"),
     (SetValued(restitution=0.5, impact_law="poisson"), None, "'poisson' is for plane bodies"),
     (SetValued(), ContactEvents(), "locates no events"),
     (SetValued(restitution=0.5), ContactEvents(), "locates no events")])

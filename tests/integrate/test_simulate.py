@@ -578,7 +578,7 @@ def test_a_motion_that_grows_beyond_all_numbers(method, tolerance):
 @pytest.mark.parametrize(("options", "message"), [
     ({"rtol": 0.0}, r"rtol = 0\.0"), ({"rtol": 0.1}, r"rtol = 0\.1"), ({"rtol": 1e-15}, "1e-15"),
     ({"rtol": float("nan")}, "rtol = nan"), ({"rtol": "fine"}, "rtol = 'fine'"),
-    ({"solver": "radau"}, r"solver = 'radau' must be Rodas5P\(\)"),
+    ({"solver": "radau"}, r"solver = 'radau' must be a solver with its options: one of Auto\(\), "),
     ({"solver": Scipy}, r"solver = Scipy must be"), ({"solver": None}, "solver = None"),
     ({"outputs": 1}, "outputs = 1"), ({"outputs": True}, "outputs"), ({"outputs": 2.5}, "outputs"),
     ({"outputs": [0.0, 0.5]}, "t_end"), ({"outputs": [0.1, 1.0]}, "outputs"),

@@ -16,7 +16,7 @@ from fecontact import (
     simulate,
 )
 from fecontact.bifurcation import contact_field
-from fecontact.integrate import SetValued
+from fecontact.integrate import EventDriven, SetValued, TimeStepping
 from fecontact.laws import (
     Constant,
     ExponentialFriction,
@@ -88,8 +88,8 @@ def along(angle):
     return np.cos(angle), np.sin(angle)
 
 
-SOLVERS = {"rodas5p": None, "events": SetValued(scheme="events"),
-           "stepping": SetValued(scheme="stepping"), "rigid": SetValued(restitution=0.6)}
+SOLVERS = {"rodas5p": None, "events": EventDriven(),
+           "stepping": TimeStepping(), "rigid": SetValued(restitution=0.6)}
 
 
 @pytest.mark.parametrize("name", list(SOLVERS))

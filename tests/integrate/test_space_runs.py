@@ -110,7 +110,7 @@ def test_motion_along_a_line_is_that_of_the_plane():
             ground=fc.Ground(speed=0.2), load=fc.Load(gravity=(0.0, -G) if components == "xy"
                                                       else (0.0, 0.0, -G)))
         runs.append(fc.simulate(system, 1.0, initial="rest", outputs=501, rtol=1e-9,
-                                solver=Rodas5P(collocation="never")))
+                                solver=Rodas5P()))
     plane, space = runs
     assert space.displacement(0)[:, 0] == pytest.approx(plane.displacement(0)[:, 0], abs=1e-10)
     assert not space.displacement(0)[:, 1].any()

@@ -10,7 +10,7 @@ from test_small_systems import system as block
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, Status, simulate
 from fecontact.core.errors import InputError
-from fecontact.integrate import ContactEvents, Rodas5P, step_loop
+from fecontact.integrate import Auto, ContactEvents, Radau, Rodas5P, step_loop
 from fecontact.integrate.collocation import tableau
 from fecontact.integrate.collocation.method import SMALL
 from fecontact.integrate.rodas5p import driver
@@ -26,9 +26,8 @@ from fecontact.laws import (
     RoughSurface,
     Step,
 )
-from fecontact.study.sections import SimulationSettings
 
-LONG, STEPS = Rodas5P(collocation="always"), Rodas5P(series="never", collocation="never")
+LONG, STEPS = Radau(), Rodas5P()
 
 
 def mass_in_x(spring=0.0, **parts):
@@ -43,7 +42,7 @@ def mass_in_x(spring=0.0, **parts):
 def progressed(system, state, times, rtol, pieces=10**9, **options):
     """A run by collocation, in pieces of so many steps."""
     run = driver.start(system, np.array(state), np.array(times), rtol=rtol,
-                       collocation="always", **options)
+                       method="radau", **options)
     while (status := run.advance(pieces)) == step_loop.RUNNING:
         pass
     assert status == step_loop.FINISHED
@@ -308,12 +307,12 @@ def test_a_checkpoint(tmp_path):
         if 0.5 < time < 399.0:
             raise KeyboardInterrupt
 
-    part = simulate(system, 400.0, **options, solver=Rodas5P(file), progress=stop)
+    part = simulate(system, 400.0, **options, solver=Radau(file), progress=stop)
     assert part.status is Status.INTERRUPTED
     assert 0.5 < part.time[-1] < 399.0
     with pytest.raises(InputError, match="checkpoint of another run"):
-        simulate(system, 400.0, **options, solver=Rodas5P(file, collocation="never"))
-    rest = simulate(system, 400.0, **options, solver=Rodas5P(file))
+        simulate(system, 400.0, **options, solver=Rodas5P(file))
+    rest = simulate(system, 400.0, **options, solver=Auto(file))
     assert (rest.states == whole.states).all()
     assert (rest.work == whole.work).all()
 
@@ -332,26 +331,34 @@ def test_neither_outputs_nor_the_end_change_the_motion():
 def test_runs_that_fail():
     system = mass_in_y(normal=PowerContact(1e10, exponent=6.0), friction=ConstantFriction(0.0))
     run = driver.start(system, np.array([-1e59, 0.0]), np.array([0.0, 1.0]), rtol=1e-8,
-                       collocation="always")
+                       method="radau")
     assert run.advance(10**4) == step_loop.NOT_FINITE
 
 
 # Choice ------------------------------------------------------------------------------------------
 
-@pytest.mark.parametrize(("system", "events", "said"), [
-    (friction_oscillator(3, **{"ground.amplitude": 1e-6, "ground.wavelength": 0.1}), None,
+@pytest.mark.parametrize(("system", "said"), [
+    (friction_oscillator(3, **{"ground.amplitude": 1e-6, "ground.wavelength": 0.1}),
      "the ground is wavy"),
-    (mass_in_plane(friction=DahlFriction(0.4, 1e-5)), None, "there is friction with memory"),
-    (block(5, 1), None, "5 modes and 1 nodes are not among them"),
-    (friction_oscillator(2), ContactEvents(), "events are not located in its steps"),
+    (mass_in_plane(friction=DahlFriction(0.4, 1e-5)), "there is friction with memory"),
+    (block(5, 1), "5 modes and 1 nodes are not among them"),
 ])
-def test_what_it_is_not_for(system, events, said):
-    options = {"initial": np.zeros(system.size), "outputs": 11, "events": events, "rtol": 1e-8}
-    with pytest.raises(InputError, match=f"collocation = 'always' is for .* but {said}; leave it"):
+def test_what_it_is_not_for(system, said):
+    options = {"initial": np.zeros(system.size), "outputs": 11, "rtol": 1e-8}
+    with pytest.raises(InputError, match=rf"Radau\(\) is for .* but {said}; take Auto"):
         simulate(system, 0.01, **options, solver=LONG)
     taken, steps = (simulate(system, 0.01, **options, solver=solver)
-                    for solver in (Rodas5P(), STEPS))
+                    for solver in (Auto(), STEPS))
     assert (taken.states == steps.states).all()
+
+
+def test_it_locates_no_events():
+    system = friction_oscillator(2)
+    options = {"initial": np.zeros(4), "outputs": 11, "events": ContactEvents(), "rtol": 1e-8}
+    with pytest.raises(InputError, match=r"Radau\(.*\) is not one that locates events"):
+        simulate(system, 0.01, **options, solver=LONG)
+    taken = simulate(system, 0.01, **options)
+    assert (taken.statistics["solver"], taken.statistics["method"]) == ("auto", "rodas5p")
 
 
 def test_when_it_is_taken():
@@ -366,22 +373,11 @@ def test_when_it_is_taken():
     assert not takes(friction_oscillator(3), 1e-6, vary=True)
     # Derivatives are not expanded in series.
     assert takes(impact_oscillator(2), 1e-9, vary=True)
-    assert not takes(friction_oscillator(3), 1e-9, collocation="never")
-    assert takes(friction_oscillator(3), 1e-3, collocation="always")
+    assert not takes(friction_oscillator(3), 1e-9, method="rodas5p")
+    assert takes(friction_oscillator(3), 1e-3, method="radau")
     # Series are faster still.
     assert not takes(impact_oscillator(2), 1e-9)
-    assert takes(impact_oscillator(2), 1e-9, collocation="always")
-    with pytest.raises(InputError, match="Rodas5P: collocation = 'no' must be one of 'always', 'a"):
-        Rodas5P(collocation="no")
-    with pytest.raises(InputError, match="exclude each other"):
-        Rodas5P(series="always", collocation="always")
-
-
-def test_the_key_in_files():
-    settings = SimulationSettings(t_end=1.0, collocation="never")
-    assert settings.chosen_solver() == Rodas5P(collocation="never")
-    with pytest.raises(InputError, match="collocation = 'never' is only for solver = 'rodas5p'"):
-        SimulationSettings(t_end=1.0, solver="cvode", collocation="never")
+    assert takes(impact_oscillator(2), 1e-9, method="radau")
 
 
 def test_ensembles():
@@ -403,7 +399,7 @@ def test_what_step_loops_take_for_granted(modes, nodes):
     said = SMALL.values(modes, nodes)
     system = block(modes, nodes, normal=RoughSurface(10e6, 10e-6, 40.0))
     run = driver.start(system, np.zeros(2 * modes), np.linspace(0.0, 0.1, 11), rtol=1e-8,
-                       collocation="always")
+                       method="radau")
     tuples = (run.problem, run.progress, run.room, run.output, run.collocation)
     found = sum(assert_as_said(values, said) for values in tuples)
     assert found >= sum(map(len, said.values()))

@@ -8,8 +8,8 @@ from systems import mass_in_plane
 
 import fecontact as fc
 from fecontact import Drive, Ground, simulate
-from fecontact.integrate import CVODE, Rodas5P, Scipy, SetValued
-from fecontact.integrate.reference.scipy import energy_scale
+from fecontact.integrate import CVODE, Radau, Rodas5P, Scipy, SetValued, TimeStepping
+from fecontact.integrate.run_limits import energy_scale
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,
@@ -19,9 +19,9 @@ from fecontact.laws import (
     signal,
 )
 
-STEPS = Rodas5P(series="never", collocation="never")
-LONG = Rodas5P(series="never", collocation="always")
-SOLVERS = [STEPS, LONG, SetValued(), SetValued(scheme="stepping"), SetValued(restitution=0.5),
+STEPS = Rodas5P()
+LONG = Radau()
+SOLVERS = [STEPS, LONG, SetValued(), TimeStepping(), SetValued(restitution=0.5),
            Scipy("Radau"), Scipy("LSODA"), CVODE()]
 NAMES = ["rodas5p", "collocation", "events", "stepping", "stops", "radau", "lsoda", "cvode"]
 

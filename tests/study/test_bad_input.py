@@ -275,8 +275,8 @@ simulation.rtol 0
 simulation.rtol 1
 simulation.rtol nan
 simulation.restitution 0.5
-simulation.scheme "events"
-simulation.series "allways"
+simulation.impact_law "poisson"
+simulation.solver "event"
 simulation.events 1
 simulation.stop ["x"]
 simulation.stop "stick"

@@ -33,7 +33,7 @@ from fecontact import (
 from fecontact.cli.templates import TEMPLATES, template
 from fecontact.core.dotted_parameters import flattened
 from fecontact.fem.shapes import Beam, Block, Pendulum
-from fecontact.integrate import SetValued
+from fecontact.integrate import SetValued, TimeStepping
 from fecontact.integrate.solvers import SOLVERS
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.study.study import with_given_keys
@@ -213,18 +213,19 @@ def test_changes_by_dotted_names(tiny):
 
 def test_solvers_have_one_name_in_files_and_in_python(tiny):
     """Every solver can be named, and takes its own options from [simulation]."""
-    assert sorted(SOLVERS) == ["bdf", "cvode", "lsoda", "radau", "rodas5p", "set-valued"]
+    assert sorted(SOLVERS) == [
+        "auto", "cvode", "event-driven", "power-series", "radau", "rodas5p", "scipy-bdf",
+        "scipy-lsoda", "scipy-radau", "set-valued", "time-stepping"]
     for name, solver in SOLVERS.items():
         assert tiny.with_(**{"simulation.solver": name}).simulation.chosen_solver() == solver
-    told = {"simulation.solver": "set-valued", "simulation.scheme": "stepping",
-            "simulation.static_coefficient": 0.9}
+    told = {"simulation.solver": "time-stepping", "simulation.static_coefficient": 0.9}
     study = tiny.with_(**told)
-    assert study.simulation.chosen_solver() == SetValued(static_coefficient=0.9, scheme="stepping")
+    assert study.simulation.chosen_solver() == TimeStepping(static_coefficient=0.9)
     run = study.run()
     same = simulate(study.system(), 1e-3, outputs=11,
-                    solver=SetValued(static_coefficient=0.9, scheme="stepping"))
+                    solver=TimeStepping(static_coefficient=0.9))
     assert np.array_equal(run.states, same.states)
-    assert run.statistics["solver"] == "set-valued"
+    assert run.statistics["solver"] == "time-stepping"
     assert not np.array_equal(run.states, tiny.run().states)
     stops = tiny.with_(**{"simulation.solver": "set-valued", "simulation.restitution": 0.5,
                           "simulation.impact_law": "poisson"})
@@ -353,11 +354,11 @@ MISTAKES = [
     ({"simulation.solver": "rodas"},
      r"\[simulation\]: solver = 'rodas' must be one of .* \(did you mean 'rodas5p'\?\)"),
     ({"simulation.restitution": 0.5},
-     r"\[simulation\]: restitution = 0\.5 is only for solver = 'set-valued', not 'rodas5p'"),
+     r"\[simulation\]: restitution = 0\.5 is only for solver = .*'event-driven'.*, not 'auto'"),
     ({"simulation.solver": "set-valued", "simulation.restitution": 1.5},
      r"\[simulation\]: restitution = 1\.5 must be a number from 0 to 1, "),
     ({"simulation.solver": "radau", "simulation.stop": ["stick"]},
-     r"\[simulation\]: events and stop are for solver = 'rodas5p' or 'set-valued', not 'radau'"),
+     r"\[simulation\]: events and stop are for solver = 'auto', .*'set-valued'.*, not 'radau'"),
     ({"geometry.shape": "bem"}, r"\[geometry\]: shape = \"bem\" must be one of .*mean 'beam'"),
     ({"geometry.length": -1}, r"\[geometry\]: length = -1\.0 must be a finite number above zero"),
     ({"geometry.file": "x.msh"}, r"\[geometry\] must have either a shape .* or the file of a"),

@@ -18,7 +18,7 @@ from fecontact import (
     static_equilibrium,
     write_case,
 )
-from fecontact.integrate import PointStart, SetValued, initial_state
+from fecontact.integrate import PointStart, SetValued, TimeStepping, initial_state
 from fecontact.laws import (
     ConstantFriction,
     HarmonicSpeed,
@@ -63,7 +63,7 @@ def velocities(run, point):
     return run.modal_velocities @ basis.T[basis.point_index(point), 1]
 
 
-@pytest.mark.parametrize("solver", [None, SetValued(scheme="stepping")])
+@pytest.mark.parametrize("solver", [None, TimeStepping()])
 def test_two_masses_with_a_hertz_spring_exchange_velocities(solver):
     system = collision(mass(1.0), mass(2.0), PowerContact(1e9))
     run = simulate(system, 5e-3, initial=PointStart(velocities={"a.p": (0.0, -1.0)}), rtol=1e-9,

@@ -24,7 +24,7 @@ from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.integrate.ensembles import ensemble, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
-from fecontact.integrate.solvers import RODAS5P, Solver
+from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import Moving, in_time, state_size
@@ -106,7 +106,7 @@ def basins(
     keep: int = 32,
     section: Crossing | None = None,
     tolerance: float = 1e-3,
-    solver: Solver = RODAS5P,
+    solver: Solver = AUTO,
     rtol: float = 1e-6,
     workers: int | None = None,
     folder: str | Path | None = None,

@@ -23,7 +23,7 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.ensembles import ensemble, is_many, strobe
 from fecontact.integrate.events import Crossing, quantity_row, require_quantity
 from fecontact.integrate.field_runs.start import start_state
-from fecontact.integrate.solvers import RODAS5P, Solver
+from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import Moving, in_time, state_size
@@ -90,7 +90,7 @@ def poincare_scan(
     initial: Any = "rest",
     down: bool = True,
     chains: int | None = None,
-    solver: Solver = RODAS5P,
+    solver: Solver = AUTO,
     rtol: float = 1e-5,
     workers: int | None = None,
     folder: str | Path | None = None,

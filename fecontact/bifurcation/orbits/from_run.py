@@ -12,7 +12,7 @@ from fecontact.core.types import Array
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import RODAS5P, Solver
+from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import Moving, in_time
@@ -28,7 +28,7 @@ _MISFIT = 1e-2
 @one_blas_thread
 def periodic_motion(
     system: Moving, *, initial: Initial | FieldRun = "rest", transient: float | None = None,
-    longest_period: float | None = None, solver: Solver = RODAS5P, rtol: float = 1e-8,
+    longest_period: float | None = None, solver: Solver = AUTO, rtol: float = 1e-8,
 ) -> PeriodicMotion:
     """Run a system until its motion repeats.
 
@@ -43,7 +43,7 @@ def periodic_motion(
         Transient before the motion is examined [s]; 200 excitation periods by default.
     longest_period : float, optional
         Longest period considered [s]; 16 excitation periods by default.
-    solver : Rodas5P, SetValued, Scipy or CVODE
+    solver : Auto, SetValued, Scipy, CVODE and others
         What runs it; see :func:`fecontact.simulate`.
     rtol : float
         Relative tolerance.

@@ -14,7 +14,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import RODAS5P, SetValued, Solver
+from fecontact.integrate.solvers import AUTO, SetValued, Solver, solver_by_name
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
@@ -227,12 +227,16 @@ def collocated(u: Array, mesh: Array, states: int, period: float, samples: int) 
 
 def solver_text(solver: Solver) -> str | None:
     """Options of a set-valued solver as text for a branch's attributes; None for the default."""
-    return json.dumps(asdict(solver)) if isinstance(solver, SetValued) else None
+    return json.dumps({"name": solver.name} | asdict(solver)) if isinstance(
+        solver, SetValued) else None
 
 
 def solver_of(known: Mapping[str, Any]) -> Solver:
     """The solver of a branch by shooting, from its attributes."""
-    return SetValued(**json.loads(known["solver"])) if "solver" in known else RODAS5P
+    if "solver" not in known:
+        return AUTO
+    options = json.loads(known["solver"])
+    return solver_by_name(options.pop("name"), options)
 
 
 def run_again(

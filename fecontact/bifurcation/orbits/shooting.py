@@ -23,7 +23,7 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensembles import ensemble
 from fecontact.integrate.sensitivities import Sensitivity, differentiated
-from fecontact.integrate.solvers import RODAS5P, Rodas5P, Solver
+from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 
@@ -71,7 +71,7 @@ class ShootingProblem(FloquetTests, Problem):
         Relative tolerance of the runs.
     derivative_rtol : float or None
         Relative tolerance of the derivatives; see :func:`fecontact.sensitivity`.
-    solver : Rodas5P or SetValued
+    solver : Auto, Rodas5P, Radau or SetValued
         What runs the segments.
     precision : float
         Tolerance of the location of special points, relative to the step: that of the runs.
@@ -93,7 +93,7 @@ class ShootingProblem(FloquetTests, Problem):
     periods: int = 1
     rtol: float = 1e-9
     derivative_rtol: float | None = None
-    solver: Solver = RODAS5P
+    solver: Solver = AUTO
     precision: float = 1e-7
     before: tuple[Array, Array] | None = None
     bend: Array | None = None
@@ -142,7 +142,7 @@ class ShootingProblem(FloquetTests, Problem):
 
     def rates(self, t: float, state: Array, values: Array) -> Array:
         """Rates (d,) of a state; of a set-valued motion those of a brief run from there."""
-        if isinstance(self.solver, Rodas5P):
+        if self.solver.smooth:
             return np.asarray(self.field.rates(np.array([t]), state[None].copy(), values)[0])
         h = _BRIEF * float(self.scales[-2])
         first, middle, last = run_from(self.field.system(values), t + np.array([[0.0, h, 2.0 * h]]),
@@ -196,7 +196,7 @@ class ShootingProblem(FloquetTests, Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""
-        if not isinstance(self.solver, Rodas5P):
+        if not self.solver.smooth:
             self._require_return(u)
             linearisation.require_certain()
         stability = linearisation.floquet
@@ -279,7 +279,7 @@ class ShootingProblem(FloquetTests, Problem):
 
 def shooting_from(
     problem: CollocationProblem, u: Array, segments: int = 4, rtol: float = 1e-9,
-    derivative_rtol: float | None = None, solver: Solver = RODAS5P,
+    derivative_rtol: float | None = None, solver: Solver = AUTO,
 ) -> tuple[ShootingProblem, Array]:
     """The shooting problem of an orbit, with segments of equal length, and its first guess.
 
@@ -301,7 +301,7 @@ def shooting_from(
 
 
 def run_from(
-    system: ContactSystem, times: Array, starts: Array, rtol: float, solver: Solver = RODAS5P
+    system: ContactSystem, times: Array, starts: Array, rtol: float, solver: Solver = AUTO
 ) -> Array:
     """States (K, k, d) at times (K, k) of runs from starts (K, d); AnalysisError if one fails."""
     found = ensemble(system, times, initial=starts, rtol=rtol, solver=solver)

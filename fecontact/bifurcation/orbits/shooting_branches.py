@@ -124,17 +124,17 @@ def _of_stepping(problem: ShootingProblem, values: Array) -> str:
         return ""
     from fecontact.integrate.nonsmooth.driver import by_events
 
-    def goes(scheme: str) -> bool:
+    def goes(method: str) -> bool:
         try:
-            return by_events(problem.field.system(values), scheme, solver.restitution, "newton",
+            return by_events(problem.field.system(values), method, solver.restitution, "newton",
                              solver.static_coefficient)
         except InputError:
             return False
 
-    if goes(solver.scheme):
+    if goes(solver.method):
         return ""
-    instead = ("SetValued(scheme='events'), whose orbits go from event to event"
-               if goes("events") else "a law with a finite smoothing_slope and Rodas5P()")
+    instead = ("EventDriven(), whose orbits go from event to event"
+               if goes("event-driven") else "a law with a finite smoothing_slope and Auto()")
     return ("runs by time stepping are exact to first order only where contacts begin to stick and "
             f"slip, and have no derivatives there; take {instead}.")
 
@@ -158,7 +158,7 @@ def _from_event_to_event(
     from fecontact.integrate.nonsmooth.driver import by_events
 
     values, d, solver = problem.parameters(u), problem.field.dimension, problem.solver
-    if not by_events(problem.field.system(values), solver.scheme, solver.restitution,
+    if not by_events(problem.field.system(values), solver.method, solver.restitution,
                      solver.impact_law, solver.static_coefficient):
         return None, ""
     try:

@@ -103,16 +103,16 @@ def collocation_for(modes: int, nodes: int, rtol: float) -> Collocation:
 
 
 def chosen_collocation(
-    system: ContactSystem, rtol: float, events: Sequence[AnyEvent], use: str,
+    system: ContactSystem, rtol: float, events: Sequence[AnyEvent], asked: bool,
 ) -> Collocation | None:
-    """Room for a run by collocation; InputError where it cannot 'always' be used."""
-    if use == "never" or (use == "auto" and rtol > ACCURATE):
+    """Room for a run by collocation; InputError where it is asked for in vain."""
+    if not asked and rtol > ACCURATE:
         return None
     found = obstacle(system, events)
     if found is not None:
-        if use == "always":
-            raise InputError(f"Rodas5P: collocation = 'always' is for small plane systems on flat "
-                             f"ground, but {found}; leave it out.")
+        if asked:
+            raise InputError(f"Radau() is for small plane systems on flat ground, but {found}; "
+                             f"take Auto().")
         return None
     return collocation_for(system.basis.modes, system.basis.contact_nodes, rtol)
 

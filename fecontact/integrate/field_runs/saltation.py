@@ -17,8 +17,8 @@ from fecontact.core.compiled import kernel
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.integrate.events import ContactEvents
-from fecontact.integrate.reference.scipy import largest_motions
 from fecontact.integrate.rodas5p.driver import start
+from fecontact.integrate.run_limits import largest_motions
 from fecontact.integrate.step_runs import finish
 from fecontact.laws.base import NormalLaw
 from fecontact.laws.signatures import normal_at
@@ -103,7 +103,7 @@ def passages(
     if not jumping.any():
         return []
     run = start(system, state, times[[0, -1]], rtol=rtol, max_step=max_step, work=False,
-                events=[ContactEvents()], series="never", collocation="never")
+                events=[ContactEvents()], method="rodas5p")
     # Whoever needs derivatives says where a run fails.
     finish(run)
     levels, events = run.problem.control.levels, run.events

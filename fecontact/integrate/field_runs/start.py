@@ -27,13 +27,12 @@ def start_state(moving: Moving, initial: Any, time: float) -> Array:
 
 def start_any(
     moving: Moving, state: Array, times: Array, *, rtol: float, max_step: float | None = None,
-    vary: bool = False, events: Sequence[AnyEvent] = (), series: str = "never",
-    collocation: str = "never",
+    vary: bool = False, events: Sequence[AnyEvent] = (), method: str = "rodas5p",
 ) -> "Run | FieldSteps":
     """A run before its first step, without powers, of a contact system or of a field."""
     if isinstance(moving, ContactSystem):
         return start(moving, state, times, rtol=rtol, max_step=max_step, work=False, vary=vary,
-                     events=events, series=series, collocation=collocation)
+                     events=events, method=method)
     # Not before it is used: its kernels need not be there for contact systems.
     from fecontact.integrate.field_runs.stepper import start_field
 

@@ -151,7 +151,7 @@ class SideBySide:
             np.array(follows, dtype=np.int64), np.zeros((count, 4), dtype=np.int64),
             np.zeros(0, dtype=np.int64), np.zeros(4, dtype=np.int64))
         self._spare = start(members[0], rest, times[0], rtol=rtol, max_step=max_step, work=False,
-                            series="never", collocation="never")
+                            method="rodas5p")
         self._waiting = np.flatnonzero(self.runs.follows == 0).tolist()
         self._lock, self.attempts = Lock(), 0
 
@@ -234,7 +234,7 @@ class SideBySide:
 
 def side_by_side(
     members: Sequence[Any], state_of: Callable[[int], Array], times: Array, rtol: float,
-    max_step: float | None, series: str, chain: int = 1,
+    max_step: float | None, method: str, chain: int = 1,
 ) -> list[SideBySide]:
     """The runs of an ensemble that go through lanes, kind by kind; chains as a whole.
 
@@ -245,12 +245,12 @@ def side_by_side(
 
     def kind(index: int) -> Kind | None:
         member, key = members[index], _key(members[index], times[index])
-        if not isinstance(member, ContactSystem) or series == "always":
+        if not isinstance(member, ContactSystem) :
             return None
         if key not in known:
             begin, end = key[1:]
             found = kind_of(member, begin, end)
-            if series == "auto" and found is not None and series_pay(member, begin, end):
+            if method == "auto" and found is not None and series_pay(member, begin, end):
                 found = None
             known[key] = found
         return known[key]

@@ -19,8 +19,8 @@ from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
 from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
 from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between_events, stops_of
-from fecontact.integrate.reference.scipy import longest_step
 from fecontact.integrate.rodas5p.event_kernels import Watch
+from fecontact.integrate.run_limits import longest_step
 from fecontact.integrate.step_loop import REJECTIONS, STEPS
 from fecontact.integrate.step_runs import ENDS, StepRun, finish
 from fecontact.integrate.trajectory import Solution, Status
@@ -39,7 +39,7 @@ def integrate_set_valued(
     times: Array,
     *,
     rtol: float = 1e-6,
-    scheme: str = "auto",
+    method: str = "set-valued",
     restitution: Coefficient | None = None,
     impact_law: str = "newton",
     tangential_restitution: Coefficient = 0.0,
@@ -70,10 +70,8 @@ def integrate_set_valued(
         Output times, ascending [s].
     rtol : float
         Relative tolerance.
-    scheme : 'auto', 'events' or 'stepping'
-        From event to event with steps of order 8: for nodes whose slip velocities, equal ones
-        counted once, are independent. Or by implicit steps of order 3, for any number of nodes and
-        for solids.
+    method : 'set-valued', 'event-driven' or 'time-stepping'
+        As :class:`fecontact.integrate.SetValued`, ``EventDriven`` and ``TimeStepping``.
     restitution : float, sequence or mapping, optional
         Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and a coefficient
         e from 0 to 1 gives their rebound; one for all nodes, one for each, or by interfaces.
@@ -103,7 +101,7 @@ def integrate_set_valued(
     Raises
     ------
     InputError
-        For friction that cannot be unsmoothed, or a scheme that cannot run the system; ranges are
+        For friction that cannot be unsmoothed, or a method that cannot run the system; ranges are
         checked by :class:`fecontact.integrate.SetValued`.
 
     References
@@ -113,7 +111,7 @@ def integrate_set_valued(
     Systems, Springer 2008.
     """
     begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, scheme=scheme, restitution=restitution,
+    run = start(system, state, times, rtol=rtol, method=method, restitution=restitution,
                 impact_law=impact_law, tangential_restitution=tangential_restitution,
                 static_coefficient=static_coefficient, longest=longest, max_step=max_step,
                 events=events)
@@ -126,7 +124,7 @@ def integrate_set_valued(
             raise
         ended = Status.INTERRUPTED
     statistics: dict[str, Any] = {
-        "scheme": run.scheme, "steps": int(counts[STEPS]),
+        "method": run.method, "steps": int(counts[STEPS]),
         "rejected": int(counts[REJECTIONS]), "events": int(counts[kinds.EVENTS]),
         "impacts": int(counts[kinds.IMPACTS]),
         "seconds": clock.perf_counter() - begin}
@@ -155,7 +153,7 @@ class Run(StepRun):
     progress: kinds.Progress
     output: kinds.Output
     watch: Watch
-    scheme: str
+    method: str
     found: list[tuple[Array, Array]] = field(default_factory=list)
 
     def step(self, most: int) -> int:
@@ -169,7 +167,7 @@ def start(
     times: Array,
     *,
     rtol: float,
-    scheme: str = "auto",
+    method: str = "set-valued",
     restitution: Coefficient | None = None,
     impact_law: str = "newton",
     tangential_restitution: Coefficient = 0.0,
@@ -185,13 +183,13 @@ def start(
     problem, rubbing = nonsmooth_problem(system, restitution, static_coefficient, longest,
                                          tangential=tangential_restitution)
     problem = problem._replace(poisson=int(impact_law == "poisson"))
-    scheme = _chosen(problem, scheme)
+    method = _chosen(problem, method)
     solid = system.basis.dimension == 3
     course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
         stops_of(system, float(times[0]), float(times[-1])),
         floor_of(system, state, times, longest), rtol, longest)
-    if longest == default and scheme == "events" and restitution is None:
+    if longest == default and method == "event-driven" and restitution is None:
         most = np.inf if max_step is None else float(max_step)
         limits = limits._replace(longest=min(longest_between_events(system, times), most))
     output = kinds.Output(times, np.empty((len(times), len(course.state))),
@@ -208,7 +206,7 @@ def start(
         _require_no_events(events)
         loop = partial(impact_steps.run_impact_steps,
                        impact_steps.Data(*data, impact_room_for(problem)))
-    elif scheme == "events":
+    elif method == "event-driven":
         from fecontact.integrate.nonsmooth.event_driven import Data, run_for
         from fecontact.integrate.nonsmooth.event_search import room_for
         loop = partial(run_for(problem), Data(*data, workspace, room_for(problem), watch))
@@ -220,13 +218,13 @@ def start(
         _require_no_events(events)
         loop = partial(time_stepping.run_steps, time_stepping.Data(
             *data, workspace, stepping_room(problem, in_space() if solid else IN_PLANE)))
-    return Run(loop, course, output, watch, scheme)
+    return Run(loop, course, output, watch, method)
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:
     if events:
-        raise InputError("SetValued: scheme = 'stepping', which this system needs, locates no "
-                         "events; leave them out, or use fewer contact nodes.")
+        raise InputError("TimeStepping(), which this system needs, locates no events; leave them "
+                         "out, or take fewer contact nodes.")
 
 
 def nonsmooth_problem(
@@ -280,13 +278,13 @@ def nonsmooth_problem(
 
 
 def by_events(
-    system: ContactSystem, scheme: str, restitution: Coefficient | None, impact_law: str,
+    system: ContactSystem, method: str, restitution: Coefficient | None, impact_law: str,
     static_coefficient: Coefficient | None,
 ) -> bool:
     """Whether a system runs from event to event, with impacts of Newton's law if any."""
     problem, _ = nonsmooth_problem(system, restitution, static_coefficient, 1.0)
     newton = restitution is None or impact_law == "newton"
-    return newton and _chosen(problem, scheme) == "events"
+    return newton and _chosen(problem, method) == "event-driven"
 
 
 def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
@@ -361,26 +359,27 @@ def _require_independence(Ty: Array, rows: Array) -> None:
                          f"of rigid stops cannot be told apart; use fewer nodes, or more modes.")
 
 
-def _chosen(problem: kinds.NonsmoothProblem, scheme: str) -> str:
+def _chosen(problem: kinds.NonsmoothProblem, method: str) -> str:
+    """The method that runs a problem; InputError if the one that is named cannot."""
     if problem.system.rows.shape[1] > 2:
         if problem.poisson:
             raise InputError("SetValued: impact_law = 'poisson' is for plane bodies, but this "
                              "system has contact in space; use impact_law = 'newton'.")
-        if scheme == "events":
-            raise InputError("SetValued: scheme = 'events' is for plane bodies, but this system "
-                             "has contact in space; use scheme = 'stepping', its default.")
-        return "stepping"
+        if method == "event-driven":
+            raise InputError("EventDriven() is for plane bodies, but this system has contact in "
+                             "space; take SetValued().")
+        return "time-stepping"
     if problem.rigid:
-        if scheme == "stepping":
-            raise InputError("SetValued: scheme = 'stepping' has no rigid stops for plane bodies; "
-                             "use 'events', or leave restitution out.")
-        return "events"
+        if method == "time-stepping":
+            raise InputError("TimeStepping() has no rigid stops for plane bodies; take "
+                             "SetValued(), or leave restitution out.")
+        return "event-driven"
     moving = problem.rows[np.any(problem.rows != 0.0, axis=1)]
     scale = np.abs(moving).max(initial=0.0)
     independent = not len(moving) or np.linalg.matrix_rank(moving, tol=1e-6 * scale) == len(moving)
-    if scheme == "auto":
-        return "events" if independent and len(moving) <= _FEW else "stepping"
-    if scheme == "events" and not independent:
-        raise InputError(f"scheme = 'events' needs independent slip velocities, but the "
-                         f"{len(moving)} different ones depend on fewer modes; use 'stepping'.")
-    return scheme
+    if method == "set-valued":
+        return "event-driven" if independent and len(moving) <= _FEW else "time-stepping"
+    if method == "event-driven" and not independent:
+        raise InputError(f"EventDriven() needs independent slip velocities, but the {len(moving)} "
+                         f"different ones depend on fewer modes; take SetValued().")
+    return method

@@ -1,91 +1,62 @@
-"""Time integration by CVODE of SUNDIALS, as a reference."""
-
-import time as clock
-from collections.abc import Callable
+"""Steps of CVODE of SUNDIALS."""
 
 import numpy as np
 
-from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.errors import MissingLibraryError
 from fecontact.core.types import Array
-from fecontact.integrate.reference import scipy
-from fecontact.integrate.trajectory import Solution, Status
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.elastic_sliders import slider_counts
+from fecontact.integrate.reference.driver import Equations, Steps
+
+# Steps that do not advance time after which it is given up.
+_STALLED = 100
 
 
-def integrate(
-    system: ContactSystem,
-    state: Array,
-    times: Array,
-    *,
-    rtol: float,
-    progress: Callable[[float], None] | None,
-    max_step: float | None = None,
-) -> Solution:
-    """Integrate by CVODE's backward differentiation formulas, restarting at breakpoints.
-
-    The equations are those of :func:`fecontact.integrate.reference.scipy.integrate`.
+class CvodeSteps(Steps):
+    """Steps of CVODE's backward differentiation formulas.
 
     Raises
     ------
     MissingLibraryError
         If scikit-sundae is not installed.
-    InputError
-        For friction by elastic Coulomb elements, whose switches it does not locate.
     """
-    if slider_counts(system).any():
-        raise InputError("CVODE does not locate where elastic Coulomb elements (JenkinsFriction, "
-                         "IwanFriction, FourParameterIwanFriction) end to slide; take Rodas5P() "
-                         "or Scipy().")
-    try:
-        from sksundae.cvode import CVODE  # type: ignore[import-untyped]
-    except ImportError:
-        raise MissingLibraryError("The solver CVODE needs scikit-sundae: pip install "
-                                  "'fecontact[cvode]'.") from None
-    begin = clock.perf_counter()
-    rate, derivative, tolerance, counts = scipy.with_work(system, state, rtol)
 
-    # CVODE's arrays are read-only, which the compiled functions do not accept.
-    def rhs(t: float, y: Array, out: Array) -> None:
-        out[:] = rate(min(max(t, after), latest), y.copy())
+    def __init__(self, equations: Equations, begin: float, y: Array, end: float) -> None:
+        try:
+            from sksundae.cvode import CVODE  # type: ignore[import-untyped]
+        except ImportError:
+            raise MissingLibraryError("The solver CVODE needs scikit-sundae: pip install "
+                                      "'fecontact[cvode]'.") from None
 
-    def jacobian(t: float, y: Array, out: Array, into: Array) -> None:
-        into[:] = derivative(t, y.copy())
+        # CVODE's arrays are read-only, which the compiled functions do not accept.
+        def rate(t: float, y: Array, out: Array) -> None:
+            out[:] = equations.rate(t, y.copy())
 
-    pieces, t = scipy.smooth_pieces(system, times), float(times[0])
-    result = np.empty((len(times), len(tolerance)))
-    done, y = scipy.pass_break(system, t, pieces[0].begin, times, 0, result,
-                               np.concatenate([state, np.zeros(len(tolerance) - len(state))]))
-    status = Status.FINISHED
-    longest = scipy.longest_step(system, times, max_step)
-    after = latest = t
-    try:
-        for piece in pieces:
-            t, after, end = piece.begin, piece.after, piece.end
-            solver = CVODE(rhs, jacfn=jacobian, method="BDF", rtol=rtol, atol=tolerance,
-                           max_step=longest, max_num_steps=100_000)
-            latest = scipy.before_break(t, end)
-            solver.init_step(t, y)
-            while t < end and status is Status.FINISHED:
-                target = min(float(times[done]), end) if done < len(times) else end
-                try:
-                    step = solver.step(target, tstop=end)
-                except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
-                    status, counts["message"] = Status.FAILED, str(error)
-                    break
-                if not step.success or not np.isfinite(step.y).all():
-                    status, counts["message"] = Status.FAILED, str(step.message)
-                    break
-                t, y = target, np.array(step.y, dtype=float)
-                if t == times[done] and t < end:
-                    result[done] = y
-                    done += 1
-                if progress is not None:
-                    progress(t)
-            if status is not Status.FINISHED:
-                break
-            done, y = scipy.pass_break(system, latest, piece.until, times, done, result, y)
-    except KeyboardInterrupt:
-        status = Status.INTERRUPTED
-    size, statistics = len(state), {**counts, "seconds": clock.perf_counter() - begin}
-    return Solution(times[:done], result[:done, :size], result[:done, size:], status, statistics)
+        def jacobian(t: float, y: Array, out: Array, into: Array) -> None:
+            into[:] = equations.jacobian(t, y.copy())
+
+        self.begin, self.t, self.y = begin, begin, y
+        self._end = end
+        self._solver = CVODE(rate, jacfn=jacobian, method="BDF", rtol=equations.rtol,
+                             atol=equations.tolerance, max_step=equations.longest)
+        self._solver.init_step(begin, y)
+
+    def step(self) -> str | None:
+        """See :meth:`Steps.step`."""
+        for _ in range(_STALLED):
+            try:
+                found = self._solver.step(self._end, method="onestep", tstop=self._end)
+            except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
+                return str(error)
+            if not found.success or not np.isfinite(found.y).all():
+                return str(found.message)
+            # After outputs within a step it first returns to its end.
+            if found.t > self.t:
+                self.begin, self.t = self.t, float(found.t)
+                self.y = np.array(found.y, dtype=float)
+                return None
+        return "The steps became shorter than numbers can tell apart."
+
+    def dense(self, t: float) -> Array:
+        """See :meth:`Steps.dense`."""
+        if t >= self.t:
+            return self.y
+        return np.array(self._solver.step(t, tstop=self._end).y, dtype=float)

@@ -14,13 +14,6 @@ from fecontact.integrate import step_loop
 from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.reference.scipy import (
-    bounded_period,
-    breaks,
-    energy_scale,
-    largest_motions,
-    work_of_jump,
-)
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
@@ -37,6 +30,13 @@ from fecontact.integrate.rodas5p.state import (
 )
 from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
+from fecontact.integrate.run_limits import (
+    bounded_period,
+    breaks,
+    energy_scale,
+    largest_motions,
+    work_of_jump,
+)
 from fecontact.integrate.series.branches import chosen_series, from_state
 from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Solution, Status
@@ -76,8 +76,7 @@ def start(
     vary: bool | tuple[ContactSystem, ContactSystem, float] = False,
     vary_rtol: float | None = None,
     events: Sequence[AnyEvent] = (),
-    series: str = "auto",
-    collocation: str = "auto",
+    method: str = "auto",
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -110,10 +109,8 @@ def start(
         times ``rtol`` where they go over a step in parts, which :func:`in_parts` says.
     events : sequence of ContactEvents, Crossing and Event
         What to watch for.
-    series : 'auto', 'always' or 'never'
-        Whether to expand the motion in power series; see :class:`fecontact.integrate.Rodas5P`.
-    collocation : 'auto', 'always' or 'never'
-        Whether to take steps by collocation; see there.
+    method : 'auto', 'rodas5p', 'radau' or 'power-series'
+        How to go on; 'auto' as :class:`fecontact.integrate.Auto` says.
     """
     require_state(state, np.inf)
     basis = system.basis
@@ -132,9 +129,12 @@ def start(
     blocks = blocks_of(basis, system.arrays)
     counts = control.slider_counts
     problem = Problem(exact_arrays(system.arrays, counts), blocks, control)
-    expanded = None if vary or collocation == "always" else chosen_series(
-        system, state, times, rtol, max_step, events, work, series)
-    collocated = None if expanded else chosen_collocation(system, rtol, events, collocation)
+    expanded, collocated = None, None
+    if method == "power-series" or (method == "auto" and not vary):
+        expanded = chosen_series(system, state, times, rtol, max_step, events, work,
+                                 method == "power-series")
+    if method == "radau" or (method == "auto" and expanded is None):
+        collocated = chosen_collocation(system, rtol, events, method == "radau")
     propagate, looser = 0, _LOOSER
     if vary and collocated:
         # Compiled for runs that need it only.
@@ -285,13 +285,11 @@ def integrate(
     progress: Callable[[float], None] | None = None,
     checkpoint: Path | None = None,
     events: Sequence[AnyEvent] = (),
-    series: str = "auto",
-    collocation: str = "auto",
+    method: str = "auto",
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, series=series,
-                collocation=collocation)
+    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, method=method)
     kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if kept is not None:
         kept.read()
@@ -304,7 +302,8 @@ def integrate(
         ended = Status.INTERRUPTED
         if kept is not None:
             kept.write()
-    statistics: dict[str, Any] = {**run.statistics, "seconds": clock.perf_counter() - begin}
+    statistics: dict[str, Any] = {"method": run.method, **run.statistics,
+                                  "seconds": clock.perf_counter() - begin}
     if ended is None:
         ended = ENDS[result]
     if ended not in (Status.FINISHED, Status.EVENT):

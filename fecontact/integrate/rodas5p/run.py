@@ -52,6 +52,13 @@ class Run(StepRun):
     found: list[tuple[Array, Array]] = field(default_factory=list)
 
     @property
+    def method(self) -> str:
+        """Name of its method."""
+        if self.series is not None:
+            return "power-series"
+        return "rodas5p" if self.collocation is None else "radau"
+
+    @property
     def work(self) -> Array:
         """Work (N, p + 2 n) up to the output times [J]."""
         return self.output.work

@@ -90,20 +90,17 @@ class Series(NamedTuple):
 
 def chosen_series(
     system: ContactSystem, state: Array, times: Array, rtol: float, max_step: float | None,
-    events: Sequence[AnyEvent], work: bool, use: str,
+    events: Sequence[AnyEvent], work: bool, asked: bool,
 ) -> Series | None:
-    """Tables of a system for which series are used; InputError where they cannot 'always' be."""
-    if use == "never":
-        return None
+    """Tables of a system for which series are used; InputError where they are asked for in vain."""
     found = obstacle(system, events, float(times[0]), float(times[-1]))
     if found is not None:
-        if use == "always":
-            raise InputError(f"Rodas5P: series = 'always' is for systems whose forces are "
-                             f"polynomials between switches of contacts, but {found}; leave it "
-                             f"out.")
+        if asked:
+            raise InputError(f"PowerSeries() is for systems whose forces are polynomials between "
+                             f"switches of contacts, but {found}; take Auto().")
         return None
     pieces = law_pieces(system)
-    if use == "auto" and not worthwhile(system, pieces):
+    if not asked and not worthwhile(system, pieces):
         return None
     return _tables(system, pieces, state, rtol, max_step, work)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.integrate.reference.scipy import longest_step
+from fecontact.integrate.run_limits import longest_step
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import POWER_COUNT
