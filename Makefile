@@ -104,7 +104,7 @@ $(BIN)/python:
 # What runs need; tools of development take as long again.
 $(BASIC): pyproject.toml | $(BIN)/python
 	@echo "Installing fecontact and what it needs"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[all]'
 	@touch $@
 
 $(READY): pyproject.toml | $(BIN)/python
@@ -114,12 +114,12 @@ $(READY): pyproject.toml | $(BIN)/python
 
 $(RUNS): | $(BASIC)
 	@echo "Compiling its kernels for runs, on two cores"
-	@$(BIN)/python .ci/compile runs
+	@$(BIN)/fecontact compile
 	@touch $@
 
 $(ALL): | $(READY)
 	@echo "Compiling all its kernels, on two cores"
-	@$(BIN)/python .ci/compile all
+	@$(BIN)/fecontact compile --all
 	@touch $@ $(RUNS)
 
 $(SYSTEM): .ci/system-libraries fecontact/core/system_libraries.py | $(BIN)/python

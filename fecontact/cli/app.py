@@ -46,6 +46,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     about.laws,
     about.demo,
     about.doctor,
+    about.compile_,
     completion,
 )
 
@@ -66,7 +67,7 @@ app = App(
 )
 app.meta.suppress_keyboard_interrupt = False
 for _place, _command in enumerate(COMMANDS):
-    app.command(_command, sort_key=_place)
+    app.command(_command, name=_command.__name__.rstrip("_"), sort_key=_place)
 
 
 @app.meta.default

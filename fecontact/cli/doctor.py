@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from importlib import metadata
 
 from fecontact.core import system_libraries
+from fecontact.core.extras import how_to_install, installed
+from fecontact.core.stored_code import prebuilt
 
 _GMSH = """
 import gmsh
@@ -67,10 +69,19 @@ def examine(report: Callable[[str], None] = lambda what: None) -> list[Finding]:
     """
     found = [Finding("Python", True, sys.version.split()[0])]
     found += _packages()
+    there = prebuilt()
+    found.append(Finding("kernels", True, "compiled on this machine" if there is None else
+                         f"of the package fecontact-kernels, for {there.folder.name}"))
     absent = system_libraries.missing()
-    for what, code in (("meshing (Gmsh)", _GMSH), ("compiled laws (numba)", _COMPILED),
-                       ("pictures (VTK)", _RENDERING), ("movies (ffmpeg)", _FFMPEG)):
+    for what, code, module in (
+            ("meshing around holes (Gmsh)", _GMSH, "gmsh"),
+            ("compiled laws (numba)", _COMPILED, "numba"),
+            ("pictures (VTK)", _RENDERING, "pyvista"),
+            ("movies (ffmpeg)", _FFMPEG, "imageio_ffmpeg")):
         report(what)
+        if not installed(module):
+            found.append(Finding(what, True, f"not installed: {how_to_install(module)}"))
+            continue
         reason = _attempt(code)
         remedy = ""
         if reason is not None:

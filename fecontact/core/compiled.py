@@ -1,4 +1,4 @@
-"""Compilation of kernels and laws by numba, and the code that is kept on disk.
+"""Compilation of kernels and laws by numba.
 
 Laws reach a kernel as addresses of compiled functions. A kernel is then compiled once for all
 laws, for this process and later ones, a call from a kernel costs a few nanoseconds, and calling
@@ -8,8 +8,6 @@ the kernel from Python spends no time on converting function objects.
 import dis
 import hashlib
 import inspect
-import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -23,18 +21,21 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numba import types
 from numba.core import sigutils
-from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
 
 from fecontact.core.addresses import contract_signature
-from fecontact.core.errors import InputError, ModelWarning
+from fecontact.core.errors import InputError
 from fecontact.core.kernel_parts import BorrowingCompiler, kernel_compiler, part
+from fecontact.core.progress import said_if_slow
 from fecontact.core.records import is_record, signature_of
+from fecontact.core.stored_code import keep_on_disk
 
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
+_COMPILING = ("Compiling what is used for the first time, once on this machine; "
+              "'fecontact compile --all' compiles everything ahead.")
 
 
 def source_digest(function: Any) -> str:
@@ -122,74 +123,6 @@ def _is_library(name: str) -> bool:
                                       "operator")
 
 
-class _StoredCode(IndexDataCacheFile):
-    """Compiled code on disk, made anew where it cannot be read.
-
-    Power cuts and full disks leave files that are cut short, and numba stops at them. Only such
-    files of this very function are removed. Code that cannot be stored is compiled again by the
-    next process.
-    """
-
-    def _load_index(self) -> Any:
-        try:
-            return super()._load_index()
-        except OSError:
-            return {}
-        except Exception:  # unpickling damaged files fails in every way there is
-            _remove(self._index_path)
-            return {}
-
-    def _load_data(self, name: str) -> Any:
-        try:
-            return super()._load_data(name)
-        except OSError:
-            raise  # which numba takes as not stored
-        except Exception as error:
-            path = self._data_path(name)
-            _remove(path)
-            raise FileNotFoundError(path) from error
-
-    def save(self, key: Any, data: Any) -> None:
-        """Store code under a key, if that is possible."""
-        with suppress(OSError):
-            super().save(key, data)
-
-
-def _remove(path: str) -> None:
-    with suppress(OSError):
-        Path(path).unlink()
-
-
-def _keep_on_disk(compiled: Any, function: Any, module: str = "", variant: str = "") -> None:
-    """Store code in a file, keyed by the sources it is made from and the module it refers to.
-
-    Where no file can be written, the code is compiled in memory, and a warning says so once.
-    """
-    try:
-        compiled.enable_caching()
-    except RuntimeError:  # numba's, for a source whose code has no folder
-        _warn_of_compilation()
-        return
-    stored: Any = getattr(compiled, "_cache", None)
-    if isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
-        mark = f".{hashlib.sha256(variant.encode()).hexdigest()[:16]}" if variant else ""
-        # Without the number of the line, which says nothing of what is compiled.
-        name = re.sub(r"-\d+(?=\.py)", "", stored._impl.filename_base)
-        if inspect.getclosurevars(getattr(function, "py_func", function)).nonlocals:
-            # The sources of enclosed functions are in the digest; numba would compare the objects.
-            stored._index_key = lambda signature, codegen: (signature, codegen.magic_tuple())
-        stored._cache_file = _StoredCode(stored.cache_path, name + mark,
-                                         (source_digest(function), module))
-
-
-@cache
-def _warn_of_compilation() -> None:
-    """Warn that compiled code is lost with the process; repeated calls do nothing."""
-    warnings.warn("Compiled code cannot be stored, so that every process compiles it anew, which "
-                  "takes minutes; name a writable folder in the environment variable "
-                  "NUMBA_CACHE_DIR.", ModelWarning, stacklevel=4)
-
-
 class _Kernel(CPUDispatcher):
     """A function for Python, compiled for one signature when it is first called.
 
@@ -223,7 +156,8 @@ class _Kernel(CPUDispatcher):
         """Itself, compiled."""
         with global_compiler_lock:
             if not self.overloads:
-                self.compile(self.signature)
+                with said_if_slow(_COMPILING):
+                    self.compile(self.signature)
                 self.disable_compile()
         return self
 
@@ -300,7 +234,7 @@ def kernel(
     kind = _RecordKernel if any(map(is_record, function.__annotations__.values())) else _Kernel
     made = kind(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
     made.given, made.by_address, made.options = signature, by_address, options
-    _keep_on_disk(made, made, variant=constants)
+    keep_on_disk(made, (source_digest(made), ""), function.__module__, constants)
     KERNELS.append(made)
     return made
 
@@ -367,7 +301,7 @@ class CompiledLaw:
                     {"error_model": "numpy"}, BorrowingCompiler)
         # Functions typed into a console have no file beside which they could be stored.
         if Path(inspect.getfile(function)).is_file():
-            _keep_on_disk(law, function, function.__module__)
+            keep_on_disk(law, (source_digest(function), function.__module__), function.__module__)
         try:
             law.compile()
         except (NumbaError, TypeError) as error:

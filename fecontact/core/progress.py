@@ -125,6 +125,33 @@ def say(text: str) -> None:
         line(text)
 
 
+_said: set[str] = set()
+
+
+@contextmanager
+def said_if_slow(text: str) -> Iterator[None]:
+    """Print a line on stderr, as :func:`say`, once what follows has taken two seconds.
+
+    A line is printed once in a process.
+    """
+    if text in _said:
+        yield
+        return
+
+    def tell() -> None:
+        if text not in _said:
+            _said.add(text)
+            say(text)
+
+    timer = threading.Timer(PATIENCE, tell)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
 def clock(seconds: float) -> str:
     """``1:05``, ``2:03:04``."""
     whole = round(seconds)

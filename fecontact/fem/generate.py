@@ -1,4 +1,4 @@
-"""Meshing of plane bodies by Gmsh, with named boundaries and points."""
+"""Meshing of plane bodies, around holes by Gmsh, with named boundaries and points."""
 
 import ctypes
 import math
@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from fecontact.core import system_libraries
 from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.extras import optional
 from fecontact.core.resources.memory import available_memory
 from fecontact.fem.mesh import Mesh
+from fecontact.fem.rectangles import mesh_of_rectangles
 from fecontact.fem.shapes import Beam, Block, Grid, Hole, Pendulum, Shape, grid_of, nearest_line
 from fecontact.fem.solids.generate import generate_solid
 from fecontact.fem.solids.shapes import SolidShape
@@ -101,7 +103,7 @@ _GMSH_OPTIONS: dict[str, float] = {
 
 
 def generate(shape: Shape | SolidShape) -> Mesh:
-    """Mesh a plane body with Gmsh, in rows and columns of rectangles or triangles, or a solid.
+    """Mesh a plane body, in rows and columns of rectangles or triangles, or a solid.
 
     Parameters
     ----------
@@ -119,7 +121,7 @@ def generate(shape: Shape | SolidShape) -> Mesh:
     InputError
         For another shape, or an element size that makes more than two million elements.
     MissingLibraryError
-        If a library that Gmsh needs is not installed; solids are meshed without Gmsh.
+        If there is no Gmsh, which meshes around the hinge of a pendulum; others need none.
 
     Notes
     -----
@@ -133,6 +135,8 @@ def generate(shape: Shape | SolidShape) -> Mesh:
                          f"or a solid of fecontact.fem, such as a SolidBlock.")
     grid = grid_of(shape)
     _require_few_cells(shape, grid)
+    if grid.hole is None:
+        return mesh_of_rectangles(grid, shape.element_size, shape.element)
     gmsh = _import_gmsh()
     with _GMSH_LOCK, _gmsh_session(gmsh):
         return _mesh(gmsh, grid, shape)
@@ -272,18 +276,13 @@ def _gmsh_session(gmsh: Any) -> Iterator[None]:
 
 def _import_gmsh() -> Any:
     try:
-        import gmsh
-    except ImportError:
-        raise MissingLibraryError(
-            "Gmsh, which makes the mesh, is not installed; install it with: pip install gmsh"
-        ) from None
+        return optional("gmsh", "A mesh around a hole")
     except OSError as error:
         raise MissingLibraryError(
             f"Gmsh, which makes the mesh, lacks a library of the system ({error}); on Debian or "
             f"Ubuntu install it with: "
             f"apt-get install -y {' '.join(system_libraries.PACKAGES.values())}"
         ) from None
-    return gmsh
 
 
 def _require_few_cells(shape: Shape, grid: Grid) -> None:

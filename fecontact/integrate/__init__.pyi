@@ -14,9 +14,9 @@ from .solvers import (
     Scipy,
     SetValued,
     Solver,
-    Task,
     TimeStepping,
 )
+from .task import Task
 from .trajectory import Energies, Solution
 from .wear import WearHistory, wear_history
 

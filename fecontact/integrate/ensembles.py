@@ -36,15 +36,10 @@ from fecontact.integrate.simulate import (
     require_max_step,
     require_resolved_span,
 )
-from fecontact.integrate.solvers import (
-    AUTO,
-    CompiledSolver,
-    Solver,
-    Task,
-    require_solver,
-)
+from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_solver
 from fecontact.integrate.step_loop import RUNNING
 from fecontact.integrate.step_runs import ENDS
+from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import MOVING, Moving, in_time, state_size

@@ -18,7 +18,8 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.events import AnyEvent, ContactEvents, Event, as_events
 from fecontact.integrate.field_runs.field_run import FieldRun, field_state, run_field
 from fecontact.integrate.initial_state import Initial, initial_state
-from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, Task, require_solver
+from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_solver
+from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time

@@ -10,7 +10,8 @@ from fecontact.integrate.coefficients import node_values
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.nonsmooth.problem import CREEP, STEEP
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import SET_VALUED, SetValued, Task
+from fecontact.integrate.solvers import SET_VALUED, SetValued
+from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.friction_curve import coefficient, largest_coefficient
 from fecontact.system.contact_system import ContactSystem

@@ -1,7 +1,7 @@
 """Solvers of runs: classes of their options with a method ``run``."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -11,43 +11,9 @@ import numpy as np
 
 from fecontact.core.checks import as_floats, as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest, shown
-from fecontact.core.types import Array
 from fecontact.integrate.coefficients import Coefficient
-from fecontact.integrate.events import AnyEvent
+from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
-from fecontact.system.contact_system import ContactSystem
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """Input of a solver.
-
-    Attributes
-    ----------
-    system : ContactSystem
-        The system.
-    state : (2 m + n s,) array
-        y = [q, q', z] at the first time.
-    times : (N,) array
-        Output times, ascending [s].
-    rtol : float
-        Relative tolerance.
-    max_step : float or None
-        Longest step [s].
-    events : sequence of ContactEvents, Crossing and Event
-        Events to locate; empty unless that is among its ``abilities``.
-    progress : callable or None
-        Called occasionally with the time reached [s].
-    """
-
-    system: ContactSystem
-    state: Array
-    times: Array
-    rtol: float
-    max_step: float | None = None
-    events: Sequence[AnyEvent] = ()
-    progress: Callable[[float], None] | None = None
-
 
 # What some solvers can do and others cannot, and how a sentence says it.
 ABILITIES = {"events": "locates events", "fields": "runs vector fields",

@@ -1,4 +1,4 @@
-"""Commands about fecontact itself: ``doctor``, ``laws`` and ``demo``."""
+"""Commands about fecontact itself: ``compile``, ``demo``, ``doctor``, ``keys``, ``laws``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from fecontact.cli.console import echo, show
+from fecontact.core.errors import InputError
 
 
 def doctor() -> int:
@@ -61,6 +62,33 @@ def keys(
         from fecontact.study.reference_page import study_keys
         from fecontact.sweeps.summaries import summaries_table
     print(study_keys(section, {"sweep": summaries_table()}), end="")
+
+
+def compile_(
+    *,
+    everything: Annotated[bool, Parameter(name="--all", help=(
+        "All kernels, also those of branches, responses and set-valued friction."))] = False,
+    wheel: Annotated[Path | None, Parameter(help=(
+        "Folder for a package of all kernels instead, which other machines install."))] = None,
+    cpu: Annotated[list[str] | None, Parameter(negative=(), help=(
+        "Processors of that package: x86-64-v3, x86-64-v2, or both, by default."))] = None,
+) -> int:
+    """Compile ahead what runs need, once on this machine; a first run then begins at once.
+
+    ``pip install 'fecontact[kernels]'`` brings compiled kernels, with which this is not needed.
+    """
+    from fecontact.cli.kernels import build_package, compile_kernels
+
+    if wheel is not None:
+        from fecontact.core.stored_code import FAMILIES
+
+        echo(str(build_package(wheel, cpu or list(FAMILIES))))
+        return 0
+    if cpu:
+        raise InputError("--cpu is for a package of kernels; give --wheel FOLDER too.")
+    count = compile_kernels("all" if everything else "runs")
+    echo(f"{count} kernels are compiled.")
+    return 0
 
 
 def demo(

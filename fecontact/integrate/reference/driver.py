@@ -17,7 +17,7 @@ from fecontact.integrate.run_limits import (
     resolution,
     work_of_jump,
 )
-from fecontact.integrate.solvers import Task
+from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system.contact_system import ContactSystem

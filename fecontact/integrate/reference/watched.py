@@ -12,7 +12,7 @@ from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p.event_kernels import Watch, begin, note_events_at
 from fecontact.integrate.rodas5p.state import Problem, Progress, Room, Step
-from fecontact.integrate.solvers import Task
+from fecontact.integrate.task import Task
 from fecontact.system.nodes import ground_motion
 
 # Pieces of a step that are searched one by one: dense outputs have degree up to five, and twelve

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fecontact.analysis.sampling import between_outputs
 from fecontact.core.checks import as_path, require_frame_rate
 from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.extras import optional
 from fecontact.core.files.atomic_write import beside, put, replaced, unwritable
 from fecontact.core.progress import counting_bar, held_back_interrupt, shown
 from fecontact.integrate.trajectory import Trajectory
@@ -259,8 +260,7 @@ def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: 
 @contextmanager
 def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], Any]]:
     """A function that adds a frame to a movie; the file is written unless the block fails."""
-    import imageio_ffmpeg
-
+    imageio_ffmpeg = optional("imageio_ffmpeg", "A movie")
     _require_folder(path)
     try:
         imageio_ffmpeg.get_ffmpeg_exe()

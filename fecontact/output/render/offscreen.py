@@ -9,6 +9,7 @@ from functools import cache
 
 from fecontact.core import system_libraries
 from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.extras import how_to_install, installed
 from fecontact.core.resources.memory import available_memory, shown_memory
 
 _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
@@ -96,6 +97,9 @@ def _attempt() -> tuple[str | None, str | None, int]:
 
     One of the first two is None.
     """
+    if not installed("pyvista"):
+        return (f"Pictures of bodies need pyvista, which is not installed; install it with: "
+                f"{how_to_install('pyvista')}"), None, 0
     try:
         done = subprocess.run([sys.executable, "-c", _ATTEMPT], capture_output=True, text=True,
                               timeout=120, check=False, stdin=subprocess.DEVNULL)

@@ -1,0 +1,169 @@
+"""Compiled code on disk: in the cache of this machine, and in the package ``fecontact-kernels``.
+
+The package has the kernels of fecontact compiled for families of processors, so that nothing need
+be compiled at first. Its code is found by the same marks of sources as that of the cache, and
+used if versions agree and the processor has the features of the family.
+"""
+
+import hashlib
+import inspect
+import json
+import os
+import re
+import warnings
+from contextlib import suppress
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import llvmlite
+import numba
+from llvmlite.binding import get_host_cpu_features
+from numba.core.caching import IndexDataCacheFile
+
+from fecontact.core.errors import ModelWarning
+
+# Families of processors, the newest first, and the features that tell them from the one before.
+_V2 = ("cx16", "popcnt", "sahf", "sse3", "ssse3", "sse4.1", "sse4.2")
+FAMILIES = {
+    "x86-64-v3": (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
+    "x86-64-v2": _V2,
+}
+PACKAGE = "fecontact_kernels"
+# Name of the file that says what code of a family was compiled with.
+MADE_WITH = "made-with.json"
+# Environment variables: compile for this very processor, and put compiled code into this folder.
+NATIVE, FOLDER = "FECONTACT_NATIVE", "FECONTACT_KERNELS_FOLDER"
+
+
+class Prebuilt(NamedTuple):
+    """Code of the package that serves this process: its folder, and numba's key of its target."""
+
+    folder: Path
+    target: tuple[str, ...]
+
+
+def made_with() -> dict[str, Any]:
+    """Versions that compiled code depends on."""
+    from fecontact import __version__
+
+    return {"fecontact": __version__, "numba": numba.__version__,
+            "llvmlite": llvmlite.__version__}
+
+
+@cache
+def prebuilt() -> Prebuilt | None:
+    """Code of the installed package for the newest family that this processor belongs to.
+
+    None where ``FECONTACT_NATIVE`` is set, or ``NUMBA_CPU_NAME`` names another processor.
+    """
+    if any(os.environ.get(name) for name in (NATIVE, "NUMBA_CPU_NAME", FOLDER)):
+        return None
+    found = find_spec(PACKAGE)
+    if found is None:
+        return None
+    features = get_host_cpu_features()
+    for place in found.submodule_search_locations or ():
+        for family, needed in FAMILIES.items():
+            file = Path(place, family, MADE_WITH)
+            if not file.is_file() or not all(features.get(name) for name in needed):
+                continue
+            told = json.loads(file.read_text(encoding="utf-8"))
+            target = tuple(told.pop("target"))
+            if told == made_with():
+                return Prebuilt(file.parent, target)
+    return None
+
+
+class _StoredCode(IndexDataCacheFile):
+    """Compiled code on disk, made anew where it cannot be read.
+
+    Power cuts and full disks leave files that are cut short, and numba stops at them. Only such
+    files of this very function are removed. Code that cannot be stored is compiled again by the
+    next process. What the cache does not have is looked for in the package.
+    """
+
+    package: IndexDataCacheFile | None = None
+
+    def load(self, key: Any) -> Any:
+        """The code of a key, or None."""
+        found = super().load(key)
+        there = prebuilt()
+        if found is not None or self.package is None or there is None:
+            return found
+        signature, target, *rest = key
+        if target[0] != there.target[0]:
+            return None
+        with suppress(Exception):  # unpickling damaged files fails in every way there is
+            return self.package.load((signature, there.target, *rest))
+        return None
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except OSError:
+            return {}
+        except Exception:  # unpickling damaged files fails in every way there is
+            _remove(self._index_path)
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        try:
+            return super()._load_data(name)
+        except OSError:
+            raise  # which numba takes as not stored
+        except Exception as error:
+            path = self._data_path(name)
+            _remove(path)
+            raise FileNotFoundError(path) from error
+
+    def save(self, key: Any, data: Any) -> None:
+        """Store code under a key, if that is possible."""
+        with suppress(OSError):
+            super().save(key, data)
+
+
+def _remove(path: str) -> None:
+    with suppress(OSError):
+        Path(path).unlink()
+
+
+def keep_on_disk(
+    compiled: Any, stamp: tuple[str, str], module: str, variant: str = "",
+) -> None:
+    """Store compiled code of a module in a file, keyed by a stamp of what it is made from.
+
+    Where no file can be written, the code is compiled in memory, and a warning says so once.
+    """
+    try:
+        compiled.enable_caching()
+    except RuntimeError:  # numba's, for a source whose code has no folder
+        _warn_of_compilation()
+        return
+    stored: Any = getattr(compiled, "_cache", None)
+    if not isinstance(getattr(stored, "_cache_file", None), IndexDataCacheFile):
+        return
+    mark = f".{hashlib.sha256(variant.encode()).hexdigest()[:16]}" if variant else ""
+    # Without the number of the line, which says nothing of what is compiled.
+    name = re.sub(r"-\d+(?=\.py)", "", stored._impl.filename_base) + mark
+    if inspect.getclosurevars(stored._py_func).nonlocals:
+        # The sources of enclosed functions are in the digest; numba would compare the objects.
+        stored._index_key = lambda signature, codegen: (signature, codegen.magic_tuple())
+    package, _, below = module.partition(".")
+    own = package == __name__.partition(".")[0]
+    if own and (folder := os.environ.get(FOLDER)):
+        stored._cache_path = str(Path(folder, *below.split(".")))
+        Path(stored._cache_path).mkdir(parents=True, exist_ok=True)
+    stored._cache_file = _StoredCode(stored._cache_path, name, stamp)
+    if own and (there := prebuilt()) is not None:
+        stored._cache_file.package = IndexDataCacheFile(
+            str(there.folder.joinpath(*below.split("."))), name, stamp)
+
+
+@cache
+def _warn_of_compilation() -> None:
+    """Warn that compiled code is lost with the process; repeated calls do nothing."""
+    warnings.warn("Compiled code cannot be stored, so that every process compiles it anew, which "
+                  "takes minutes; name a writable folder in the environment variable "
+                  "NUMBA_CACHE_DIR.", ModelWarning, stacklevel=4)

@@ -1,0 +1,39 @@
+"""What a solver is asked to do."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from fecontact.core.types import Array
+from fecontact.integrate.events import AnyEvent
+from fecontact.system.contact_system import ContactSystem
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Input of a solver.
+
+    Attributes
+    ----------
+    system : ContactSystem
+        The system.
+    state : (2 m + n s,) array
+        y = [q, q', z] at the first time.
+    times : (N,) array
+        Output times, ascending [s].
+    rtol : float
+        Relative tolerance.
+    max_step : float or None
+        Longest step [s].
+    events : sequence of ContactEvents, Crossing and Event
+        Events to locate; empty unless that is among its ``abilities``.
+    progress : callable or None
+        Called occasionally with the time reached [s].
+    """
+
+    system: ContactSystem
+    state: Array
+    times: Array
+    rtol: float
+    max_step: float | None = None
+    events: Sequence[AnyEvent] = ()
+    progress: Callable[[float], None] | None = None
