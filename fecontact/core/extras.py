@@ -28,7 +28,8 @@ def optional(module: str, what: str) -> Any:
     MissingLibraryError
         If it is not installed, with the command that installs it.
     """
-    if not installed(module):
+    try:
+        return import_module(module)
+    except ImportError:
         raise MissingLibraryError(f"{what} needs {module}, which is not installed; install it "
-                                  f"with: {how_to_install(module)}")
-    return import_module(module)
+                                  f"with: {how_to_install(module)}") from None

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from fecontact import (
     Beam,
@@ -19,6 +20,8 @@ from fecontact import (
     read_mesh,
     write_mesh,
 )
+from fecontact.fem import generate as generation
+from fecontact.fem.shapes import grid_of
 
 try:
     import gmsh
@@ -26,6 +29,8 @@ except (ImportError, OSError) as error:
     pytest.skip(f"Gmsh does not load: {error}", allow_module_level=True)
 
 MESHES = Path(__file__).parents[2] / "meshes"
+# Gmsh meshes around holes alone.
+HOLED = Pendulum(hinge_radius=0.002)
 
 SHAPES = [
     Beam(),
@@ -223,7 +228,7 @@ def test_something_else_is_not_a_shape() -> None:
 
 def test_generation_is_quiet_and_leaves_gmsh_closed(capfd: pytest.CaptureFixture[str]) -> None:
     handler = signal.getsignal(signal.SIGINT)
-    generate(Beam())
+    generate(HOLED)
     assert capfd.readouterr() == ("", "")
     assert signal.getsignal(signal.SIGINT) is handler
     assert not gmsh.isInitialized()
@@ -231,17 +236,17 @@ def test_generation_is_quiet_and_leaves_gmsh_closed(capfd: pytest.CaptureFixture
 
 def test_generation_from_threads() -> None:
     areas: list[float] = []
-    threads = [threading.Thread(target=lambda: areas.append(generate(Pendulum()).area))
+    threads = [threading.Thread(target=lambda: areas.append(generate(HOLED).area))
                for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert areas == [generate(Pendulum()).area] * 4
+    assert areas == [generate(HOLED).area] * 4
 
 
 def test_gmsh_in_use_by_the_caller_is_left_as_it_was() -> None:
-    alone = generate(Beam(element="triangle"))
+    alone = generate(HOLED)
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -253,7 +258,7 @@ def test_gmsh_in_use_by_the_caller_is_left_as_it_was() -> None:
         gmsh.model.add("another")
         gmsh.model.setCurrent("mine")
         models = gmsh.model.list()
-        mesh = generate(Beam(element="triangle"))
+        mesh = generate(HOLED)
         assert gmsh.isInitialized()
         assert gmsh.model.list() == models
         assert gmsh.model.getCurrent() == "mine"
@@ -271,7 +276,7 @@ def test_gmsh_is_closed_after_a_failure(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(gmsh.model.mesh, "generate", fail)
     with pytest.raises(RuntimeError, match="no mesh today"):
-        generate(Beam())
+        generate(HOLED)
     assert not gmsh.isInitialized()
 
 
@@ -281,7 +286,8 @@ def test_gmsh_is_closed_after_a_failure(monkeypatch: pytest.MonkeyPatch) -> None
         ("raise OSError('libGLU.so.1: cannot open shared object file')",
          r"lacks a library of the system \(libGLU.so.1: .*\); .* apt-get install -y libegl1 libgl1 "
          "libglu1-mesa libxcursor1 libxft2 libxinerama1 libgomp1"),
-        ("raise ImportError('no gmsh')", "Gmsh.* is not installed; .* pip install gmsh"),
+        ("raise ImportError('no gmsh')",
+         r"A mesh around a hole needs gmsh, .* not installed; .* pip install .fecontact\[mesh\]"),
     ],
 )
 def test_missing_libraries_are_named(
@@ -291,7 +297,39 @@ def test_missing_libraries_are_named(
     monkeypatch.delitem(sys.modules, "gmsh")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(MissingLibraryError, match=message):
-        generate(Beam())
+        generate(HOLED)
+
+
+@pytest.mark.parametrize("shape", [
+    Beam(length=0.11, height=0.017, element_size=0.004), Beam(element="triangle"),
+    Block(contact_length=0.03), Block(element="triangle", drive_height=0.013),
+    Pendulum(), Pendulum(element="triangle"),
+], ids=lambda shape: f"{type(shape).__name__} {shape.element}")
+def test_rectangles_are_meshed_as_by_gmsh(shape) -> None:
+    own, grid = generate(shape), grid_of(shape)
+    with generation._gmsh_session(gmsh):
+        other = generation._mesh(gmsh, grid, shape)
+    distance, node = cKDTree(other.nodes).query(own.nodes)
+    assert len(own.nodes) == len(other.nodes)
+    assert distance.max() < 1e-11
+
+    def cyclic(cells):
+        return {tuple(np.roll(cell, -np.argmin(cell)).tolist()) for cell in cells}
+
+    assert cyclic(node[own.cells]) == cyclic(other.cells)
+    assert own.boundaries.keys() == other.boundaries.keys()
+    for name, edges in own.boundaries.items():
+        assert set(map(tuple, node[edges].tolist())) == set(map(tuple,
+                                                               other.boundaries[name].tolist()))
+    for name, place in own.points.items():
+        assert (node[place] == other.points[name]).all()
+
+
+def test_rectangles_need_no_gmsh(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gmsh", None)
+    assert generate(Beam()).area == pytest.approx(Beam().length * Beam().height, rel=1e-14)
+    with pytest.raises(MissingLibraryError, match="A mesh around a hole needs gmsh"):
+        generate(HOLED)
 
 
 def committed_shapes() -> dict:
