@@ -23,7 +23,7 @@ SLOW = {"test_documentation", "test_examples", "test_benchmarks", "test_site", "
 # Files whose tests start processes, draw movies, compile or follow motions for long.
 LONG = {
     "test_kinks_between_samples", "test_modes_at_an_amplitude", "test_bad_arguments",
-    "test_damaged_caches", "test_memory_laws", "test_laws_by_name",
+    "test_damaged_caches", "test_prebuilt", "test_memory_laws", "test_laws_by_name",
     "test_plots", "test_sweep_statistics", "test_assembled",
     "test_hairpin", "test_closed_and_flat_branches", "test_shooting", "test_orbit_curves",
     "test_critical_orbits", "test_intervals_along_branches", "test_intervals_along_curves",

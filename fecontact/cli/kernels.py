@@ -17,8 +17,8 @@ from fecontact.core.errors import FecontactError, InputError, choices
 from fecontact.core.progress import counting_bar
 from fecontact.core.stored_code import FAMILIES, FOLDER, MADE_WITH, PACKAGE, made_with
 
-# Modules whose kernels are compiled, and what is compiled when its address is asked for, or by the
-# functions of a list. Kernels that share much of their code are neighbours.
+# Modules whose kernels are compiled, then members that are compiled for their address, or size by
+# size. Kernels that share much of their code are neighbours.
 _BODIES = ("fecontact.laws.sampling", "fecontact.fem.assembly", "fecontact.reduction.modal_basis",
            "fecontact.fem.mesh_files", "fecontact.system.friction_memory",
            "fecontact.system.jacobian")
@@ -76,14 +76,14 @@ def compile_kernels(part: str) -> int:
             other.kill()
             raise
         if other.returncode != 0:
-            # What it has left out; the rest is read.
+            # Compiled here: kernels that it left out; all others are only read.
             for compile_one in found:
                 compile_one()
     return len(found)
 
 
 def _jobs(part: str) -> list[Callable[[], Any]]:
-    """What is to be compiled, as functions, in the same order in each process."""
+    """Functions that compile one kernel each, in the same order in each process."""
     compiled = import_module("fecontact.core.compiled")
     kernels = compiled.KERNELS
     found: list[Callable[[], Any]] = []
@@ -141,9 +141,9 @@ def build_package(folder: Path, families: Sequence[str]) -> Path:
             _compile_family(package / family, family)
         (package / "__init__.py").write_text('"""Compiled kernels of fecontact."""\n',
                                              encoding="utf-8")
-        license_file = Path(metadata.distribution("fecontact").locate_file("LICENSE"))
-        if license_file.is_file():
-            shutil.copy(license_file, place)
+        for file in metadata.files("fecontact") or []:
+            if file.name == "LICENSE":
+                shutil.copy(file.locate(), place)
         Path(place, "pyproject.toml").write_text(_project(), encoding="utf-8")
         Path(place, "hatch_build.py").write_text(_HOOK, encoding="utf-8")
         folder.mkdir(parents=True, exist_ok=True)
@@ -186,18 +186,18 @@ def _run(command: Sequence[str], variables: dict[str, str] | None = None) -> str
 
 def _project() -> str:
     """``pyproject.toml`` of the package, which fits these versions alone."""
-    told = made_with()
+    versions = made_with()
     return f'''[build-system]
 requires = ["hatchling>=1.25"]
 build-backend = "hatchling.build"
 
 [project]
 name = "fecontact-kernels"
-version = "{told["fecontact"]}"
+version = "{versions["fecontact"]}"
 description = "Compiled kernels of fecontact, with which nothing is compiled at its first run"
 license = "BSD-3-Clause"
 requires-python = "=={sys.version_info.major}.{sys.version_info.minor}.*"
-dependencies = ["numba=={told["numba"]}", "llvmlite=={told["llvmlite"]}"]
+dependencies = ["numba=={versions["numba"]}", "llvmlite=={versions["llvmlite"]}"]
 
 [tool.hatch.build.targets.wheel]
 include = ["{PACKAGE}"]

@@ -156,7 +156,8 @@ class _Kernel(CPUDispatcher):
         """Itself, compiled."""
         with global_compiler_lock:
             if not self.overloads:
-                with said_if_slow(_COMPILING):
+                # Code that is on disk is no miss.
+                with said_if_slow(_COMPILING, lambda: bool(self._cache_misses)):
                     self.compile(self.signature)
                 self.disable_compile()
         return self

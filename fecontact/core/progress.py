@@ -129,17 +129,17 @@ _said: set[str] = set()
 
 
 @contextmanager
-def said_if_slow(text: str) -> Iterator[None]:
+def said_if_slow(text: str, applies: Callable[[], bool]) -> Iterator[None]:
     """Print a line on stderr, as :func:`say`, once what follows has taken two seconds.
 
-    A line is printed once in a process.
+    A line is printed once in a process, and only if it ``applies`` then.
     """
     if text in _said:
         yield
         return
 
     def tell() -> None:
-        if text not in _said:
+        if text not in _said and applies():
             _said.add(text)
             say(text)
 

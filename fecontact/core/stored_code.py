@@ -69,9 +69,9 @@ def prebuilt() -> Prebuilt | None:
             file = Path(place, family, MADE_WITH)
             if not file.is_file() or not all(features.get(name) for name in needed):
                 continue
-            told = json.loads(file.read_text(encoding="utf-8"))
-            target = tuple(told.pop("target"))
-            if told == made_with():
+            versions = json.loads(file.read_text(encoding="utf-8"))
+            target = tuple(versions.pop("target"))
+            if versions == made_with():
                 return Prebuilt(file.parent, target)
     return None
 

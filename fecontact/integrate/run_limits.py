@@ -1,4 +1,4 @@
-"""What limits the steps of a run: its breaks, and scales of its motion and energy."""
+"""Limits of the steps of a run: breaks, periods, and scales of motion and energy."""
 
 import numpy as np
 

@@ -15,7 +15,7 @@ from fecontact.integrate.coefficients import Coefficient
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
 
-# What some solvers can do and others cannot, and how a sentence says it.
+# Abilities that not all solvers have, and the verb and object of a sentence about them.
 ABILITIES = {"events": "locates events", "fields": "runs vector fields",
              "derivatives": "carries derivatives of the motion along"}
 

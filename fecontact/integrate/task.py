@@ -1,4 +1,4 @@
-"""What a solver is asked to do."""
+"""Input of solvers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -207,3 +207,16 @@ def test_closed_standard_error_stops_no_work(monkeypatch):
         monkeypatch.setattr(sys, "stderr", stream)
         with progress.titled_bar() as show:
             show("Running", 0.5)
+
+
+def test_what_is_slow_is_said_once(notebook, capsys, monkeypatch):
+    def wait(seconds, text, applies=True):
+        with progress.said_if_slow(text, lambda: applies):
+            time.sleep(seconds)
+        return capsys.readouterr().err
+
+    monkeypatch.setattr(progress, "PATIENCE", 0.2)
+    assert wait(0.0, "Compiling.") == ""
+    assert wait(0.6, "Reading.", applies=False) == ""
+    assert wait(0.6, "Compiling.") == "Compiling.\n"
+    assert wait(0.6, "Compiling.") == ""

@@ -35,7 +35,7 @@ from fecontact.system.powers import NODE_POWERS, POWERS, powers
 
 
 class Equations(NamedTuple):
-    """What a library's solver integrates: y' of state and work, and how finely.
+    """Equations for a library's solver: y' of state and work, and its tolerances.
 
     ``rate(t, y)`` and ``jacobian(t, y)`` return new arrays; ``tolerance`` is the absolute one of
     each entry, ``longest`` the longest step [s].

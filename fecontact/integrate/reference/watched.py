@@ -21,7 +21,7 @@ _PIECES = 4
 
 
 class Watched:
-    """What is watched for in the steps of a run from a time and state, and what was found."""
+    """Search for events in the steps of a run from a time and state."""
 
     def __init__(self, task: Task, t: float, state: Array) -> None:
         from fecontact.integrate.rodas5p.driver import start
@@ -66,7 +66,7 @@ class Watched:
 def _set_interpolant(states: Array, progress: Progress, room: Room) -> None:
     """Let a piece of a step be the polynomial through five states, equally far apart."""
     first, last = states[0], states[4]
-    # What remains but for the line through the ends, over s (1 - s), is quadratic.
+    # The rest beside the line through the ends, over s (1 - s), is quadratic.
     left, middle, right = ((states[k] - (1.0 - 0.25 * k) * first - 0.25 * k * last)
                            / (0.25 * k * (1.0 - 0.25 * k)) for k in (1, 2, 3))
     progress.state[:], room.after[:] = first, last
