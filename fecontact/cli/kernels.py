@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
 from pkgutil import walk_packages
@@ -93,17 +94,17 @@ def _jobs(part: str) -> list[Callable[[], Any]]:
         module = import_module(place)
         found += [kernel.ready for kernel in kernels[known:]]
         known = len(kernels)
-        made = getattr(module, member) if member else None
+        made: Any = getattr(module, member) if member else None
         if hasattr(made, "compilers"):
             found += made.compilers
         elif made is not None:
-            found.append(lambda made=made: made.address)
+            found.append(partial(getattr, made, "address"))
     laws = {}
     for package in _LAWS:
         for entry in walk_packages(import_module(package).__path__, f"{package}."):
             laws.update({id(value): value for value in vars(import_module(entry.name)).values()
                          if isinstance(value, compiled.CompiledLaw)})
-    found += [lambda law=law: law.address for law in laws.values()]
+    found += [partial(getattr, law, "address") for law in laws.values()]
     return found + [kernel.ready for kernel in kernels[known:]]
 
 

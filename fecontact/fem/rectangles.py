@@ -28,7 +28,8 @@ def mesh_of_rectangles(grid: Grid, element_size: float, element: str) -> Mesh:
             line = numbers(first_x[i], np.arange(first_y[j], first_y[j + 1] + 1))
         return np.stack([line[:-1], line[1:]], axis=1)
 
-    cells, sides = [], {}
+    cells: list[Integers] = []
+    sides: dict[tuple[str, int, int], list[str]] = {}
     for i, j, part in grid.cells():
         columns, rows = (one.ravel() for one in np.meshgrid(
             np.arange(counts_x[i]), np.arange(counts_y[j]), indexing="ij"))
