@@ -69,9 +69,9 @@ def examine(report: Callable[[str], None] = lambda what: None) -> list[Finding]:
     """
     found = [Finding("Python", True, sys.version.split()[0])]
     found += _packages()
-    package = prebuilt()
-    found.append(Finding("kernels", True, "compiled on this machine" if package is None else
-                         f"of the package fecontact-kernels, for {package.folder.name}"))
+    kernels = prebuilt()
+    found.append(Finding("kernels", True, "compiled on this machine" if kernels is None else
+                         f"of the package fecontact-kernels, for {kernels.folder.name}"))
     absent = system_libraries.missing()
     for what, code, module in (
             ("meshing around holes (Gmsh)", _GMSH, "gmsh"),
