@@ -21,7 +21,7 @@ from fecontact.system.fields.vector_field import VectorField
 _DIFFERENCE = 1e-5
 UNREPEATED = ("The internal variables of friction do not come to repeat; take more samples a "
               "period.")
-_NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0))
+_NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0), np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +206,7 @@ class Balance:
         x[:, m : 2 * m] = differences(x[:, :m]) / period
         z = np.empty((self.samples, layout.memory))
         if not march(self.times(period), x, self.field.arrays(self.parameters(u)), period,
-                     self.kept.at(x[:, :m]), z):
+                     self.kept.blocks, self.kept.at(x[:, :m]), z):
             raise AnalysisError(UNREPEATED)
         x[:, first:] = z
         return x
@@ -384,7 +384,8 @@ class Linearised:
         # Variables of other nodes have no influence.
         s, nodes = c // layout.nodes, np.arange(layout.nodes)
         whole = J[:, :, first:].reshape(N, layout.nodes, s, layout.nodes, s)
-        solve_around(np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1)), T, right)
+        solve_around(np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1)), T,
+                     problem.kept.blocks, right)
         return right
 
     def _coupled(self, z: Array) -> Array:

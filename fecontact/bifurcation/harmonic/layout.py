@@ -11,6 +11,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.types import Array, Integers
+from fecontact.system.elastic_sliders import slider_counts
 from fecontact.system.fields.vector_field import VectorField
 
 
@@ -80,6 +81,14 @@ def element_rows(field: VectorField, layout: Layout) -> Array:
                 for k in range(law.memory * len(tangents)):
                     rows[node * s + k] = tangents[k % len(tangents)][node]
     return rows
+
+
+def memory_blocks(field: VectorField, layout: Layout) -> Integers:
+    """Numbers (n,) of internal variables of each node that act on each other; 0 for all of them."""
+    if not (layout.memory and isinstance(field, ContactField)):
+        return np.zeros(layout.nodes, dtype=np.int64)
+    system = field.system()
+    return np.where(slider_counts(system) > 0, system.basis.dimension - 1, 0)
 
 
 def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> Array:

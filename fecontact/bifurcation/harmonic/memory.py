@@ -9,8 +9,8 @@ with velocities q' that are the same differences of the displacements: a spring 
 its displacement exactly. Nothing but the leak e = 1e-6 determines the mean deflection of an element
 that never slides: s is the deflection x + a of an element that has stuck since it was preloaded, a
 the part that it slid back then (:class:`Kept`). One that slides a little gives up as much of a as
-it must. What is found repeats, so that its derivatives are those of these equations, cyclic and
-node by node.
+it must. What is found repeats, so that its derivatives are those of these equations, cyclic, node
+by node and element by element.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise, solve, solve_rows
-from fecontact.core.records import Array4, Block, Matrix, Vector
-from fecontact.core.types import Array
+from fecontact.core.records import Array4, Block, IntegerVector, Matrix, Vector
+from fecontact.core.types import Array, Integers
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import SystemArrays, force_room, ground_motion, node_motion
 
@@ -40,10 +40,14 @@ class Kept:
         The displacement x from q, of springs; zero for other internal variables.
     offsets : (c,) array
         a [m].
+    blocks : (n,) array
+        How many internal variables of each node act on each other: those of an element, and all of
+        others, 0.
     """
 
     rows: Array
     offsets: Array
+    blocks: Integers
 
     def at(self, q: Array) -> Array:
         """Deflections (N, c) for displacements q (N, m)."""
@@ -53,7 +57,7 @@ class Kept:
         """Those that elements have after states (N, d), on the average."""
         c, m = self.rows.shape
         return Kept(self.rows, (states[:, states.shape[1] - c :]
-                                - states[:, :m] @ self.rows.T).mean(axis=0))
+                                - states[:, :m] @ self.rows.T).mean(axis=0), self.blocks)
 
 
 def differences(z: Array) -> Array:
@@ -64,54 +68,63 @@ def differences(z: Array) -> Array:
 
 
 @kernel
-def solve_around(slopes: Array4, T: float, x: Block) -> None:
+def solve_around(slopes: Array4, T: float, blocks: IntegerVector, x: Block) -> None:
     """Replace right sides x (N, n s, columns) by the solutions z of D z / T - g_z z = x.
 
-    ``slopes`` (N, n, s, s) holds the derivatives g_z of each of n nodes with s variables. The last
-    two samples are guessed as zero first; what this leaves around the period is the solution of
-    2 s equations, since solutions of the homogeneous equations combine.
+    ``slopes`` (N, n, s, s) holds the derivatives g_z of each of n nodes with s variables, of which
+    as many in a row as ``blocks`` (n,) says act on each other, all for 0. The last two samples of a
+    block are guessed as zero first; what this leaves around the period is the solution of two
+    equations for each of its variables, since solutions of the homogeneous equations combine.
     """
-    N, n, s, _ = slopes.shape
-    columns = x.shape[2]
+    for node in range(slopes.shape[1]):
+        s = blocks[node] if blocks[node] > 0 else slopes.shape[2]
+        for first in range(0, slopes.shape[2], s):
+            _solve_block(slopes, T, node, first, s, x)
+
+
+@helper
+def _solve_block(slopes, T, node, own, s, x):
+    """Solve for s variables of a node, from ``own`` on; see :func:`solve_around`."""
+    N, columns = len(slopes), x.shape[2]
+    first = node * slopes.shape[2] + own
     rate = N / T
     wide = columns + 2 * s
     a, pivots = np.empty((s, s)), np.empty(s, dtype=np.int64)
     z = np.empty((N, s, wide))
     ring, ring_pivots = np.empty((2 * s, 2 * s)), np.empty(2 * s, dtype=np.int64)
     given = np.empty((2 * s, columns))
-    for node in range(n):
-        for place in range(N):
-            for i in range(s):
-                for k in range(s):
-                    a[i, k] = -slopes[place, node, i, k]
-                a[i, i] += 1.5 * rate + LEAK / T
-                for c in range(wide):
-                    value = x[place, node * s + i, c] if c < columns else 0.0
-                    # Columns beyond the right sides: unit values of the last two samples.
-                    one = z[place - 1, i, c] if place > 0 else (
-                        1.0 if c == columns + i else 0.0)
-                    two = z[place - 2, i, c] if place > 1 else (
-                        (1.0 if c == columns + i else 0.0) if place == 1 else (
-                            1.0 if c == columns + s + i else 0.0))
-                    z[place, i, c] = value + rate * (2.0 * one - 0.5 * two)
-            factorise(a, s, pivots)
-            solve_rows(a, pivots, z[place])
-        for last in range(2):
-            for i in range(s):
+    for place in range(N):
+        for i in range(s):
+            for k in range(s):
+                a[i, k] = -slopes[place, node, own + i, own + k]
+            a[i, i] += 1.5 * rate + LEAK / T
+            for c in range(wide):
+                value = x[place, first + i, c] if c < columns else 0.0
+                # Columns beyond the right sides: unit values of the last two samples.
+                one = z[place - 1, i, c] if place > 0 else (
+                    1.0 if c == columns + i else 0.0)
+                two = z[place - 2, i, c] if place > 1 else (
+                    (1.0 if c == columns + i else 0.0) if place == 1 else (
+                        1.0 if c == columns + s + i else 0.0))
+                z[place, i, c] = value + rate * (2.0 * one - 0.5 * two)
+        factorise(a, s, pivots)
+        solve_rows(a, pivots, z[place])
+    for last in range(2):
+        for i in range(s):
+            for k in range(2 * s):
+                ring[last * s + i, k] = -z[N - 1 - last, i, columns + k]
+            ring[last * s + i, last * s + i] += 1.0
+            for c in range(columns):
+                given[last * s + i, c] = z[N - 1 - last, i, c]
+    factorise(ring, 2 * s, ring_pivots)
+    solve_rows(ring, ring_pivots, given)
+    for place in range(N):
+        for i in range(s):
+            for c in range(columns):
+                value = z[place, i, c]
                 for k in range(2 * s):
-                    ring[last * s + i, k] = -z[N - 1 - last, i, columns + k]
-                ring[last * s + i, last * s + i] += 1.0
-                for c in range(columns):
-                    given[last * s + i, c] = z[N - 1 - last, i, c]
-        factorise(ring, 2 * s, ring_pivots)
-        solve_rows(ring, ring_pivots, given)
-        for place in range(N):
-            for i in range(s):
-                for c in range(columns):
-                    value = z[place, i, c]
-                    for k in range(2 * s):
-                        value += z[place, i, columns + k] * given[k, c]
-                    x[place, node * s + i, c] = value
+                    value += z[place, i, columns + k] * given[k, c]
+                x[place, first + i, c] = value
 
 
 @helper
@@ -153,28 +166,44 @@ def _keep_within(start, brackets):
                 start[entry] = 0.5 * (brackets[2, entry] + brackets[3, entry])
 
 
+@helper
+def _take_block(first, rates, diagonal, a):
+    """Fill a (b, b) with the derivatives of the equations of b variables of a node at a sample."""
+    b = len(a)
+    for i in range(b):
+        for c in range(b):
+            a[i, c] = -rates[first + i, 3 + first + c]
+        a[i, i] += diagonal
+
+
 @kernel
-def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Matrix) -> int:
+def march(
+    t: Vector, y: Matrix, s: SystemArrays, T: float, blocks: IntegerVector, target: Matrix,
+    z: Matrix,
+) -> int:
     """Fill z (N, c) with the internal variables that repeat; c = n nodes times their number.
 
     t (N,) are the times of the samples and y (N, d) the states, with the differences of the
-    displacements as velocities; ``target`` (N, c) are the deflections to which they leak. Rounds
-    begin without deflection; after two of them, Newton's method finds the start that repeats.
-    Returns 1 if every node has come to that, 0 if one has not.
+    displacements as velocities; ``target`` (N, c) are the deflections to which they leak. Of a node
+    as many variables in a row as ``blocks`` (n,) says act on each other, all for 0. Rounds begin
+    without deflection; after two of them, Newton's method finds the start that repeats. Returns 1
+    if every node has come to that, 0 if one has not.
     """
     N, n = len(t), len(s.rows)
     states = s.memory.max()
     force, rates = force_room(s)
     rate, leak = N / T, LEAK / T
-    path, turned = np.empty((N, states)), np.empty((N, states, 2 * states))
+    path = np.empty((N, states))
     z[:, :] = 0.0
     done = 1
     for j in range(n):
         k = s.memory[j]
         if k == 0:
             continue
-        a, pivots = np.empty((k, k)), np.empty(k, dtype=np.int64)
-        ring, ring_pivots = np.empty((2 * k, 2 * k)), np.empty(2 * k, dtype=np.int64)
+        b = blocks[j] if blocks[j] > 0 else k
+        turned, part = np.empty((N, k, 2 * b)), np.empty(2 * b)
+        a, pivots = np.empty((b, b)), np.empty(b, dtype=np.int64)
+        ring, ring_pivots = np.empty((2 * b, 2 * b)), np.empty(2 * b, dtype=np.int64)
         start, off, step = np.zeros(2 * k), np.empty(2 * k), np.empty(k)
         last_round = np.empty(k)
         repeats, largest = False, 0.0
@@ -195,11 +224,10 @@ def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Ma
                                start[i] if place == 1 else start[k + i])
                         step[i] = (rates[i, 0] - leak * (here[i] - target[place, j * states + i])
                                    - rate * (1.5 * here[i] - 2.0 * one + 0.5 * two))
-                        for c in range(k):
-                            a[i, c] = -rates[i, 3 + c]
-                        a[i, i] += 1.5 * rate + leak
-                    factorise(a, k, pivots)
-                    solve(a, pivots, step)
+                    for first in range(0, k, b):
+                        _take_block(first, rates, 1.5 * rate + leak, a)
+                        factorise(a, b, pivots)
+                        solve(a, pivots, step[first : first + b])
                     change, size = 0.0, 0.0
                     for i in range(k):
                         here[i] += step[i]
@@ -207,14 +235,18 @@ def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Ma
                     largest = max(largest, size)
                     if not change > _SOLVED * largest:
                         break
-                for i in range(k):
-                    for c in range(2 * k):
-                        one = turned[place - 1, i, c] if place > 0 else (1.0 if c == i else 0.0)
-                        two = turned[place - 2, i, c] if place > 1 else (
-                            (1.0 if c == i else 0.0) if place == 1 else
-                            (1.0 if c == k + i else 0.0))
-                        turned[place, i, c] = rate * (2.0 * one - 0.5 * two)
-                solve_rows(a, pivots, turned[place, :k, : 2 * k])
+                for first in range(0, k, b):
+                    for i in range(b):
+                        for c in range(2 * b):
+                            one = (turned[place - 1, first + i, c] if place > 0 else
+                                   (1.0 if c == i else 0.0))
+                            two = turned[place - 2, first + i, c] if place > 1 else (
+                                (1.0 if c == i else 0.0) if place == 1 else
+                                (1.0 if c == b + i else 0.0))
+                            turned[place, first + i, c] = rate * (2.0 * one - 0.5 * two)
+                    _take_block(first, rates, 1.5 * rate + leak, a)
+                    factorise(a, b, pivots)
+                    solve_rows(a, pivots, turned[place, first : first + b])
                 # Where two samples are those of the last round, all behind them are.
                 if turn > 0:
                     moved_by = 0.0
@@ -226,18 +258,26 @@ def march(t: Vector, y: Matrix, s: SystemArrays, T: float, target: Matrix, z: Ma
             gap = 0.0
             for i in range(k):
                 for last in range(2):
-                    row = last * k + i
-                    off[row] = path[N - 1 - last, i] - start[row]
-                    gap = max(gap, abs(off[row]))
-                    for c in range(2 * k):
-                        ring[row, c] = (1.0 if c == row else 0.0) - turned[N - 1 - last, i, c]
+                    off[last * k + i] = path[N - 1 - last, i] - start[last * k + i]
+                    gap = max(gap, abs(off[last * k + i]))
             repeats = gap <= _REPEATS * largest
             if repeats:
                 break
             if turn > 0:
                 _bracket(turn, start, off, brackets)
-                factorise(ring, 2 * k, ring_pivots)
-                solve(ring, ring_pivots, off)
+                for first in range(0, k, b):
+                    for last in range(2):
+                        for i in range(b):
+                            row = last * b + i
+                            part[row] = off[last * k + first + i]
+                            for c in range(2 * b):
+                                ring[row, c] = ((1.0 if c == row else 0.0)
+                                                - turned[N - 1 - last, first + i, c])
+                    factorise(ring, 2 * b, ring_pivots)
+                    solve(ring, ring_pivots, part)
+                    for last in range(2):
+                        for i in range(b):
+                            off[last * k + first + i] = part[last * b + i]
             for i in range(2 * k):
                 start[i] += off[i]
             _keep_within(start, brackets)

@@ -14,7 +14,7 @@ from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
-from fecontact.bifurcation.harmonic.layout import element_rows, layout_of
+from fecontact.bifurcation.harmonic.layout import element_rows, layout_of, memory_blocks
 from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -45,7 +45,8 @@ def problem_for(
     """
     layout = layout_of(field)
     kept = Kept(element_rows(field, layout),
-                np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float))
+                np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float),
+                memory_blocks(field, layout))
     found = HarmonicProblem(
         field, values.copy(), free, method.harmonics, method.count,
         np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout, periods,

@@ -66,15 +66,15 @@ class Equations(NamedTuple):
     and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N,
     m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
     whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
-    which internal variables return, ``onsets`` (k, n) the penetrations at which normal forces have
-    kinks. Numbers are the period times p or 0, the period, least and
-    largest p for which this holds, whether contact forces do not depend on p and t, whether they
-    are plain, of displacements and velocities in the plane alone, bounds of the branch, tolerance,
-    largest step, largest turn, Newton's rounding, whether folds are located, whether all
-    forces at rest have no mean; and of Newton's method the size of a second step over the square
-    of the first, negative if unknown, with the number of times it was relied on; and whether
-    contact forces may have kinks. ``limits`` (m,) bound the scales of the displacements; ``nodes``
-    have internal variables.
+    which internal variables return, ``blocks`` (n,) how many of a node act on each other,
+    ``onsets`` (k, n) the penetrations at which normal forces have kinks. Numbers are the period
+    times p or 0, the period, least and largest p for which this holds, whether contact forces do
+    not depend on p and t, whether they are plain, of displacements and velocities in the plane
+    alone, bounds of the branch, tolerance, largest step, largest turn, Newton's rounding, whether
+    folds are located, whether all forces at rest have no mean; and of Newton's method the size of a
+    second step over the square of the first, negative if unknown, with the number of times it was
+    relied on; and whether contact forces may have kinks. ``limits`` (m,) bound the scales of the
+    displacements; ``nodes`` have internal variables.
     """
 
     contact: SystemArrays
@@ -91,6 +91,7 @@ class Equations(NamedTuple):
     pulls: Block
     springs: Matrix
     offsets: Vector
+    blocks: IntegerVector
     onsets: Matrix
     limits: Vector
     numbers: Vector

@@ -118,7 +118,8 @@ class CompiledBalance:
         return arrays.Equations(
             contact, near.flat, near.base, near.slope, series.times, series.values,
             series.projection, series.cosines, series.sines, body, given,
-            series.projection @ given, problem.kept.rows, problem.kept.offsets, problem.onsets,
+            series.projection @ given, problem.kept.rows, problem.kept.offsets,
+            problem.kept.blocks, problem.onsets,
             np.full(m, np.inf), numbers, layout.nodes, room)
 
     def _without_contact(

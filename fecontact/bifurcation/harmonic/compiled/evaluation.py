@@ -139,7 +139,7 @@ def evaluate_at(u, derivatives, e):
         for n in range(len(room.t)):
             for i in range(c):
                 room.y[n, 2 * m + i] = 0.0
-        if march(room.t, room.y, e.contact, T, room.target, room.z) == 0:
+        if march(room.t, room.y, e.contact, T, e.blocks, room.target, room.z) == 0:
             return 0.0
         for n in range(len(room.t)):
             for i in range(c):
@@ -325,7 +325,7 @@ def _add_memory(T, e):
                     followed[k, i, q * m + j] = (
                         e.values[k, q] * (J[k, 2 * m + i, j] + LEAK / T * e.springs[i, j])
                         + speed * J[k, 2 * m + i, m + j])
-    solve_around(room.slopes, T, followed)
+    solve_around(room.slopes, T, e.blocks, followed)
     room.forces[:, :, :] = 0.0
     for k in range(N):
         for j in range(m):
