@@ -24,6 +24,7 @@ _BODIES = ("fecontact.laws.sampling", "fecontact.fem.assembly", "fecontact.reduc
            "fecontact.fem.mesh_files", "fecontact.system.friction_memory",
            "fecontact.system.jacobian")
 _STEPS = ("fecontact.integrate.rodas5p.driver", "fecontact.integrate.rodas5p.unfelt:first_unfelt",
+          "fecontact.integrate.series.method",
           "fecontact.integrate.rodas5p.method:SMALL", "fecontact.study.study")
 _PARTS = {
     "runs": (*_BODIES, *_STEPS),
@@ -177,11 +178,13 @@ def _target(family: str) -> dict[str, str]:
 
 
 def _run(command: Sequence[str], variables: dict[str, str] | None = None) -> str:
-    """Output of a command; FecontactError with the end of what it says if it fails."""
-    found = subprocess.run(command, env=os.environ | (variables or {}), capture_output=True,
+    """Output of a command; FecontactError if it fails."""
+    # What it says of its progress and its errors is shown.
+    found = subprocess.run(command, env=os.environ | (variables or {}), stdout=subprocess.PIPE,
                            text=True, check=False)
     if found.returncode != 0:
-        raise FecontactError(f"{' '.join(command[1:4])} failed: {found.stderr.strip()[-500:]}")
+        raise FecontactError(f"{' '.join(command[1:4])} failed, with exit code "
+                             f"{found.returncode}.")
     return found.stdout
 
 
