@@ -37,8 +37,9 @@ BENCHMARKS = {
     "solids": ((), [(r"^ +6 +(8) ", 8.0, 0.0)]),
     "sweep": ((), [(r"^(\d+) cases on", 20.0, 0.0)]),
 }
-HELPERS = {"beside", "continuation_peer", "integrator", "integrator_peers", "integrator_problems",
-           "kept_runs", "nonsmooth_peer"}
+# first_minute builds wheels and installs them, which takes half an hour.
+HELPERS = {"beside", "continuation_peer", "first_minute", "integrator", "integrator_peers",
+           "integrator_problems", "kept_runs", "nonsmooth_peer"}
 
 # Two checkouts in turn: here one and the same, in which no row has another name.
 def test_two_checkouts_in_turn():
