@@ -13,20 +13,31 @@ from systems import (
     with_force,
 )
 
-from fecontact import AnalysisError, InputError, simulate
+from fecontact import (
+    AnalysisError,
+    ContactSystem,
+    InputError,
+    Load,
+    PointLoad,
+    basis_from_matrices,
+    simulate,
+)
 from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
     ContinuationOptions,
+    HarmonicBalance,
     Shooting,
     contact_field,
     equilibrium_branch,
+    frequency_response,
     observe,
     orbit_branch,
     periodic_motion,
 )
 from fecontact.bifurcation.orbits.restored import restored_shooting
 from fecontact.integrate import strobe
+from fecontact.laws import Harmonic, LinearContact
 
 FEW = ContinuationOptions(step=5e-3, largest_step=0.05, points=60)
 
@@ -217,3 +228,34 @@ def test_kind_errors(two_masses):
     with pytest.raises(InputError, match="segments = 0 must be"):
         Shooting(segments=0)
     assert contact_field(belt(), {}).dimension == 2
+
+
+def test_two_masses_with_a_unilateral_spring():
+    """Published largest displacements (NLvib, example 3), on branches of grown amplitude.
+
+    Masses 1, springs 1 between them and from the second to the base, dashpots 0.03, force 0.1 cos
+    on the second mass, spring 100 behind a gap of 1 on the first.
+    """
+    rows, points = np.zeros((1, 3, 2)), np.zeros((2, 3, 2))
+    rows[0, 1, 0] = -1.0
+    points[0, 0, 0] = points[1, 0, 1] = 1.0
+    K = np.array([[1.0, -1.0], [-1.0, 2.0]])
+    basis = basis_from_matrices(np.eye(2), K, {"contact": rows, "one": points[0],
+                                               "two": points[1]}, damping=0.03 * K)
+    system = ContactSystem(basis, normal=LinearContact(100.0), gap=1.0, load=Load(
+        forces=(PointLoad("two", "x", signal=Harmonic(0.1, 0.8)),)))
+    name, seen = "load.forces.0.signal.angular_frequency", basis.point_row("one", "x")
+    response = frequency_response(
+        system, (0.5, 0.8), name, observe=("one", "x"), start=0.8,
+        method=HarmonicBalance(21, 512, stability=None)).branches[0]
+    field = contact_field(system, [name])
+    for w, which, largest in ((0.64, 0, 1.0262143), (0.7, -1, 1.0521133)):
+        orbit = orbit_branch(field, response.at(field, w, which).orbit(field), method=Shooting(),
+                             bounds=(w, w + 0.01), options=ContinuationOptions(points=1)).points[0]
+        assert (orbit.orbit(field, 8001).states[:, :2] @ seen).max() == pytest.approx(
+            largest, rel=3e-7)
+    # Scales grow with the motion: those of the first orbit would take some thousand points.
+    shot = orbit_branch(field, response.points[0].orbit(field), method=Shooting(1, rtol=1e-6),
+                        bounds=(0.5, 0.8), direction=-1.0,
+                        options=ContinuationOptions(points=500, locate=False))
+    assert shot.parameter[-1] == 0.5
