@@ -19,8 +19,9 @@ from .core.errors import (
     MissingLibraryError,
     ModelWarning,
 )
-from .fem.elastic_body import ElasticBody, Material
+from .fem.elastic_body import ElasticBody
 from .fem.generate import Beam, Block, Pendulum, generate
+from .fem.material import Material
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
 from .fem.points import Patch

@@ -39,7 +39,9 @@ _AFFINE = 1e-13
 _MOST = np.iinfo(np.int32).max
 
 
-def assembled(basis: Any, lateral: float, shear: float, density: float) -> tuple[Any, Any]:
+def assembled(
+    basis: Any, lateral: float | Array, shear: float | Array, density: float | Array
+) -> tuple[Any, Any]:
     """Stiffness and mass of one displacement component, both exactly symmetric.
 
     Parameters
@@ -48,10 +50,10 @@ def assembled(basis: Any, lateral: float, shear: float, density: float) -> tuple
         Scalar Lagrange elements (N nodes) on triangles, quadrilaterals, tetrahedra or hexahedra,
         straight or curved. Its quadrature is used in the cells whose map is not affine; the others
         are exact.
-    lateral, shear : float
+    lateral, shear : float or (c,) array
         Lame's constants lambda and mu of a solid or in plane strain [Pa]; in plane stress
-        ``nu E / (1 - nu^2)`` and mu.
-    density : float
+        ``nu E / (1 - nu^2)`` and mu; of all cells or of each.
+    density : float or (c,) array
         rho [kg/m^3].
 
     Returns
@@ -74,18 +76,20 @@ def assembled(basis: Any, lateral: float, shear: float, density: float) -> tuple
     indptr, indices, slots = pattern(dofs, size)
     blocks, mass = np.zeros((len(indices), dimension, dimension)), np.zeros(len(indices))
     nodes, corners, element = _geometry(basis)
+    constants = np.empty((len(dofs), 3))
+    for column, value in enumerate((lateral, shear, density)):
+        constants[:, column] = value
     affine = _affine_cells(nodes, corners, dimension)
     if affine.any():
         which = np.flatnonzero(affine)
         inverse, scale = _inverse_jacobians(nodes, corners[which], dimension)
         gradients, masses = _reference_integrals(basis.elem)
-        _add_affine(which, inverse, scale, gradients, masses, lateral, shear, slots, blocks, mass)
+        _add_affine(which, inverse, scale, gradients, masses, constants, slots, blocks, mass)
     if not affine.all():
         at, weights = basis.X, np.ascontiguousarray(basis.W)
         values, slopes = _shapes(basis.elem, at)
         _add_quadrature(np.flatnonzero(~affine), nodes, corners, _shapes(element, at)[1], values,
-                        slopes, weights, lateral, shear, slots, blocks, mass)
-    mass *= density
+                        slopes, weights, constants, slots, blocks, mass)
     return (sp.bsr_array((blocks, indices, indptr), shape=(dimension * size,) * 2),
             sp.csr_array((mass, indices, indptr), shape=(size, size)))
 
@@ -246,13 +250,14 @@ def _reference_integrals(element: Any) -> tuple[Array, Array]:
 @kernel
 def _add_affine(
     which: IntegerVector, inverse: Block, scale: Vector, gradients: Array4, masses: Matrix,
-    lateral: float, shear: float, slots: ShortBlock, blocks: Block, mass: Vector,
+    constants: Matrix, slots: ShortBlock, blocks: Block, mass: Vector,
 ) -> None:
     """Add the affine cells ``which`` to the blocks of the stiffness and the entries of the mass."""
     width, dimension = slots.shape[1], blocks.shape[1]
     half, H = np.empty((3, 3)), np.empty((3, 3))
     for cell in range(len(which)):
         e, J, volume = which[cell], inverse[cell], scale[cell]
+        lateral, shear, density = constants[e]
         for i in range(width):
             for j in range(i, width):
                 G = gradients[i, j]
@@ -265,7 +270,7 @@ def _add_affine(
                                             + J[2, p] * half[2, q])
                 spread = shear * (H[0, 0] + H[1, 1] + H[2, 2])
                 there, back = slots[e, i, j], slots[e, j, i]
-                weight = volume * masses[i, j]
+                weight = density * (volume * masses[i, j])
                 mass[there] += weight
                 if there != back:
                     mass[back] += weight
@@ -282,7 +287,7 @@ def _add_affine(
 @kernel
 def _add_quadrature(
     which: IntegerVector, nodes: Matrix, corners: IntegerMatrix, stretch: Block, values: Matrix,
-    slopes: Block, weights: Vector, lateral: float, shear: float, slots: ShortBlock, blocks: Block,
+    slopes: Block, weights: Vector, constants: Matrix, slots: ShortBlock, blocks: Block,
     mass: Vector,
 ) -> None:
     """Add the cells ``which`` by quadrature; ``stretch`` (q, g, 3) are slopes of their map."""
@@ -291,6 +296,7 @@ def _add_quadrature(
     slope, H = np.empty((width, 3)), np.empty((width, width, 3, 3))
     own = np.empty((width, width))
     for e in which:
+        lateral, shear, density = constants[e]
         H[:] = 0.0
         own[:] = 0.0
         for point in range(points):
@@ -323,9 +329,10 @@ def _add_quadrature(
         for i in range(width):
             for j in range(i, width):
                 there, back = slots[e, i, j], slots[e, j, i]
-                mass[there] += own[i, j]
+                weight = density * own[i, j]
+                mass[there] += weight
                 if there != back:
-                    mass[back] += own[i, j]
+                    mass[back] += weight
                 spread = shear * (H[i, j, 0, 0] + H[i, j, 1, 1] + H[i, j, 2, 2])
                 for p in range(dimension):
                     for q in range(p if i == j else 0, dimension):

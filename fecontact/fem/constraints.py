@@ -1,6 +1,6 @@
 """Constraints between displacements of a body: equations, ties of faces, couplings to a point."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -90,6 +90,12 @@ class LinearEquation:
             term._replace(at=new.get(term.at, term.at)) if isinstance(term.at, str) else term
             for term in self.terms])
 
+    def refined(self, middle_node: Callable[[tuple[int, int]], int]) -> "LinearEquation":
+        """Equation in a refined mesh, where the middles of edges are nodes."""
+        return replace(self, terms=[
+            term._replace(at=middle_node(term.at)) if isinstance(term.at, tuple) else term
+            for term in self.terms])
+
     def turned(self, turn: Array, _: Array) -> "LinearEquation":
         """Equation of the body turned, and perhaps mirrored, by ``turn`` (d, d)."""
         terms = []
@@ -142,6 +148,10 @@ class Tie:
     def groups(self) -> tuple[str, ...]:
         """Names of the boundaries or points of the mesh."""
         return self.dependent, self.independent
+
+    def refined(self, _: object) -> "Tie":
+        """The tie itself."""
+        return self
 
     def renamed(self, new: Mapping[str, str]) -> "Tie":
         """Tie with new names of some groups."""
@@ -217,6 +227,10 @@ class Coupling:
     def groups(self) -> tuple[str, ...]:
         """Names of the nodes and of the reference point."""
         return self.nodes, self.reference
+
+    def refined(self, _: object) -> "Coupling":
+        """The coupling itself."""
+        return self
 
     def renamed(self, new: Mapping[str, str]) -> "Coupling":
         """Coupling with new names of some groups."""

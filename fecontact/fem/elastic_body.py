@@ -13,7 +13,6 @@ from fecontact.core.errors import (
     MeshError,
     choices,
     nearest,
-    require_finite,
     require_positive,
 )
 from fecontact.core.read_only import read_only_arrays
@@ -29,6 +28,7 @@ from fecontact.fem.constraints import (
 )
 from fecontact.fem.elements.cell_kinds import numbered_rows
 from fecontact.fem.equations import expansion
+from fecontact.fem.material import Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.supports import HingeSupport, check_supports, fixed_dofs, hinges
 
@@ -40,51 +40,6 @@ _ORDER = {(2, 3, 1): 4, (2, 3, 2): 4, (2, 4, 1): 4, (2, 4, 2): 4,
           (3, 4, 1): 2, (3, 4, 2): 4, (3, 8, 1): 5, (3, 8, 2): 5}
 # With curved cells the products of shape functions meet determinants of higher order.
 _CURVED_ORDER = {(2, 3): 6, (2, 4): 6, (3, 4): 6, (3, 8): 6}
-
-
-@dataclass(frozen=True)
-class Material:
-    """Isotropic linear elastic material.
-
-    Parameters
-    ----------
-    youngs_modulus : float
-        E, positive [Pa].
-    poisson_ratio : float
-        nu, above -1 and below 0.5.
-    density : float
-        rho, positive [kg/m^3].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
-    """
-
-    youngs_modulus: float = 2.1e11
-    poisson_ratio: float = 0.3
-    density: float = 7850.0
-
-    def __post_init__(self) -> None:
-        require_positive("Material", youngs_modulus=self.youngs_modulus, density=self.density)
-        require_finite("Material", poisson_ratio=self.poisson_ratio)
-        if not -1.0 < self.poisson_ratio < 0.5:
-            raise InputError(f"Material: poisson_ratio = {self.poisson_ratio!r} must be above -1 "
-                             f"and below 0.5.")
-
-    @classmethod
-    def named(cls, name: str) -> "Material":
-        """'steel' or 'aluminium' with handbook values; InputError for other names."""
-        require_kind("Material.named", str, name=name)
-        if name not in _MATERIALS:
-            raise InputError(f"There is no material '{name}'"
-                             f"{nearest(str(name), _MATERIALS)}; named materials are "
-                             f"{choices(_MATERIALS)}, or give youngs_modulus, poisson_ratio and "
-                             f"density.")
-        return cls(*_MATERIALS[name])
-
-
-_MATERIALS = {"steel": (2.1e11, 0.3, 7850.0), "aluminium": (7.0e10, 0.33, 2700.0)}
 
 
 @read_only_arrays
@@ -101,7 +56,9 @@ class ElasticBody(Summarised):
     ----------
     mesh : Mesh
         Triangles or quadrilaterals; tetrahedra or hexahedra for a solid.
-    material : Material
+    material : Material or mapping of name to Material, optional
+        One material, or that of each group of cells of the mesh, which together hold each cell
+        once; by default those of the mesh, or steel if it has none.
     thickness : float
         Out-of-plane thickness of a plane body, positive [m].
     plane : 'stress' or 'strain'
@@ -125,7 +82,7 @@ class ElasticBody(Summarised):
     """
 
     mesh: Mesh
-    material: Material = field(default_factory=Material)
+    material: Material | Mapping[str, Material] | None = None
     thickness: float = 1.0
     plane: Literal["stress", "strain"] = "stress"
     degree: int = 2
@@ -134,7 +91,9 @@ class ElasticBody(Summarised):
 
     def __post_init__(self) -> None:
         require_kind("ElasticBody", Mesh, mesh=self.mesh)
-        require_kind("ElasticBody", Material, material=self.material)
+        if self.material is None:
+            object.__setattr__(self, "material", self.mesh.materials or Material())
+        require_kind("ElasticBody", (Material, Mapping), material=self.material)
         require_kind("ElasticBody", Mapping, fixed=self.fixed)
         for name, directions in self.fixed.items():
             require_kind("ElasticBody: fixed", str, name=name, directions=directions)
@@ -152,6 +111,7 @@ class ElasticBody(Summarised):
                        kind.unknowns(degree) * _BYTES[kind.dimension, kind.corners],
                        f", by a larger element_size, or {plain} or degree = 1")
         check_supports(self.mesh, self.fixed)
+        _ = self.cell_materials
         if self.constraints is not None:
             require_kind("ElasticBody", Sequence, constraints=self.constraints)
             check_constraints(self.constraints, self.mesh.boundaries, self.mesh.points,
@@ -163,7 +123,8 @@ class ElasticBody(Summarised):
 
     def summary(self) -> list[tuple[str, str]]:
         """Mesh, material, kind of elements and supports."""
-        material, mesh = self.material, self.mesh
+        mesh, of = self.mesh, self.material
+        named = of.items() if isinstance(of, Mapping) else [("", one) for one in self.materials]
         curved = f", {len(mesh.curved_cells)} curved" if len(mesh.curved_cells) else ""
         return [
             ("mesh", f"{len(mesh.cells)} {mesh.kind.name}{curved}, {len(mesh.nodes)} nodes, degree "
@@ -171,8 +132,9 @@ class ElasticBody(Summarised):
             *((axis, span(values, "m")) for axis, values in zip("xyz", mesh.nodes.T, strict=False)),
             ("thickness", f"{self.thickness:.4g} m, plane {self.plane}") if self.dimension == 2
             else ("volume", f"{mesh.volume:.4g} m³"),
-            ("material", f"{quantity(material.youngs_modulus, 'Pa')}, Poisson ratio "
-             f"{material.poisson_ratio:.4g}, {material.density:.4g} kg/m³"),
+            *((f"material {name}".rstrip(), f"{quantity(material.youngs_modulus, 'Pa')}, Poisson "
+               f"ratio {material.poisson_ratio:.4g}, {material.density:.4g} kg/m³")
+              for name, material in named),
             ("fixed", listed([f"{name} in {way}" for name, way in self.fixed.items()])),
             *([("constraints", counted(self.equations))] if self.equations else []),
         ]
@@ -195,8 +157,46 @@ class ElasticBody(Summarised):
     @cached_property
     def total_mass(self) -> float:
         """Mass of the body with the edges of its mesh [kg]."""
-        size = self.mesh.area * self.thickness if self.dimension == 2 else self.mesh.volume
-        return float(size * self.material.density)
+        if len(self.materials) == 1:
+            size = self.mesh.area * self.thickness if self.dimension == 2 else self.mesh.volume
+            return float(size * self.materials[0].density)
+        return float(self.component_mass.sum())
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """The materials, in the order in which they are given."""
+        assert self.material is not None
+        return (self.material,) if isinstance(self.material, Material) else tuple(
+            self.material.values())
+
+    @cached_property
+    def cell_materials(self) -> Integers:
+        """Number (M,) of the material of each cell."""
+        if isinstance(self.material, Material):
+            return np.zeros(len(self.mesh.cells), np.int64)
+        assert self.material is not None
+        groups = self.mesh.cell_groups
+        found = np.full(len(self.mesh.cells), -1)
+        for number, (name, one) in enumerate(self.material.items()):
+            require_kind("ElasticBody: material", str, name=name)
+            require_kind("ElasticBody: material", Material, **{name: one})
+            if name not in groups:
+                raise MeshError(f"ElasticBody: material names '{name}', which is no group of cells "
+                                f"of the mesh{nearest(name, groups)}; its groups of cells are: "
+                                f"{choices(groups)}.")
+            if (found[groups[name]] >= 0).any():
+                earlier = list(self.material)[int(found[groups[name]].max())]
+                raise InputError(f"ElasticBody: material gives cells of '{name}' a second one, "
+                                 f"beside that of '{earlier}'; give groups that share no cell.")
+            found[groups[name]] = number
+        if (found < 0).any():
+            first = np.flatnonzero(found < 0)[0]
+            place = self.mesh.nodes[self.mesh.cells[first]].mean(axis=0)
+            where = ", ".join(f"{x:g}" for x in place)
+            raise InputError(f"ElasticBody: material leaves {np.count_nonzero(found < 0)} of "
+                             f"{len(found)} cells without a material, the first at ({where}); give "
+                             f"the groups of these cells too.")
+        return found
 
     @cached_property
     def basis(self) -> Any:
@@ -242,6 +242,8 @@ class ElasticBody(Summarised):
         if self.dimension == 3:
             rows = self.stiffness_blocks.tocsr()
             return sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
+        if len(self.materials) > 1:
+            return sp.csc_array(self.thickness * self._assembled[0])
         # Three scalar forms of 9 x 9 pairs are much faster than one vector form of 18 x 18 pairs,
         # most of whose products are zero.
         gradients = [
@@ -249,7 +251,7 @@ class ElasticBody(Summarised):
             for a, b in ((0, 0), (1, 1), (0, 1))
         ]
         xx, yy, xy = (matrix.tocsr() for matrix in gradients)
-        direct, lateral, shear = self.elasticity
+        direct, lateral, shear = self.elasticity[0]
         blocks = [[direct * xx + shear * yy, lateral * xy + shear * xy.T],
                   [lateral * xy.T + shear * xy, direct * yy + shear * xx]]
         K = sum(sp.kron(blocks[i][j], sp.csr_array(([1.0], ([i], [j])), shape=(2, 2)))
@@ -263,9 +265,9 @@ class ElasticBody(Summarised):
 
     @cached_property
     def _assembled(self) -> tuple[Any, Any]:
-        """Stiffness and mass of one component of a solid."""
-        _, lateral, shear = self.elasticity
-        return assembled(self.basis, lateral, shear, self.material.density)
+        """Stiffness and mass of one component of a solid, or of a plane body 1 m thick."""
+        _, lateral, shear = self.elasticity.T
+        return assembled(self.basis, lateral, shear, self.densities)
 
     @cached_property
     def component_mass(self) -> Any:
@@ -275,8 +277,10 @@ class ElasticBody(Summarised):
 
         if self.dimension == 3:
             return self._assembled[1]
+        if len(self.materials) > 1:
+            return sp.csr_array(self.thickness * self._assembled[1])
         scalar = BilinearForm(lambda u, v, w: u * v).assemble(self.basis)
-        return sp.csr_array(0.5 * self.material.density * self.thickness * (scalar + scalar.T))
+        return sp.csr_array(0.5 * self.densities[0] * self.thickness * (scalar + scalar.T))
 
     @cached_property
     def mass(self) -> Any:
@@ -290,18 +294,29 @@ class ElasticBody(Summarised):
         """Derivatives in x, y (, z) at the nodes, sparse (N, N): means of the adjacent elements."""
         return _nodal_gradients(self.basis)
 
-    @property
-    def elasticity(self) -> tuple[float, float, float]:
-        """Elastic constants [Pa]: s_xx = first e_xx + second (e_yy + e_zz), s_xy = third g_xy.
+    @cached_property
+    def material_gradients(self) -> list[tuple[Array, tuple[Any, ...]]]:
+        """Elastic constants (3,) of each material, and the part of its cells in ``gradients``."""
+        if len(self.materials) == 1:
+            return [(self.elasticity[0], self.gradients)]
+        return [(_elasticity(one, self.dimension, self.plane),
+                 _nodal_gradients(self.basis, self.cell_materials == number))
+                for number, one in enumerate(self.materials)]
 
-        Those of a plane body hold without e_zz.
+    @property
+    def elasticity(self) -> Array:
+        """Elastic constants (M, 3) of each cell [Pa].
+
+        s_xx = first e_xx + second (e_yy + e_zz), s_xy = third g_xy. Those of a plane body hold
+        without e_zz.
         """
-        E, nu = self.material.youngs_modulus, self.material.poisson_ratio
-        shear = E / (2.0 * (1.0 + nu))
-        if self.dimension == 2 and self.plane == "stress":
-            return E / (1.0 - nu**2), nu * E / (1.0 - nu**2), shear
-        lateral = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
-        return lateral + 2.0 * shear, lateral, shear
+        constants = [_elasticity(one, self.dimension, self.plane) for one in self.materials]
+        return np.array(constants)[self.cell_materials]
+
+    @property
+    def densities(self) -> Array:
+        """Density (M,) of each cell [kg/m^3]."""
+        return np.array([one.density for one in self.materials])[self.cell_materials]
 
     @cached_property
     def fixed_dofs(self) -> Integers:
@@ -420,6 +435,15 @@ class ElasticBody(Summarised):
         return np.column_stack([edges[:, 0], middle, edges[:, 1]])
 
 
+def _elasticity(material: Material, dimension: int, plane: str) -> Array:
+    E, nu = material.youngs_modulus, material.poisson_ratio
+    shear = E / (2.0 * (1.0 + nu))
+    if dimension == 2 and plane == "stress":
+        return np.array([E / (1.0 - nu**2), nu * E / (1.0 - nu**2), shear])
+    lateral = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    return np.array([lateral + 2.0 * shear, lateral, shear])
+
+
 def _turned(places: Array, cells: Integers, corners: Integers) -> Array:
     """Second-order places (M, 6, 2) of triangles whose corners are taken in another order."""
     at = (cells[:, None, :] == corners[:, :, None]).argmax(axis=2)
@@ -429,10 +453,11 @@ def _turned(places: Array, cells: Integers, corners: Integers) -> Array:
     return np.take_along_axis(places, np.concatenate([at, 3 + edge], axis=1)[:, :, None], axis=1)
 
 
-def _nodal_gradients(basis: Any) -> tuple[Any, ...]:
+def _nodal_gradients(basis: Any, chosen: Any = True) -> tuple[Any, ...]:
     """Derivatives in x, y (, z) at the nodes, sparse (N, N).
 
-    Each is the area-weighted mean of the gradients of the adjacent elements at the node.
+    Each is the area-weighted mean of the gradients of the adjacent elements at the node, to which
+    those that are not ``chosen`` (M,) add nothing.
     """
     import scipy.sparse as sp
 
@@ -442,7 +467,7 @@ def _nodal_gradients(basis: Any) -> tuple[Any, ...]:
     count, size = basis.doflocs.shape[1], dofs.shape[1]
     slopes = np.stack([basis.elem.gbasis(basis.mapping, local, i)[0].grad for i in range(size)])
     # slopes: (function, direction, element, node)
-    slopes = np.moveaxis(slopes, (0, 1, 2, 3), (3, 0, 1, 2)) * area[None, :, None, None]
+    slopes = np.moveaxis(slopes, (0, 1, 2, 3), (3, 0, 1, 2)) * (area * chosen)[None, :, None, None]
     row = np.broadcast_to(dofs[:, :, None], slopes.shape[1:]).ravel()
     column = np.broadcast_to(dofs[:, None, :], slopes.shape[1:]).ravel()
     around = np.bincount(dofs.ravel(), np.repeat(area, size), minlength=count)

@@ -116,6 +116,7 @@ class _Unknowns:
         """Displacements of a node, or of the nodes whose mean is the middle of an edge."""
         nodes = np.atleast_1d(node)
         if len(nodes) == 2:
+            self.body.mesh.edge_numbers(nodes[None], "constraints")
             nodes = self.body.edge_nodes(nodes[None])[0]
             nodes = nodes[1:2] if len(nodes) == 3 else nodes
         return [self.d * one + np.arange(self.d) for one in nodes]
@@ -419,11 +420,16 @@ def _over_constrained(
                       f"of them.")
 
 
+def selects(G: Any) -> bool:
+    """Whether each unknown is one displacement, as it is with fixed displacements alone."""
+    return bool(G.nnz == G.shape[1] and (G.data == 1.0).all())
+
+
 def least_squares(G: Any, displacements: Array) -> Array:
     """Unknowns q (f, k) with ``G q`` closest to displacements (d N, k)."""
     from scipy.sparse.linalg import splu
 
     right = np.asarray(G.T @ displacements)
-    if G.nnz == G.shape[1]:
+    if selects(G):
         return right
     return np.asarray(splu((G.T @ G).tocsc()).solve(right))

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -126,20 +127,24 @@ def stress_of(body: ElasticBody, displacements: Array) -> Array:
 
     In the order xx, yy, zz, xy (, yz, xz); means over the adjacent elements.
     """
-    if body.dimension == 3:
-        return _stress_in_space(body, displacements)
-    dx, dy = body.gradients
-    direct, lateral, shear = body.elasticity
-    u, v = displacements[0::2], displacements[1::2]
-    xx, yy, slide = dx @ u, dy @ v, dy @ u + dx @ v
-    sxx, syy = direct * xx + lateral * yy, lateral * xx + direct * yy
-    szz = body.material.poisson_ratio * (sxx + syy) * (body.plane == "strain")
-    return np.stack([sxx, syy, szz, shear * slide], axis=1)
+    parts = []
+    for constants, gradients in body.material_gradients:
+        if body.dimension == 3:
+            parts.append(_stress_in_space(constants, gradients, displacements))
+            continue
+        (dx, dy), (direct, lateral, shear) = gradients, constants
+        u, v = displacements[0::2], displacements[1::2]
+        xx, yy, slide = dx @ u, dy @ v, dy @ u + dx @ v
+        sxx, syy = direct * xx + lateral * yy, lateral * xx + direct * yy
+        szz = lateral * (xx + yy) * (body.plane == "strain")
+        parts.append(np.stack([sxx, syy, szz, shear * slide], axis=1))
+    return parts[0] if len(parts) == 1 else np.asarray(np.sum(parts, axis=0))
 
 
-def _stress_in_space(body: ElasticBody, displacements: Array) -> Array:
-    dx, dy, dz = body.gradients
-    direct, lateral, shear = body.elasticity
+def _stress_in_space(
+    constants: Array, gradients: tuple[Any, ...], displacements: Array
+) -> Array:
+    (dx, dy, dz), (direct, lateral, shear) = gradients, constants
     u, v, w = (displacements[axis::3] for axis in range(3))
     xx, yy, zz = dx @ u, dy @ v, dz @ w
     all_round = lateral * (xx + yy + zz)

@@ -25,6 +25,7 @@ from fecontact.fem.elements.cell_geometry import (
 )
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
 from fecontact.fem.elements.refinement import refined
+from fecontact.fem.material import Material
 
 _FLAT = 1e-12  # area of a degenerate cell, relative to its squared sides
 
@@ -57,6 +58,10 @@ class Mesh(Summarised):
     constraints : sequence of LinearEquation, Tie or Coupling
         Constraints between displacements that a file holds, for bodies of this mesh; none by
         default.
+    cell_groups : mapping of name to (k,) integer array
+        Numbers of cells, such as those of one material.
+    materials : mapping of name to Material
+        Materials of groups of cells that a file holds, for bodies of this mesh; none by default.
 
     Raises
     ------
@@ -73,6 +78,8 @@ class Mesh(Summarised):
     curved_edges: Integers = field(default_factory=lambda: np.empty((0, 2), np.int64))
     curved_middles: Array | None = None
     constraints: Sequence[Constraint] = ()
+    cell_groups: Mapping[str, Integers] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
@@ -135,11 +142,21 @@ class Mesh(Summarised):
         for array in (nodes, cells, curved, middles, *boundaries.values(), *points.values()):
             array.setflags(write=False)
         if len(curved):
-            self._edges_between(curved, "curved_edges")
+            self.edge_numbers(curved, "curved_edges")
             curved_volumes(self.second_order_places(self.curved_cells), kind)
         require_kind("Mesh", Sequence, constraints=self.constraints)
         check_constraints(self.constraints, boundaries, points, dimension, len(nodes))
         object.__setattr__(self, "constraints", tuple(self.constraints))
+        require_kind("Mesh", Mapping, cell_groups=self.cell_groups, materials=self.materials)
+        groups = {name: np.unique(as_integers(which, f"The cells of mesh group '{name}'"))
+                  for name, which in self.cell_groups.items()}
+        for name, group in groups.items():
+            require_kind("Mesh: cell_groups", str, name=name)
+            if not group.size or group.min() < 0 or group.max() >= len(cells):
+                raise MeshError(f"Mesh group of cells '{name}' must hold numbers from 0 to "
+                                f"{len(cells) - 1}, at least one.")
+            group.setflags(write=False)
+        object.__setattr__(self, "cell_groups", groups)
 
     @property
     def dimension(self) -> int:
@@ -219,8 +236,8 @@ class Mesh(Summarised):
         distinct, number, _ = numbered_rows(ends)
         return distinct, number.reshape(len(self.cells), -1)
 
-    def _edges_between(self, ends: Integers, name: str) -> Integers:
-        """Numbers in ``edges`` of pairs of nodes."""
+    def edge_numbers(self, ends: Integers, name: str) -> Integers:
+        """Numbers in ``edges`` of pairs of nodes; MeshError, with ``name``, for other pairs."""
         known, pairs = self.edges[0], np.sort(ends, axis=1)
         keys, wanted = (rows[:, 0] * len(self.nodes) + rows[:, 1] for rows in (known, pairs))
         found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
@@ -235,7 +252,7 @@ class Mesh(Summarised):
         """Places (E, d) of the middles of ``edges`` [m]."""
         middles = self.nodes[self.edges[0]].mean(axis=1)
         if len(self.curved_edges):
-            middles[self._edges_between(self.curved_edges, "curved_edges")] = self.curved_middles
+            middles[self.edge_numbers(self.curved_edges, "curved_edges")] = self.curved_middles
         return middles
 
     @cached_property
@@ -244,7 +261,7 @@ class Mesh(Summarised):
         if not len(self.curved_edges):
             return np.empty(0, np.int64)
         curved = np.zeros(len(self.edges[0]), bool)
-        curved[self._edges_between(self.curved_edges, "curved_edges")] = True
+        curved[self.edge_numbers(self.curved_edges, "curved_edges")] = True
         return np.flatnonzero(curved[self.edges[1]].any(axis=1))
 
     def second_order_places(self, cells: Integers | None = None) -> Array:
@@ -261,7 +278,18 @@ class Mesh(Summarised):
         Curved edges stay on their parabolas.
         """
         nodes, cells, boundaries, curved, middles = refined(self)
-        return Mesh(nodes, cells, boundaries, self.points, curved, middles, self.constraints)
+        # The first parts of all cells come first, then the second ones.
+        parts = len(self.cells) * np.arange(len(cells) // len(self.cells))
+        groups = {name: np.add.outer(parts, group).ravel()
+                  for name, group in self.cell_groups.items()}
+        constraints = [one.refined(self.middle_node) for one in self.constraints]
+        return Mesh(nodes, cells, boundaries, self.points, curved, middles, constraints, groups,
+                    self.materials)
+
+    def middle_node(self, ends: tuple[int, int]) -> int:
+        """Node in the middle of an edge in the refined mesh."""
+        pair = np.array([ends])
+        return len(self.nodes) + int(self.edge_numbers(pair, "constraints")[0])
 
     def placed(
         self,
@@ -306,7 +334,8 @@ class Mesh(Summarised):
         nodes, middles = (places * signs @ turn.T + by
                           for places in (self.nodes, np.asarray(self.curved_middles)))
         return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles,
-                    [one.turned(turn * signs, by) for one in self.constraints])
+                    [one.turned(turn * signs, by) for one in self.constraints],
+                    self.cell_groups, self.materials)
 
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""

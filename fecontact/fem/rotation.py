@@ -83,7 +83,8 @@ def stress_stiffness(body: ElasticBody, displacement: Array) -> Any:
     import scipy.sparse as sp
     from skfem import BilinearForm
 
-    direct, lateral, shear = body.elasticity
+    # Of each cell, at all of its points.
+    direct, lateral, shear = body.elasticity.T[:, :, None]
 
     def form(u: Any, v: Any, w: Any) -> Any:
         (xx, xy), (yx, yy) = w["x"].grad, w["y"].grad

@@ -12,7 +12,7 @@ from fecontact.core.errors import AnalysisError, InputError, choices, nearest
 from fecontact.core.records import Block, IntegerMatrix, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.equations import least_squares
+from fecontact.fem.equations import least_squares, selects
 from fecontact.reduction.solid_motions import allowed_motions, solid_strain_energies
 from fecontact.reduction.solvers.factorisation import Factors, factorised
 from fecontact.reduction.solvers.solid_solver import Eigensolver, SolidSolver, possible, suited
@@ -68,7 +68,7 @@ class FreeSystem:
         solid = (body if body.dimension == 3 else None, eigensolver)
         if E.shape[0] == E.shape[1]:
             return cls(body.stiffness, body.mass, rigid, body.component_mass, *solid)
-        if E.nnz == E.shape[1]:
+        if selects(E):
             free = E.indices
             K, M = (a[free][:, free].tocsc() for a in (body.stiffness, body.mass))
             return cls(K, M, rigid[free], None, *solid)
@@ -252,22 +252,22 @@ def strain_energies(body: ElasticBody, shapes: Array) -> Array:
     _strain_energies(slopes.reshape(2 * functions, elements, points),
                      np.ascontiguousarray(basis.dx),
                      np.ascontiguousarray(basis.element_dofs.T, dtype=np.int64),
-                     np.ascontiguousarray(shapes), np.array(body.elasticity), energies)
+                     np.ascontiguousarray(shapes), body.elasticity, energies)
     return energies * body.thickness
 
 
 @kernel
 def _strain_energies(
-    slopes: Block, dx: Matrix, nodes: IntegerMatrix, shapes: Matrix, elasticity: Vector,
+    slopes: Block, dx: Matrix, nodes: IntegerMatrix, shapes: Matrix, elasticity: Matrix,
     energies: Vector,
 ) -> None:
     """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions in x and y."""
     elements, points = dx.shape
     corners, modes = nodes.shape[1], len(energies)
-    direct, lateral, shear = elasticity
     strains = np.empty((3, modes))
     energies[:] = 0.0
     for e in range(elements):
+        direct, lateral, shear = elasticity[e]
         for p in range(points):
             strains[:] = 0.0
             for k in range(1, corners):

@@ -11,6 +11,7 @@ from fecontact.core.errors import InputError, choices, nearest, require_finite, 
 from fecontact.core.tables import located
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
+from fecontact.fem.constraints import Coupling
 from fecontact.fem.contact_face import ContactNodes, contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import numbered_rows
@@ -109,6 +110,9 @@ def modal_basis(
     d = body.dimension
     if rotation is not None and d == 3:
         raise InputError("rotation is that of plane bodies; leave it out for a solid.")
+    if rotation is not None and any(isinstance(one, Coupling) for one in body.equations):
+        raise InputError("rotation is that of bodies without couplings, whose nodes would run on "
+                         "circles; leave it out, or the couplings.")
     face = contact_groups(body, contact, contact_nodes)
     named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
     further = [place_rows(body, place, name) for name, place in points.items()]

@@ -78,7 +78,7 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
     _, slopes = shape_functions(3, members.shape[1], local)
     straight = body.mesh.kind.corners
     geometry = slopes if body.curved else shape_functions(3, straight, local)[1]
-    constants = np.array(body.elasticity)
+    constants = body.elasticity
     fields = np.ascontiguousarray(shapes, dtype=float).reshape(len(body.nodes), 3, -1)
     energies = np.zeros(shapes.shape[1])
     for first in range(0, len(members), _AT_ONCE):
@@ -89,22 +89,22 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
         volume = np.abs(np.linalg.det(jacobian)) * weights
         gradients = np.einsum("qkj,eqji->eqki", slopes, np.linalg.inv(jacobian))
         _add_strain_energies(np.ascontiguousarray(gradients), volume,
-                             np.ascontiguousarray(nodes, dtype=np.int64), fields, constants,
-                             energies)
+                             np.ascontiguousarray(nodes, dtype=np.int64), fields,
+                             constants[first : first + _AT_ONCE], energies)
     return energies
 
 
 @kernel
 def _add_strain_energies(
-    gradients: Array4, volume: Matrix, nodes: IntegerMatrix, fields: Block, elasticity: Vector,
+    gradients: Array4, volume: Matrix, nodes: IntegerMatrix, fields: Block, elasticity: Matrix,
     energies: Vector,
 ) -> None:
     """Add the energies of some elements; gradients (e, q, k, 3) of their k shape functions."""
     elements, points = volume.shape
     corners, modes = nodes.shape[1], len(energies)
-    direct, lateral, shear = elasticity
     strains = np.empty((6, modes))
     for e in range(elements):
+        direct, lateral, shear = elasticity[e]
         first = nodes[e, 0]
         for q in range(points):
             strains[:] = 0.0

@@ -16,7 +16,8 @@ from fecontact.core.errors import (
 from fecontact.core.tables import convert_fields, located, plain, shown
 from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
-from fecontact.fem.elastic_body import ElasticBody, Material
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.material import Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
@@ -40,8 +41,8 @@ class BodySettings:
     Parameters
     ----------
     material : str, optional
-        'steel' or 'aluminium'; the keys below override single values. Steel if no material value
-        is given at all.
+        'steel' or 'aluminium'; the keys below override single values. If no material value is
+        given at all, the materials of the mesh file, or steel if it holds none.
     youngs_modulus, poisson_ratio, density : float, optional
         [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
     thickness : float
@@ -109,7 +110,9 @@ class BodySettings:
             raise InputError("ElasticBody: the key 'thickness' is missing, the thickness of a "
                              "plane body in m; give it, or plane = \"strain\" for a slice of a "
                              "long part, 1 m thick.")
-        return ElasticBody(mesh, self.elastic_material, thickness=self.depth,
+        keys = (self.material, self.youngs_modulus, self.poisson_ratio, self.density)
+        of_mesh = mesh.materials and all(value is None for value in keys)
+        return ElasticBody(mesh, None if of_mesh else self.elastic_material, thickness=self.depth,
                            plane=self.plane, degree=self.degree, fixed=self.fixed)
 
 

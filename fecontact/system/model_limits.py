@@ -193,13 +193,14 @@ def _bodies(planned: PlannedBodies) -> Iterator[str]:
     low, high = SIZES
     for name, body in planned.bodies.items():
         who = f"body '{name}'" if name else "the body"
-        size, material = float(np.ptp(body.mesh.nodes, axis=0).max()), body.material
+        size = float(np.ptp(body.mesh.nodes, axis=0).max())
         if not low <= size <= high:
             yield (f"{who} has an extent of {size:.3g} m, not from {low:g} to {high:g} m; check "
                    f"the unit of lengths, and give a mesh in mm the scale 1e-3.")
         for key, value, (least, most), unit in (
-                ("youngs_modulus", material.youngs_modulus, MODULI, "Pa"),
-                ("density", material.density, DENSITIES, "kg/m3")):
+                check for material in body.materials for check in (
+                    ("youngs_modulus", material.youngs_modulus, MODULI, "Pa"),
+                    ("density", material.density, DENSITIES, "kg/m3"))):
             if not least <= value <= most:
                 yield (f"{key} = {value:.3g} {unit} of {who} is not from {least:g} to {most:g} "
                        f"{unit}; check its unit.")

@@ -18,7 +18,7 @@ from fecontact import (
     modal_basis,
     static_solution,
 )
-from fecontact.fem import Coupling, LinearEquation, Term, Tie
+from fecontact.fem import Coupling, LinearEquation, Rotation, Term, Tie
 from fecontact.laws import Constant
 from fecontact.reduction import eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import FreeSystem, eigenmodes, rigid_modes
@@ -283,6 +283,31 @@ def test_a_coupling_in_some_directions_leaves_the_others_free():
     assert eigenfrequencies_hz(turned, 5) == pytest.approx(eigenfrequencies_hz(body, 5), rel=1e-8)
 
 
+def test_a_tie_to_a_rigid_face_follows_its_reference_point():
+    """Dependent nodes of the tie through the dependent nodes of the coupling: a chain."""
+    body = ElasticBody(cut_block((2, 3, 2), (2, 2, 1), TIE, Coupling(
+        "two.left", "hub", (0.1, 0.0, 0.0))), STEEL, fixed={"one.left": "xyz"})
+    found = static_solution(body, Load(boundaries=(BoundaryLoad("two.top", 1e6),)))
+    both = [face_motion(body, face, found.displacement, (0.1, 0.0, 0.0))
+            for face in ("one.right", "two.left")]
+    assert both[0][0] == pytest.approx(both[1][0], rel=1e-9, abs=1e-15)
+    assert max(rest for _, rest in both) < 1e-10 * np.abs(found.displacement).max()
+
+
+def test_a_coupling_of_one_node_at_its_point_changes_nothing():
+    body, plain = (bar(*constraints, points=TIPS) for constraints in (
+        [Coupling("d", "hub", (L, A, A))], []))
+    assert body.expansion.shape == plain.expansion.shape
+    assert eigenfrequencies_hz(body, 4) == pytest.approx(eigenfrequencies_hz(plain, 4), rel=1e-9)
+
+
+def test_rotation_takes_no_couplings():
+    mesh = rectangle(0.1, 0.1, 2, 2)
+    body = ElasticBody(mesh, constraints=[Coupling("top", "hub", (0.0, 0.0))])
+    with pytest.raises(InputError, match=r"^rotation is that of bodies without couplings"):
+        modal_basis(body, 6, contact=(), rotation=Rotation(10.0))
+
+
 # Equations --------------------------------------------------------------------------------
 
 
@@ -335,6 +360,12 @@ def test_a_middle_of_an_edge_is_a_node_or_the_mean_of_two():
         other = (G[[3 * int(middle[1]) + 2]].toarray() if degree == 2 else
                  0.5 * sum(G[[3 * int(node) + 2]].toarray() for node in edge))
         assert own == pytest.approx(other, abs=1e-15)
+    finer = Mesh(mesh.nodes, mesh.cells, constraints=[equation]).refined()
+    first = finer.constraints[0].terms[0]
+    assert finer.nodes[first.at] == pytest.approx(mesh.nodes[edge].mean(axis=0), abs=1e-15)
+    far = LinearEquation((Term((0, int(mesh.cells.max())), (0, 0, 1)),))
+    with pytest.raises(MeshError, match=r"^Mesh constraints must be edges of cells"):
+        eigenfrequencies_hz(ElasticBody(mesh, constraints=[far]), 1)
 
 
 def test_constrained_bodies_take_the_direct_solver():

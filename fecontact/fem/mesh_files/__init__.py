@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path, require_kind, require_regular_file
-from fecontact.core.errors import InputError, MeshError, ModelWarning
+from fecontact.core.errors import InputError, MeshError, ModelWarning, choices
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.resources.memory import available_memory, shown_memory
 from fecontact.core.types import ArrayLike, Coordinates, Integers
@@ -48,6 +48,8 @@ def read_mesh(
     groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
     second-order elements are kept, coincident nodes merged, nodes without a cell left out. Ties,
     couplings and equations of Abaqus files become ``mesh.constraints``; their nodes are not merged.
+    Sections of Abaqus files become ``mesh.materials``, in SI units if the file's forces are in N
+    and its mass fits to them, such as tonnes beside mm.
 
     Parameters
     ----------
@@ -86,7 +88,8 @@ def read_mesh(
                     named_boundaries(mesh, groups, boundaries or {}),
                     named_points(mesh, groups, points or {}),
                     mesh.curved_edges, mesh.curved_middles,
-                    named_constraints(groups, boundaries or {}, points or {}))
+                    named_constraints(groups, boundaries or {}, points or {}),
+                    mesh.cell_groups, groups.materials)
     except (MeshError, InputError) as error:
         raise type(error)(f"{path}: {error}") from None
 
@@ -95,7 +98,8 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
     """Write a mesh as Gmsh 4.1 text, boundaries and points as physical groups.
 
     Coordinates are written with all digits, so that :func:`read_mesh` restores the same mesh, but
-    for constraints, of which a warning tells. The file is written whole or not at all.
+    for groups of cells, and for constraints and materials, of which a warning tells. The file is
+    written whole or not at all.
 
     Raises
     ------
@@ -111,9 +115,11 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
     for name in (*mesh.boundaries, *mesh.points):
         if not name.strip() or '"' in name or "\n" in name:
             raise InputError(f"{path}: Gmsh cannot store a group named {name!r}; rename it.")
-    if mesh.constraints:
-        warnings.warn(f"{path}: Gmsh cannot store constraints, so that {counted(mesh.constraints)} "
-                      f"are not written; give them to the body anew.", ModelWarning, stacklevel=2)
+    lost = [counted(mesh.constraints)] * bool(mesh.constraints)
+    lost += [f"the materials of {choices(mesh.materials)}"] * bool(mesh.materials)
+    if lost:
+        warnings.warn(f"{path}: Gmsh cannot store {' and '.join(lost)}; give them to the body "
+                      f"anew.", ModelWarning, stacklevel=2)
     with replaced(path) as part, part.open("w", encoding="utf-8", newline="\n") as stream:
         write_msh(mesh, stream)
 

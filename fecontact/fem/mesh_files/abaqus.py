@@ -117,6 +117,10 @@ def read_inp(path: Path) -> RawMesh:
                       f"has none of their stiffness or mass, so give supports, links and welds "
                       f"beside it.", ModelWarning, stacklevel=4)
     joined.constraints = constraints
+    joined.materials, unread = assembly.section_materials()
+    for one in unread:
+        warnings.warn(f"{path}: {one}, so that no material of the file is taken; give material to "
+                      f"the body.", ModelWarning, stacklevel=4)
     return joined
 
 
@@ -219,6 +223,9 @@ def _joined(parts: dict[str, RawMesh]) -> RawMesh:
             for title, group in groups.items():
                 earlier = [all_groups[title]] if title in all_groups else []
                 all_groups[title] = np.concatenate([*earlier, group + first])
+        for title, elements in raw.parts.items():
+            joined.cell_sets.setdefault(title, []).extend(
+                (kind, block + first) for kind, block in elements)
         for title, blocks in raw.faces.items():
             joined.faces.setdefault(title, []).extend(block + first for block in blocks)
         first += len(raw.points)
@@ -354,6 +361,8 @@ class _Assembly:
         self.own = _Instance("", _Part(""))
         self.constraints: list[Block] = []
         self.unsorted: set[str] = set()
+        self.sections: list[tuple[_Part | None, Options]] = []
+        self.materials: dict[str, dict[str, list[str]]] = {}
 
     def add(self, keyword: str, options: Options, lines: list[str]) -> None:
         part = self.current
@@ -380,6 +389,13 @@ class _Assembly:
                 self.current = None
             case "INSTANCE":
                 self._add_instance(options, lines)
+            case "SOLID SECTION":
+                self.sections.append((part, options))
+            case "MATERIAL":
+                self.materials[options["NAME"].upper()] = {}
+            case "ELASTIC" | "DENSITY" if self.materials:
+                name = f"{keyword} {options.get('TYPE', '').upper()}".strip()
+                self.materials[next(reversed(self.materials))][name] = lines
             case _ if keyword in READ:
                 self.constraints.append((keyword, options, lines))
             case _ if keyword in _GENERATING:
@@ -405,6 +421,41 @@ class _Assembly:
             for key, one in of_part.items():
                 one.title = self.parts[key].name
         return [one for one in found if one.part.node_blocks and one.part.element_blocks]
+
+    def section_materials(self) -> tuple[dict[str, tuple[float, float, float]], list[str]]:
+        """E, nu and density of the element sets of sections, in units of the file, and what lacks.
+
+        Raises
+        ------
+        MeshError
+            For a section without a set or a material, or with one that the file does not hold.
+        """
+        found: dict[str, tuple[float, float, float]] = {}
+        for part, options in self.sections:
+            name, wanted = options.get("ELSET", ""), options.get("MATERIAL", "")
+            if not name or not wanted:
+                raise MeshError(f"A line *SOLID SECTION has no "
+                                f"{'ELSET' if not name else 'MATERIAL'}=; add it.")
+            if wanted.upper() not in self.materials:
+                raise MeshError(f"The section of '{name}' names the material '{wanted}', which the "
+                                f"file does not hold{nearest(wanted.upper(), self.materials)}; its "
+                                f"materials are: {choices(self.materials)}.")
+            given = self.materials[wanted.upper()]
+            kinds = ("ELASTIC", "ELASTIC ISOTROPIC", "ELASTIC ISO")
+            elastic = next((given[kind] for kind in kinds if kind in given), None)
+            density = given.get("DENSITY")
+            if elastic is None or density is None or len(elastic) != 1 or len(density) != 1:
+                return {}, [f"the material '{wanted}' has not one line of isotropic *ELASTIC data "
+                            f"and one of *DENSITY"]
+            E, nu, *_ = *_values(elastic[0]), 0.0, 0.0
+            found[self._set_name(part, name)] = E, nu, _values(density[0])[0]
+        return found, []
+
+    def _set_name(self, part: "_Part | None", name: str) -> str:
+        """Spelling of the name of an element set where it is made."""
+        sets = [one.sets.elements for one in ((part,) if part else self.parts.values())]
+        return next((known for held in sets for known in held if known.upper() == name.upper()),
+                    name)
 
     def reference_points(self) -> list["_Instance"]:
         """Return the assembly itself, instances and parts that hold nodes without elements."""

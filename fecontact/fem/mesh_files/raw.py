@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint
-from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind
+from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
+from fecontact.fem.material import Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.cut_cells import (
     PYRAMID,
@@ -66,6 +67,10 @@ class RawMesh:
         Whether nodes at one place are different ones.
     chosen : str
         Name of the part that was chosen, if any.
+    cell_sets : mapping as ``parts``
+        Further groups of elements, of which none is a body.
+    materials : mapping of name to (E, nu, rho)
+        Materials of groups of elements in the unit of the file, with forces in N.
     """
 
     points: Array
@@ -79,6 +84,8 @@ class RawMesh:
     constraints: list[Constraint] = field(default_factory=list)
     apart: bool = False
     chosen: str = ""
+    cell_sets: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
+    materials: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
     def part(self, name: str | None) -> "RawMesh":
         """The elements of one part, with the groups of the file; all elements for None.
@@ -133,7 +140,8 @@ class Groups:
     """Named groups of a mesh.
 
     ``empty`` are the names of groups without nodes, edges or faces of the body, ``cells`` those of
-    groups of cells. ``constraints`` are in metres, with nodes of the mesh.
+    groups of cells. ``constraints`` are in metres, with nodes of the mesh, and ``materials`` those
+    of groups of cells.
     """
 
     boundaries: dict[str, Integers]
@@ -141,6 +149,7 @@ class Groups:
     empty: tuple[str, ...]
     cells: tuple[str, ...] = ()
     constraints: tuple[Constraint, ...] = ()
+    materials: dict[str, Material] = field(default_factory=dict)
 
 
 def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
@@ -203,8 +212,13 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     ends = number[np.concatenate([np.empty((0, 2), np.int64), *(ends for ends, _ in curves)])]
     middles = np.concatenate([np.empty((0, dimension)), *(places for _, places in curves)])
     _, once = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
-    mesh = Mesh(points[used], cells[np.sort(distinct)], {}, {}, ends[once], middles[once])
-    groups = _groups(raw, mesh, number)
+    kept = np.sort(distinct)
+    regions = _cell_groups(raw, points, number, cells[kept])
+    mesh = Mesh(points[used], cells[kept], {}, {}, ends[once], middles[once],
+                cell_groups=regions)
+    groups = replace(_groups(raw, mesh, number), materials={
+        name: Material(E / scale**2, nu, rho / scale**4) for name in regions
+        for of, (E, nu, rho) in raw.materials.items() if name == of or name.endswith(f".{of}")})
     if not raw.constraints:
         return mesh, groups
     middles_of: dict[int, tuple[int, int]] = {}
@@ -214,6 +228,34 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
                                ((a, b) for a, b in pairs.tolist()), strict=True))
     return mesh, replace(groups, constraints=constraints_of_mesh(
         raw, groups.boundaries, groups.points, number, middles_of, points, scale))
+
+
+def _cell_groups(
+    raw: RawMesh, points: Array, number: Integers, cells: Integers
+) -> dict[str, Integers]:
+    """Numbers of the cells (M, n) of each group of elements of the file that holds some."""
+    rows, names = [np.sort(cells, axis=1)], []
+    for name, blocks in {**raw.cell_sets, **raw.parts}.items():
+        found = [np.empty((0, cells.shape[1]), np.int64)]
+        for kind, block in blocks:
+            corners = block[:, :CORNERS.get(kind, 0)]
+            if (kind in SOLID) != (points.shape[1] == 3) or not corners.size:
+                continue
+            inside = corners[(number[corners] >= 0).all(axis=1)]
+            if cells.shape[1] == 4 and kind in SOLID and len(inside):
+                inside = cut_into_tetrahedra(points, number, inside, SHAPES[CORNERS[kind]])
+            if inside.shape[1] == cells.shape[1]:
+                found.append(np.sort(number[inside], axis=1))
+        rows.append(np.concatenate(found))
+        names.append(name)
+    label = numbered_rows(np.concatenate(rows))[1]
+    place = np.full(int(label.max()) + 1, -1)
+    place[label[:len(cells)]] = np.arange(len(cells))
+    ends = np.cumsum([len(one) for one in rows])
+    groups = {name: np.unique(place[label[start:end]])
+              for name, start, end in zip(names, ends, ends[1:], strict=False)}
+    groups = {name: held[held >= 0] for name, held in groups.items()}
+    return {name: held for name, held in groups.items() if len(held)}
 
 
 def on_outline(mesh: Mesh, chosen: NDArray[np.bool_]) -> Integers:

@@ -45,7 +45,7 @@ def suited(body: ElasticBody) -> bool:
     where a tenth of the cells are longer than five times their width, as in thin plates.
     """
     return (possible(body) and 3 * len(body.nodes) >= _FEW
-            and body.material.poisson_ratio <= _INCOMPRESSIBLE
+            and max(one.poisson_ratio for one in body.materials) <= _INCOMPRESSIBLE
             and float(np.quantile(aspect_ratios(body), 0.9)) <= _STRETCHED)
 
 
@@ -101,7 +101,8 @@ class SolidSolver:
         triangle = np.linalg.cholesky(motions.T @ moved)
         gauge = np.linalg.solve(triangle, np.asarray(K @ motions).T).T
         # A part of the mass makes K positive definite, too small to matter beside elastic modes.
-        waves = body.elasticity[2] / body.material.density * (np.pi / body.mesh.extent) ** 2
+        speeds = body.elasticity[:, 2] / body.densities
+        waves = float(speeds.min()) * (np.pi / body.mesh.extent) ** 2
         shift = 0.02 * waves if rigid else 0.0
         moving = moving_components(body)
         held = held_matrix(K, moving)
