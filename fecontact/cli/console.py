@@ -38,14 +38,10 @@ def waiting(what: str) -> Iterator[None]:
     from rich.console import Console
 
     status = Console(stderr=True).status(f"{what} ...")
-    timer = threading.Timer(progress.PATIENCE, status.start)
-    timer.daemon = True
-    timer.start()
     try:
-        yield
+        with progress.after_patience(status.start):
+            yield
     finally:
-        timer.cancel()
-        timer.join()
         status.stop()
 
 

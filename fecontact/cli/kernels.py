@@ -179,7 +179,7 @@ def _target(family: str) -> dict[str, str]:
 
 def _run(command: Sequence[str], variables: dict[str, str] | None = None) -> str:
     """Output of a command; FecontactError if it fails."""
-    # What it says of its progress and its errors is shown.
+    # Its progress and errors go to stderr, and are shown.
     found = subprocess.run(command, env=os.environ | (variables or {}), stdout=subprocess.PIPE,
                            text=True, check=False)
     if found.returncode != 0:

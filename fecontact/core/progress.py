@@ -143,13 +143,21 @@ def said_if_slow(text: str, applies: Callable[[], bool]) -> Iterator[None]:
             _said.add(text)
             say(text)
 
-    timer = threading.Timer(PATIENCE, tell)
+    with after_patience(tell):
+        yield
+
+
+@contextmanager
+def after_patience(call: Callable[[], object]) -> Iterator[None]:
+    """Call a function from another thread once what follows has taken two seconds."""
+    timer = threading.Timer(PATIENCE, call)
     timer.daemon = True
     timer.start()
     try:
         yield
     finally:
         timer.cancel()
+        timer.join()
 
 
 def clock(seconds: float) -> str:

@@ -14,7 +14,7 @@ from fecontact.fem.constraints import Constraint, Coupling, LinearEquation, Term
 
 
 class _Raw(Protocol):
-    """What of the contents of a file the constraints need."""
+    """The contents of a file that constraints refer to."""
 
     constraints: list[Constraint]
     nodes: dict[str, Integers]
@@ -81,7 +81,7 @@ def constraints_of_mesh(
 def _missing(
     one: Tie | Coupling, boundaries: Mapping[str, Integers], points: Mapping[str, Integers]
 ) -> str:
-    """What a constraint needs and the mesh does not have."""
+    """Nodes or faces of a constraint that the mesh lacks, in words; else empty."""
     name = one.nodes if isinstance(one, Coupling) else one.dependent
     if name not in boundaries and name not in points:
         return f"nodes of '{name}'"
