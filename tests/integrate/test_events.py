@@ -25,6 +25,8 @@ from fecontact.integrate import (
     Rodas5P,
     Scipy,
 )
+from fecontact.integrate.reference.watched import _set_interpolant
+from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.driver import start
 from fecontact.laws import JenkinsFriction, LinearContact
@@ -134,6 +136,22 @@ def test_other_solvers_find_the_events_of_the_compiled_one(solver, parts, end):
     assert (other.node == own.node).all()
     assert other.time == pytest.approx(own.time, abs=2e-5)
     assert other.states[:, :2] == pytest.approx(own.states[:, :2], abs=2e-6)
+
+
+def test_pieces_of_steps_of_other_solvers_are_exact_to_degree_four():
+    """Five states determine the polynomial that the search takes."""
+    coefficients = np.array([[0.3, -1.0], [2.0, 0.5], [-0.7, 1.5], [1.1, -2.0], [0.9, 0.4]])
+
+    def course(s):
+        return sum(c * s**k for k, c in enumerate(coefficients))
+
+    run = start(drop(), START, np.array([0.0, 1.0]), rtol=1e-6, work=False, method="rodas5p")
+    _set_interpolant(np.array([course(s) for s in np.linspace(0.0, 1.0, 5)]), run.progress,
+                     run.room)
+    for s in (0.0, 0.1, 0.4, 0.8, 1.0):
+        found = [tableau.one_interpolated.py_func(s, k, run.progress.state, run.room.after,
+                                                  run.room.dense) for k in range(2)]
+        assert found == pytest.approx(course(s), rel=1e-13, abs=1e-13)
 
 
 @pytest.mark.parametrize("solver", [Scipy("BDF"), CVODE()], ids=lambda one: one.name)

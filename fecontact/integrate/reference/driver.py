@@ -108,8 +108,8 @@ def integrate(
                     stop = watched.look(steps.begin, t, latest, steps.dense)
                     if stop is not None:
                         t, y, status = stop, steps.dense(stop), Status.EVENT
-                side: Any = "left" if t == piece.end else "right"
-                reached = done + int(np.searchsorted(times[done:], t, side=side))
+                # An output at the end of a step belongs to the next one, or to the break there.
+                reached = done + int(np.searchsorted(times[done:], t))
                 for row in range(done, reached):
                     result[row] = steps.dense(float(times[row]))
                 done = reached
