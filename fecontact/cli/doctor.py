@@ -5,6 +5,7 @@ exception if graphics libraries are missing.
 """
 
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,8 +26,9 @@ gmsh.model.mesh.generate(2)
 assert len(gmsh.model.mesh.getNodes()[0]) > 3
 """
 _FFMPEG = """
-import subprocess, imageio_ffmpeg
-subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-version"], check=True, capture_output=True)
+import subprocess
+from fecontact.output.render.encoder import ffmpeg
+subprocess.run([ffmpeg(), "-version"], check=True, capture_output=True)
 """
 _COMPILED = "import fecontact.system.contact_system"
 _RENDERING = """
@@ -79,7 +81,7 @@ def examine(report: Callable[[str], None] = lambda what: None) -> list[Finding]:
             ("pictures (VTK)", _RENDERING, "pyvista"),
             ("movies (ffmpeg)", _FFMPEG, "imageio_ffmpeg")):
         report(what)
-        if not installed(module):
+        if not installed(module) and not (code == _FFMPEG and shutil.which("ffmpeg")):
             found.append(Finding(what, True, f"not installed: {how_to_install(module)}"))
             continue
         reason = _attempt(code)

@@ -1,3 +1,4 @@
+import os
 import signal
 from dataclasses import replace
 from itertools import islice, pairwise
@@ -20,7 +21,7 @@ from fecontact import (
 from fecontact.analysis.sampling import between_outputs, coarse_frames_message
 from fecontact.laws import ConstantFriction, Frictionless, RoughSurface
 from fecontact.output.files.frames import frame_indices
-from fecontact.output.render import movie
+from fecontact.output.render import encoder, movie
 from fecontact.output.render import offscreen as probe
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion
@@ -389,16 +390,23 @@ def test_missing_graphics_libraries_are_named(tmp_path, monkeypatch, attempt, re
 
 @rendering
 def test_movie_that_the_encoder_cut_short_is_not_kept(tmp_path, monkeypatch):
-    def full_disk(path, *args, **options):
-        with open(path, "wb") as file:
-            while True:
-                frame = yield
-                file.write(frame[:1, :1].tobytes() if frame is not None else b"")
-
-    monkeypatch.setattr(imageio_ffmpeg, "write_frames", full_disk)
+    # An encoder that stops after its first bytes, as at a full disk.
+    program = tmp_path / "ffmpeg"
+    program.write_text('#!/bin/sh\neval "file=\\${$#}"; head -c 100 > "$file"; exit 1\n')
+    program.chmod(0o755)
+    monkeypatch.setattr(encoder, "ffmpeg", lambda: str(program))
     with pytest.raises(InputError, match=r"run\.mp4 cannot be written"):
         render(run(basis(columns=4, rows=2), times=3), tmp_path / "run.mp4", size=SMALL)
-    assert not list(tmp_path.iterdir())
+    assert [entry.name for entry in tmp_path.iterdir()] == ["ffmpeg"]
+
+
+def test_movies_are_encoded_by_the_program_of_the_system_if_it_can(tmp_path, monkeypatch):
+    program = tmp_path / "ffmpeg"
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    for encoders, taken in (("libx264", str(program)), ("mpeg4", imageio_ffmpeg.get_ffmpeg_exe())):
+        program.write_text(f"#!/bin/sh\necho ' V....D {encoders}'\n")
+        program.chmod(0o755)
+        assert encoder.ffmpeg.__wrapped__() == taken
 
 
 def test_interrupt_while_a_frame_is_drawn_ends_the_movie(tmp_path):

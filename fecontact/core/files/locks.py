@@ -1,9 +1,10 @@
 """Locks on files that are being written; the system releases them when their process ends."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from fecontact.core.errors import InputError
 
@@ -13,7 +14,7 @@ def locked(path: Path, busy: str, *, keep: bool = False) -> Iterator[None]:
     """Hold a lock file; other processes that request it meanwhile get an error.
 
     The lock belongs to the process, not to the file: the file of a killed process does not block
-    others, and is removed by the next one.
+    others, and is removed by the next one. Links to other files are not followed.
 
     Parameters
     ----------
@@ -29,39 +30,19 @@ def locked(path: Path, busy: str, *, keep: bool = False) -> Iterator[None]:
     InputError
         If another process holds the lock, or the file cannot be made.
     """
+    lock = FileLock(path, timeout=0.0)
     try:
-        import fcntl
-    except ImportError:  # Windows: rely on atomic writing alone
-        yield
-        return
-    while True:
-        try:
-            # Do not follow a link to a foreign file.
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
-        except OSError as error:
-            raise InputError(f"{path} cannot be written "
-                             f"({(error.strerror or str(error)).lower()}).") from None
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            raise InputError(busy) from None
-        except OSError:  # file systems without locks
-            pass
-        if _is_at(descriptor, path):
-            break
-        os.close(descriptor)  # removed by its last holder meanwhile
+        lock.acquire()
+    except Timeout:
+        raise InputError(busy) from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be written "
+                         f"({(error.strerror or str(error)).lower()}).") from None
     try:
         yield
     finally:
         if not keep:
-            with suppress(OSError):
+            # While the lock is held: whoever opened the file meanwhile sees that it has gone.
+            with suppress(OSError):  # Windows, where the lock removes it
                 path.unlink()
-        os.close(descriptor)
-
-
-def _is_at(descriptor: int, path: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(descriptor), os.stat(path, follow_symlinks=False))
-    except FileNotFoundError:
-        return False
+        lock.release()

@@ -1,9 +1,7 @@
 """Movies of a run as MP4 or numbered PNG files, and stills."""
 
 import glob
-import os
 import re
-import subprocess
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,13 +12,13 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.sampling import between_outputs
 from fecontact.core.checks import as_path, require_frame_rate
-from fecontact.core.errors import InputError, MissingLibraryError
-from fecontact.core.extras import optional
+from fecontact.core.errors import InputError
 from fecontact.core.files.atomic_write import beside, put, replaced, unwritable
 from fecontact.core.progress import counting_bar, held_back_interrupt, shown
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.output.files.frames import frame_indices, require_drawable, require_field
+from fecontact.output.render.encoder import encoder
 from fecontact.output.render.frames_data import Colour, Motion
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Overlay
@@ -260,25 +258,9 @@ def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: 
 @contextmanager
 def _movie_file(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], Any]]:
     """A function that adds a frame to a movie; the file is written unless the block fails."""
-    imageio_ffmpeg = optional("imageio_ffmpeg", "A movie")
     _require_folder(path)
-    try:
-        imageio_ffmpeg.get_ffmpeg_exe()
-    except RuntimeError as error:
-        raise MissingLibraryError(f"There is no ffmpeg to encode movies with ({error}); reinstall "
-                                  f"imageio-ffmpeg, or write .png pictures.") from None
-    with replaced(path) as part:
-        writer = imageio_ffmpeg.write_frames(
-            # ffmpeg takes names with colons for protocols, and leading hyphens for options.
-            os.path.abspath(part), size, fps=fps, codec="libx264", quality=7, macro_block_size=2,
-            pix_fmt_out="yuv420p", ffmpeg_log_level="error",
-            output_params=["-movflags", "+faststart"])
-        try:
-            writer.send(None)
-            yield lambda image: writer.send(np.ascontiguousarray(image))
-        finally:
-            writer.close()
-        _require_readable(imageio_ffmpeg.get_ffmpeg_exe(), part)
+    with replaced(path) as part, encoder(part, size, fps) as take:
+        yield take
 
 
 @contextmanager
@@ -312,15 +294,6 @@ def _is_ours(picture: Path) -> bool:
     """Whether this package has drawn a picture."""
     with picture.open("rb") as file:
         return _OURS in file.read(1000)
-
-
-def _require_readable(ffmpeg: str, movie: Path) -> None:
-    """Raise OSError for a truncated movie: the encoder's exit status is not passed on."""
-    done = subprocess.run([ffmpeg, "-v", "error", "-i", os.path.abspath(movie), "-frames:v", "1",
-                           "-f", "null", "-"], capture_output=True, check=False,
-                          stdin=subprocess.DEVNULL)
-    if done.returncode != 0:
-        raise OSError("the encoder did not finish; the disk may be full")
 
 
 def _save(path: Path, image: Image) -> None:
