@@ -939,6 +939,8 @@ def test_sizes_are_held_against_memory_before_anything_is_made(names, monkeypatc
     bifurcation, strobe = fecontact.bifurcation, fecontact.integrate.strobe
     with pytest.raises(InputError, match="harmonics = 100000 would"):
         bifurcation.HarmonicBalance(10**5)
+    with pytest.raises(InputError, match="harmonics = 100000 would"):
+        bifurcation.HarmonicBalance([1, 10**5])
     with pytest.raises(InputError, match=r"number of times = 4000001 would .* or fewer runs"):
         strobe([oscillator] * 10, transient_periods=3, keep=4 * 10**6)
     with pytest.raises(InputError, match="padding = 1000000 would"):

@@ -46,8 +46,9 @@ class ResponseSettings:
         For collocation: mesh intervals of an orbit.
     segments : int
         For shooting: pieces of an orbit that are run for themselves; more for unstable orbits.
-    harmonics : int
-        Harmonics of the period of the excitation.
+    harmonics : int or list of int
+        Harmonics of the period of the excitation: all up to a number, or those of a list alone,
+        ``[1, 3, 5]``; 0 is the mean.
     samples : int, optional
         Samples a period, at least 2 harmonics + 2; by default as many as ``sampling_tolerance``
         needs, from 8 harmonics or 32.
@@ -83,7 +84,7 @@ class ResponseSettings:
     method: Literal["harmonic balance", "collocation", "shooting"] = "harmonic balance"
     intervals: int = 50
     segments: int = 4
-    harmonics: int = 9
+    harmonics: int | tuple[int, ...] = 9
     samples: int | None = None
     tolerance: float | None = None
     most_harmonics: int = 100
@@ -189,8 +190,10 @@ class ResponseSettings:
         """Harmonic balance with the numbers of the section, for modes too."""
         from fecontact.bifurcation.harmonic.method import HarmonicBalance
 
+        most = self.most_harmonics
         return HarmonicBalance(self.harmonics, self.samples, self.tolerance,
-                               max(self.harmonics, self.most_harmonics),
+                               max(self.harmonics, most) if isinstance(self.harmonics, int)
+                               else most,
                                None if self.stability == "none" else self.stability,
                                self.sampling_tolerance)
 

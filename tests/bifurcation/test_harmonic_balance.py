@@ -332,6 +332,14 @@ def test_series_are_orthogonal():
 
 @pytest.mark.parametrize(("options", "told"), [
     ({"harmonics": 0}, "harmonics = 0 must be a whole number from 1"),
+    ({"harmonics": [0]}, r"harmonics = \[0\] must be different whole numbers from 0"),
+    ({"harmonics": []}, r"harmonics = \[\] must be different whole numbers"),
+    ({"harmonics": [1, 1]}, r"harmonics = \[1, 1\] must be different"),
+    ({"harmonics": [1, -3]}, "must be different whole numbers from 0 to 100000, at least one"),
+    ({"harmonics": [1, 2.5]}, "must be different whole numbers"),
+    ({"harmonics": "135"}, "harmonics = '135' must be a whole number from 1"),
+    ({"harmonics": [1, 5], "samples": 11}, "samples = 11 must be a whole number from 12"),
+    ({"harmonics": [1, 3], "tolerance": 1e-3}, "leave it out, or give harmonics = 3"),
     ({"harmonics": 9, "samples": 19}, "samples = 19 must be a whole number from 20"),
     ({"tolerance": 0.0}, "tolerance"),
     ({"stability": "Hill"}, "'transitions' or 'Koopman-Hill'")])

@@ -11,7 +11,7 @@ from fecontact.bifurcation import BranchStatus, ResponseSettings
 from fecontact.bifurcation.responses import follow_responses
 from fecontact.cli.response_results import keep_response
 from fecontact.core.errors import InputError
-from fecontact.io import read_response, read_system
+from fecontact.io import read_mode, read_response, read_system
 
 
 @pytest.fixture
@@ -81,6 +81,20 @@ def test_command_line_overrides_the_section(cli, file):
     assert found.branches[0].attributes["harmonics"] == 1
     assert found.branches[0].attributes["samples"] == 64
     assert found.branches[0].parameter[[0, -1]] / (2.0 * np.pi) == pytest.approx([9.0, 10.0])
+
+
+def test_a_list_of_harmonics(cli, file):
+    """By option, by the section, and of modes; the file holds the list."""
+    for how in (["--harmonics", "0,1,3"], ["--set", "response.harmonics=[0,1,3]"]):
+        assert cli("response", file, "--hz", 9, 9.5, "--samples", 64, *how)[0] == 0
+        found = read_response(file.parent / "results" / "block-response.h5")
+        assert found.branches[0].attributes["orders"].tolist() == [0, 1, 3]
+        assert not found.harmonic(2).any()
+        assert found.harmonic(3).any()
+    assert cli("modes", file, "--nonlinear", 1, "--amplitudes", 1e-6, 1e-5, "--set",
+               "response.harmonics=[0,1,3]")[0] == 0
+    mode = read_mode(file.parent / "results" / "block-mode-1.h5")
+    assert mode.branch.attributes["orders"].tolist() == [0, 1, 3]
 
 
 def test_another_parameter_than_the_frequency(cli, file):
@@ -237,6 +251,11 @@ def test_a_level_that_fails_leaves_the_others(monkeypatch):
     (["drive.stifness_x", "--bounds", "1", "2"], "did you mean 'drive.stiffness_x'"),
     (["--levels", "load.normal"], "must have the form KEY=VALUE,VALUE"),
     (["--levels", "drive.angular_frequency=1"], "take another parameter for the levels"),
+    (["--harmonics", "1,,3"], "--harmonics 1,,3 must be a whole number, or several with commas"),
+    (["--harmonics", "1,3"], "harmonics = [1, 3] leave out the mean, but constant loads deflect"),
+    (["--harmonics", "0"], "harmonics = 0 must be a whole number from 1"),
+    (["--set", "response.harmonics=[0,0]"], "harmonics = [0, 0] must be different whole numbers"),
+    (["--harmonics", "1,3", "--tolerance", "1e-3"], "leave it out, or give harmonics = 3"),
     (["--samples", "5"], "samples = 5 must be a whole number from 8"),
     (["--set", "response.point=D"], "'D'"),
     (["--set", "response.component=z"], "z"),

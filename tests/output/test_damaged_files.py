@@ -402,6 +402,13 @@ def without(group, name):
     return change
 
 
+def added(name, value):
+    """A change of a file: a dataset that it does not have."""
+    def change(file):
+        file[name] = value
+    return change
+
+
 def filled(name, value):
     """A change of a file: one value everywhere in a dataset."""
     return lambda file: other(name, np.full(file[name].shape, value))(file)
@@ -424,6 +431,7 @@ ATTRIBUTES, VALUES = "branches/0/attributes", "branches/0/values"
     *(filled(f"{VALUES}/observed_amplitude", value) for value in (np.nan, np.inf)),
     filled(f"{VALUES}/unstable", np.nan), filled("branches/0/u", np.nan),
     filled("branches/0/u", 1e300), filled("branches/0/tangent", -np.inf),
+    *(added(f"{ATTRIBUTES}/orders", value) for value in (3, [1, 4], [1.0, 3.0], [-1, 1], "1")),
 ])
 def test_a_damaged_response_is_one_sentence(response, change, tmp_path):
     path = tmp_path / "damaged.h5"

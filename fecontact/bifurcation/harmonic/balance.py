@@ -12,9 +12,15 @@ from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
-from fecontact.bifurcation.harmonic.series import Series, differentiated, fill_blocks, series
+from fecontact.bifurcation.harmonic.series import (
+    Series,
+    differentiated,
+    fill_blocks,
+    rows_of,
+    series,
+)
 from fecontact.core.errors import AnalysisError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.system.fields.vector_field import VectorField
 
 # Relative step of differences in a parameter that changes the period.
@@ -63,6 +69,8 @@ class Balance:
         Deflections of elements that never slide.
     compiled : CompiledBalance, optional
         Makes compiled equations.
+    orders : tuple of int, optional
+        Harmonics of the series where some of 0 to H are left out: these are zero.
     """
 
     field: VectorField
@@ -78,6 +86,7 @@ class Balance:
     fixed: float | None = None
     kept: Kept = _NOTHING_KEPT
     compiled: CompiledBalance | None = None
+    orders: tuple[int, ...] | None = None
 
     def equations(self, value: float) -> Equations | None:
         """Compiled equations about a value of the parameter; None where there are none."""
@@ -98,6 +107,17 @@ class Balance:
     def size(self) -> int:
         """Number of coefficients."""
         return self.reference.size
+
+    @cached_property
+    def rows_kept(self) -> Integers:
+        """Rows of the coefficients (2 H + 1, b) whose harmonics are not left out."""
+        return rows_of(self.orders, self.harmonics)
+
+    @cached_property
+    def left_out(self) -> Integers:
+        """Indices of the coefficients that are zero because their harmonics are left out."""
+        places = np.arange(self.size).reshape(self.reference.shape)
+        return np.delete(places, self.rows_kept, axis=0).reshape(-1)
 
     @cached_property
     def common(self) -> int:
@@ -287,7 +307,9 @@ class Linearised:
         if m:
             turned[:, :m] = differentiated(turned[:, :m]) / period
         turned -= problem.series.projection @ rates[:, m : layout.states - layout.memory]
-        return turned.reshape(-1)
+        found = turned.reshape(-1)
+        found[problem.left_out] = u[problem.left_out]
+        return found
 
     @cached_property
     def _common(self) -> Array:
@@ -415,7 +437,7 @@ class Linearised:
             found[:n] += self._coupled(self._followed)
         if problem.autonomous:
             found[n, :n], found[n, n:] = problem.phase_row, 0.0
-        return found
+        return zero_left_out(found, problem.left_out)
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
@@ -423,8 +445,11 @@ class Linearised:
             square = np.empty((len(row), len(row)))
             square[:-1], square[-1] = self.condensed, row
             directions = None if self.problem.autonomous else self.problem.directions
-            made = (Factors.of(square) if directions is None
-                    else FewContacts.of(square, directions))
+            if len(self.problem.left_out):
+                made: Factors | FewContacts | None = Factors.without(square, self.problem.left_out)
+            else:
+                made = (Factors.of(square) if directions is None
+                        else FewContacts.of(square, directions))
             if made is None:
                 return np.full(len(row), np.nan)
             self._factors = made, row
@@ -435,3 +460,11 @@ class Linearised:
         # Another last row: add what solves the homogeneous equations.
         along = factors.solve(np.append(np.zeros(len(row) - 1), 1.0))
         return np.asarray(found + (rhs[-1] - row @ found) / (row @ along) * along)
+
+
+def zero_left_out(matrix: Array, left: Integers) -> Array:
+    """The derivatives (n, n + e) with the equations u_k = 0 for indices k that are left out."""
+    if len(left):
+        matrix[left], matrix[:, left] = 0.0, 0.0
+        matrix[left, left] = 1.0
+    return matrix

@@ -81,6 +81,11 @@ def beyond(
     """The other orbits at a period doubling or branch point; doubled ones have 2 H harmonics."""
     problem, u, tangent = starts.restored(field, point)
     problem = _rescaled(problem, scales, width)
+    if problem.orders is not None:
+        # The other orbits may have harmonics that these leave out.
+        every = replace(_method_of(problem), harmonics=problem.harmonics)
+        _, tangent = starts.with_more(problem, tangent, every)
+        problem, u = starts.with_more(problem, u, every)
     problem, u, tangent = (starts.doubled(problem, u) if point.kind == "period doubling"
                            else starts.crossing(problem, u, tangent))
     own = _method_of(problem)
@@ -120,7 +125,8 @@ def method_of(point: BranchPoint) -> HarmonicBalance:
 
 
 def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
-    return HarmonicBalance(problem.harmonics, problem.samples, stability=problem.stability)
+    return HarmonicBalance(problem.orders or problem.harmonics, problem.samples,
+                           stability=problem.stability)
 
 
 def _rescaled(
@@ -139,7 +145,9 @@ def _rescaled(
 def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
     """What a branch stores of its problem, so that its points can be restored."""
     field, layout = problem.field, problem.layout
-    found = {} if problem.limits is None else {"limits": problem.limits}
+    found: dict[str, Any] = {} if problem.limits is None else {"limits": problem.limits}
+    if problem.orders is not None:
+        found["orders"] = np.array(problem.orders)
     return {**found, "state_names": list(field.state_names),
             "parameter_names": list(field.parameters),
             "parameter_values": problem.values, "scales": problem.scales,
@@ -267,14 +275,14 @@ def _with_more_harmonics(method: HarmonicBalance, branch: Branch) -> HarmonicBal
     worst = float(np.max(branch.column("truncation_error")))
     if worst <= method.tolerance:
         return None
-    harmonics = int(np.ceil(_MORE * method.harmonics))
+    harmonics = int(np.ceil(_MORE * method.highest))
     if harmonics > method.most_harmonics:
         raise AnalysisError(f"The truncation error of the branch is {worst:.2g} with "
-                            f"{method.harmonics} harmonics, above tolerance = "
+                            f"{method.highest} harmonics, above tolerance = "
                             f"{method.tolerance:g}; raise most_harmonics = "
                             f"{method.most_harmonics} or the tolerance.")
     samples = None if method.samples is None else int(
-        np.ceil(method.samples * harmonics / method.harmonics))
+        np.ceil(method.samples * harmonics / method.highest))
     return replace(method, harmonics=harmonics, samples=samples)
 
 

@@ -10,15 +10,16 @@ _FINE, _LEAST_FINE = 12, 96
 
 
 def neglected(
-    X: Array, forces: Array, mean: Array, periods: Array, sizes: Array, displacements: int
+    X: Array, forces: Array, mean: Array, periods: Array, sizes: Array, displacements: int,
+    orders: tuple[int, ...] | None = None,
 ) -> tuple[Array, Array]:
     """Estimates (K,) of the errors of K orbits, and of those of their equations.
 
-    The neglected harmonics k > H of the rates, f_k, would add x_k = (i k w - J_0)^-1 f_k to
-    the orbit, J_0 the mean derivative. The first number is their root mean square over that of
-    harmonics 1 to H of displacements and other states, in their scales; the second that of f_k,
-    the residual in time, over that of x'. Velocities are those of the series: none of their
-    harmonics are neglected.
+    The neglected harmonics of the rates, f_k, k > H or not among ``orders``, would add
+    x_k = (i k w - J_0)^-1 f_k to the orbit, J_0 the mean derivative. The first number is their root
+    mean square over that of harmonics 1 to H of displacements and other states, in their scales;
+    the second that of f_k, the residual in time, over that of x'. Velocities are those of the
+    series: none of their harmonics are neglected.
 
     Parameters
     ----------
@@ -34,6 +35,8 @@ def neglected(
         Scales.
     displacements : int
         b or 0: whether X holds displacements.
+    orders : tuple of int, optional
+        Harmonics of the orbits where some of 0 to H are left out.
     """
     count, samples, b = forces.shape
     H = X.shape[1] // 2
@@ -41,8 +44,10 @@ def neglected(
     if most <= H:
         return np.full(count, np.nan), np.full(count, np.nan)
     spectrum = 2.0 * np.fft.rfft(forces, axis=1) / samples
-    left = spectrum[:, H + 1 : most + 1]
-    turns = 2.0j * np.pi / periods[:, None] * np.arange(H + 1, most + 1)
+    spectrum[:, 0] *= np.sqrt(0.5)
+    numbers = np.delete(np.arange(most + 1), range(H + 1) if orders is None else orders)
+    left = spectrum[:, numbers]
+    turns = 2.0j * np.pi / periods[:, None] * numbers
     turned = turns[:, :, None, None]
     mean = mean[:, None]
     matrix = (turned**2 * np.eye(b) - mean[..., :b] - turned * mean[..., b:] if displacements

@@ -8,14 +8,14 @@ row. The unknowns stay those of the modes: orbits, their continuation and files 
 they are solved for.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.system.fields.vector_field import VectorField
 
 # Unknowns from which this is faster, and largest part of them that may be left.
@@ -43,6 +43,7 @@ class Factors:
 
     square: Array
     factors: tuple[Any, Any]
+    rest: Integers | None = None
 
     @classmethod
     def of(cls, square: Array) -> "Factors | None":
@@ -50,9 +51,20 @@ class Factors:
         factors, pivots, failed = dgetrf(square.T)
         return None if failed else cls(square, (factors, pivots))
 
+    @classmethod
+    def without(cls, square: Array, left: Integers) -> "Factors | None":
+        """Factors without the unknowns that are left out, which stay zero."""
+        rest = np.delete(np.arange(len(square)), left)
+        found = cls.of(np.ascontiguousarray(square[np.ix_(rest, rest)]))
+        return None if found is None else replace(found, rest=rest)
+
     def solve(self, rhs: Array) -> Array:
         """Solution (n + 1,)."""
-        return np.asarray(dgetrs(*self.factors, rhs, trans=1)[0])
+        if self.rest is None:
+            return np.asarray(dgetrs(*self.factors, rhs, trans=1)[0])
+        found = np.zeros_like(rhs)
+        found[self.rest] = dgetrs(*self.factors, rhs[self.rest], trans=1)[0]
+        return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Options of harmonic balance."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,15 +29,17 @@ class HarmonicBalance:
 
     Parameters
     ----------
-    harmonics : int
-        H, at least 1: harmonics of the period of the orbit.
+    harmonics : int or sequence of int
+        H, at least 1: harmonics 0 to H of the period of the orbit, 0 being the mean. A list such as
+        ``[1, 3, 5]`` keeps these alone, the others are zero and no unknowns; H is the largest. The
+        truncation error counts what they leave out. Under constant loads 0 is needed.
     samples : int, optional
         N, at least 2 H + 2, samples a period. By default 8 H, at least 32, and on branches of
         forced orbits as many more as ``sampling_tolerance`` needs. Kinks of laws need many;
         products of three harmonics are exact above 4 H.
     tolerance : float, optional
         Largest truncation error allowed on a branch: it is followed again with more harmonics, by
-        half each time, until it is met, up to ``most_harmonics``.
+        half each time, until it is met, up to ``most_harmonics``. Not with a list of harmonics.
     most_harmonics : int
         Limit for that.
     sampling_tolerance : float, optional
@@ -56,7 +59,7 @@ class HarmonicBalance:
         If these cannot be used.
     """
 
-    harmonics: int = 9
+    harmonics: int | Sequence[int] = 9
     samples: int | None = None
     tolerance: float | None = None
     most_harmonics: int = 100
@@ -64,24 +67,49 @@ class HarmonicBalance:
     sampling_tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("harmonics", "most_harmonics"):
-            value = getattr(self, name)
-            if not (isinstance(value, int | np.integer) and 1 <= value <= MOST):
-                raise InputError(f"HarmonicBalance: {name} = {value!r} must be a whole number from "
-                                 f"1 to {MOST}.")
-        least = 2 * self.harmonics + 2
+        if isinstance(self.harmonics, Sequence | np.ndarray) and not isinstance(
+                self.harmonics, str):
+            object.__setattr__(self, "harmonics", self._checked_list(list(self.harmonics)))
+        else:
+            _require_count("harmonics", self.harmonics)
+        _require_count("most_harmonics", self.most_harmonics)
+        least = 2 * self.highest + 2
         if self.samples is not None and not (isinstance(self.samples, int | np.integer)
                                              and least <= self.samples <= MOST):
             raise InputError(f"HarmonicBalance: samples = {self.samples!r} must be a whole number "
                              f"from {least}, twice the harmonics and two, to {MOST}.")
         # Cosines and sines of all harmonics at all samples.
-        require_memory("HarmonicBalance: harmonics", self.harmonics, 16.0 * self.count)
+        require_memory("HarmonicBalance: harmonics", self.highest, 16.0 * self.count)
         for name in ("tolerance", "sampling_tolerance"):
             if getattr(self, name) is not None:
                 require_positive("HarmonicBalance", **{name: getattr(self, name)})
         if self.stability not in _STABILITY:
             raise InputError(f"HarmonicBalance: stability = {self.stability!r} must be "
                              f"'transitions' or 'Koopman-Hill', or None.")
+
+    def _checked_list(self, given: list[int]) -> tuple[int, ...]:
+        whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool)
+                    and 0 <= k <= MOST for k in given)
+        if not whole or len(set(given)) != len(given) or not any(given):
+            raise InputError(f"HarmonicBalance: harmonics = {given!r} must be different whole "
+                             f"numbers from 0 to {MOST}, at least one of them above 0.")
+        if self.tolerance is not None:
+            raise InputError(f"HarmonicBalance: tolerance = {self.tolerance:g} adds harmonics to "
+                             f"all up to a number; with harmonics = {given!r} leave it out, or "
+                             f"give harmonics = {max(given)}.")
+        return tuple(sorted(int(k) for k in given))
+
+    @property
+    def highest(self) -> int:
+        """The largest harmonic H."""
+        return max(self.harmonics) if isinstance(self.harmonics, Sequence) else int(self.harmonics)
+
+    @property
+    def orders(self) -> tuple[int, ...] | None:
+        """Harmonics of the series where some of 0 to H are left out, else None."""
+        if not isinstance(self.harmonics, Sequence) or len(self.harmonics) == self.highest + 1:
+            return None
+        return tuple(self.harmonics)
 
     @property
     def refines(self) -> bool:
@@ -98,4 +126,10 @@ class HarmonicBalance:
     @property
     def count(self) -> int:
         """Number N of samples."""
-        return int(self.samples or max(_LEAST, _PER_HARMONIC * self.harmonics))
+        return int(self.samples or max(_LEAST, _PER_HARMONIC * self.highest))
+
+
+def _require_count(name: str, value: object) -> None:
+    if not (isinstance(value, int | np.integer) and 1 <= value <= MOST):
+        raise InputError(f"HarmonicBalance: {name} = {value!r} must be a whole number from 1 to "
+                         f"{MOST}.")

@@ -18,7 +18,12 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.harmonic import estimates
-from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised
+from fecontact.bifurcation.harmonic.balance import (
+    UNREPEATED,
+    Balance,
+    Linearised,
+    zero_left_out,
+)
 from fecontact.bifurcation.harmonic.compiled.arrays import TOLERANCE, Equations
 from fecontact.bifurcation.harmonic.compiled.balance import MOST_UNKNOWNS
 from fecontact.bifurcation.harmonic.compiled.orbit import (
@@ -76,7 +81,7 @@ class HarmonicLinearisation(Linearised):
         forces, mean = self._samples()
         error, residual = estimates.neglected(
             problem.coefficients(self.u)[None], forces[None], mean[None], np.array([self.period]),
-            problem.scales[layout.columns], layout.displacements)
+            problem.scales[layout.columns], layout.displacements, problem.orders)
         return float(error[0]), float(residual[0])
 
     def _samples(self) -> tuple[Array, Array]:
@@ -105,7 +110,10 @@ class CompiledLinearisation(HarmonicLinearisation):
             raise AnalysisError(UNREPEATED)
         found = room.residual.copy(), room.z.copy(), forces
         n = len(room.residual)
-        return (*found, room.condensed.reshape(n, n + 1).copy(), mean) if derivatives else found
+        if not derivatives:
+            return found
+        condensed = room.condensed.reshape(n, n + 1).copy()
+        return *found, zero_left_out(condensed, self.problem.left_out), mean
 
     @cached_property
     def _values(self) -> tuple[Array, ...]:
@@ -258,7 +266,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         else:
             periods = np.array([self.period(each) for each in u])
         orbits = StoredOrbits(layout, u[:, : self.size].reshape(count, -1, layout.harmonic), z,
-                              periods, forces, mean, sizes, self.row, known)
+                              periods, forces, mean, sizes, self.row, known, self.orders)
         return [StoredValues(orbits, k) for k in range(count)]
 
     def started(

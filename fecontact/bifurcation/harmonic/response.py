@@ -398,6 +398,8 @@ def _problem(
     scales[-2] = problem.period(values[[free]])
     if not np.isfinite(scales[-2]):
         raise InputError(f"At {name} = {values[free]:g} the excitation has no period.")
+    if isinstance(field, ContactField) and method.orders is not None:
+        starts.require_mean(method, rest_state(field, values)[: problem.layout.displacements])
     if isinstance(field, ContactField) and problem.layout.memory:
         state = rest_state(field, values) if held is None else held
         problem = replace(problem, kept=problem.kept.left_by(state[None]))

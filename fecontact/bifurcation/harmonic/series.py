@@ -11,7 +11,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Array4, Matrix
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +73,13 @@ def differentiated(X: Array) -> Array:
     np.multiply(turns, X[2::2], out=out[1::2])
     np.multiply(-turns, X[1::2], out=out[2::2])
     return out
+
+
+def rows_of(orders: tuple[int, ...] | None, harmonics: int) -> Integers:
+    """Rows of coefficients (2 H + 1, b) that belong to some harmonics; all of them for None."""
+    if orders is None:
+        return np.arange(2 * harmonics + 1)
+    return np.array([row for k in orders for row in ((2 * k - 1, 2 * k) if k else (0,))])
 
 
 def shifted(X: Array, shift: float) -> Array:

@@ -32,6 +32,8 @@ _CORRECTIONS = 40
 _INTERVALS, _DEGREE = 200, 4
 # Least size of an equation, in that of the largest one, by which it is divided at a branch point.
 _ZERO_ROW = 1e-8
+# Largest modal displacement at rest that is rounding.
+_NO_REST = 1e-14
 
 
 def problem_for(
@@ -48,18 +50,27 @@ def problem_for(
                 np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float),
                 memory_blocks(field, layout))
     found = HarmonicProblem(
-        field, values.copy(), free, method.harmonics, method.count,
-        np.zeros((2 * method.harmonics + 1, layout.harmonic)), scales, layout, periods,
-        *timing_of(field, values, free), kept, stability=method.stability, limits=limits)
+        field, values.copy(), free, method.highest, method.count,
+        np.zeros((2 * method.highest + 1, layout.harmonic)), scales, layout, periods,
+        *timing_of(field, values, free), kept, orders=method.orders, stability=method.stability,
+        limits=limits)
     # The problem is new: nobody has it yet.
     object.__setattr__(found, "compiled", CompiledBalance.of(found))
     return found
+
+
+def require_mean(method: HarmonicBalance, rest: Array) -> None:
+    """Raise InputError if the mean is left out, but the displacements at rest (m,) are not zero."""
+    if method.orders is not None and 0 not in method.orders and np.abs(rest).max() > _NO_REST:
+        raise InputError(f"HarmonicBalance: harmonics = {list(method.orders)} leave out the mean, "
+                         f"but constant loads deflect the system at rest; add 0 to the list.")
 
 
 def unknowns(problem: HarmonicProblem, states: Array, period: float) -> Array:
     """Unknowns u of states (N, d) at the samples of a period [s]."""
     layout = problem.layout
     X = problem.series.projection @ states[:, layout.columns]
+    X.reshape(-1)[problem.left_out] = 0.0
     return np.concatenate([X.reshape(-1), [period] if problem.autonomous else [],
                            [problem.values[problem.free]]])
 
@@ -127,7 +138,9 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
 def method_of(attributes: Mapping[str, Any]) -> HarmonicBalance:
     """Harmonic balance as a branch has it, from its attributes."""
     stability = str(attributes["stability"])
-    return HarmonicBalance(int(attributes["harmonics"]), int(attributes["samples"]),
+    orders = attributes.get("orders")
+    return HarmonicBalance(int(attributes["harmonics"]) if orders is None else
+                           np.asarray(orders).tolist(), int(attributes["samples"]),
                            stability=None if stability == "none" else stability)
 
 
@@ -188,7 +201,7 @@ def corrected(
 
 
 def doubled(problem: HarmonicProblem, u: Array) -> Start:
-    """Start on the doubled orbits at a period doubling u, with twice the harmonics.
+    """Start on the doubled orbits at a period doubling u, with all harmonics up to twice H.
 
     The direction is the null vector of the odd harmonics of the doubled period, which change sign
     after one period.
@@ -204,7 +217,8 @@ def doubled(problem: HarmonicProblem, u: Array) -> Start:
     else:
         periods *= 2
     result = replace(problem, harmonics=2 * problem.harmonics, samples=2 * problem.samples,
-                     reference=twice, periods=periods, scales=scales, before=(), bend=None)
+                     orders=None, reference=twice, periods=periods, scales=scales, before=(),
+                     bend=None)
     start = np.append(twice.reshape(-1), common)
     odd = np.zeros(twice.shape, dtype=bool)
     odd[1::4] = odd[2::4] = True
@@ -234,7 +248,8 @@ def with_more(problem: HarmonicProblem, u: Array, method: HarmonicBalance) -> tu
     HarmonicProblem, Array
 ]:
     """Problem and unknowns, or a tangent, with another number of harmonics and samples."""
-    X = with_harmonics(problem.coefficients(u), method.harmonics)
-    result = replace(problem, harmonics=method.harmonics, samples=method.count, reference=X,
-                     stability=method.stability, before=(), bend=None)
+    X = with_harmonics(problem.coefficients(u), method.highest)
+    result = replace(problem, harmonics=method.highest, samples=method.count, reference=X,
+                     orders=method.orders, stability=method.stability, before=(), bend=None)
+    X.reshape(-1)[result.left_out] = 0.0
     return result, np.append(X.reshape(-1), u[-problem.common :])

@@ -36,6 +36,8 @@ class StoredOrbits:
         Displacement that is observed.
     known : dict
         Values by name that are there, a sequence of K each.
+    orders : tuple of int, optional
+        Harmonics of the orbits where some are left out.
     """
 
     layout: Layout
@@ -47,6 +49,7 @@ class StoredOrbits:
     sizes: Array
     row: Array | None = None
     known: dict[str, Any] = field(default_factory=dict)
+    orders: tuple[int, ...] | None = None
 
     def names(self) -> tuple[str, ...]:
         """Names of all values, in the order in which they are stored."""
@@ -84,7 +87,8 @@ class StoredOrbits:
                                         X[..., m:]], axis=2)
             return dict(zip(_EXTREMES, estimates.extremes(whole, self.z), strict=True))
         if name in _ERRORS:
-            found = estimates.neglected(X, self.forces, self.mean, self.periods, self.sizes, m)
+            found = estimates.neglected(X, self.forces, self.mean, self.periods, self.sizes, m,
+                                        self.orders)
             return {each: values.tolist() for each, values in zip(_ERRORS, found, strict=True)}
         if name in OBSERVED and self.row is not None:
             return observed_of_orbits(layout, X, self.periods, self.row)

@@ -396,6 +396,7 @@ def _leaving(
     field, d, w = start.field, start.field.dimension, start.angular_frequency
     seen = complex(row @ start.shape)
     m = field.system().basis.modes
+    starts.require_mean(method, start.state[:m])
     if abs(seen) <= _LEAST_SEEN * np.linalg.norm(row[:m]) * np.linalg.norm(start.shape[:m]):
         raise InputError(f"{observed} does not move in this mode, at {w / (2.0 * np.pi):.5g} Hz, "
                          f"or hardly; observe another displacement.")

@@ -32,8 +32,9 @@ def response(
         "each.")] = None,
     method: Annotated[Literal["harmonic balance", "collocation", "shooting"] | None, Parameter(
         help="How orbits are found; overrides `[response]`.")] = None,
-    harmonics: Annotated[int | None, Parameter(
-        help="Harmonics; overrides `[response]`.")] = None,
+    harmonics: Annotated[str | None, Parameter(
+        help="All harmonics up to a number, `7`, or those of a list, `1,3,5`; overrides "
+        "`[response]`.")] = None,
     samples: Annotated[int | None, Parameter(
         help="Samples a period; overrides `[response]`.")] = None,
     tolerance: Annotated[float | None, Parameter(
@@ -117,12 +118,12 @@ def response(
 def _wanted(
     given: "ResponseSettings", parameter: str | None, hz: tuple[float, float] | None,
     bounds: tuple[float, float] | None, levels: str | None, method: str | None,
-    harmonics: int | None, samples: int | None, tolerance: float | None,
+    harmonics: str | None, samples: int | None, tolerance: float | None,
 ) -> "ResponseSettings":
     """The section [response] with the options of the command line."""
     changes: dict[str, object] = {name: value for name, value in (
-        ("parameter", parameter), ("method", method), ("harmonics", harmonics),
-        ("samples", samples),
+        ("parameter", parameter), ("method", method),
+        ("harmonics", None if harmonics is None else _harmonics(harmonics)), ("samples", samples),
         ("tolerance", tolerance)) if value is not None}
     if hz is not None and bounds is not None:
         raise InputError("--hz and --bounds mean the same; give one of them.")
@@ -148,6 +149,16 @@ def _levels(text: str) -> dict[str, tuple[float, ...]]:
         raise InputError(f"--levels {text} must have the form KEY=VALUE,VALUE, like "
                          f"drive.amplitude_x=1e-5,2e-5.")
     return {name: values}
+
+
+def _harmonics(text: str) -> int | tuple[int, ...]:
+    """A number of harmonics, or a list of them from ``1,3,5``."""
+    try:
+        found = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--harmonics {text} must be a whole number, or several with commas "
+                         f"between them, like 1,3,5.") from None
+    return found if len(found) > 1 else found[0]
 
 
 def _earlier(study: "Study", file: Path) -> "FrequencyResponse":

@@ -248,7 +248,7 @@ _LAYOUT = ("displacements", "harmonics", "memory", "memory_nodes", "state_names"
 _NUMBERS = ("level",)
 _TEXTS = ("condition", "kind", "level_label", "level_name", "observed", "stability")
 _LISTS = ("labels", "parameter_names", "parameters", "state_names")
-_ARRAYS = ("limits", "parameter_values", "scales", "widths")
+_ARRAYS = ("limits", "orders", "parameter_values", "scales", "widths")
 
 
 def _require_kinds(attributes: dict[str, Any]) -> None:
@@ -296,7 +296,10 @@ def _require_orbits(attributes: dict[str, Any], u: list[Array], stored: dict[str
         raise DamagedError(f"the attribute 'periods' is {attributes['periods']}")
     if not balanced:
         return
-    layout = layout_from(attributes)
+    layout, orders = layout_from(attributes), attributes.get("orders", np.zeros(0, dtype=int))
+    if orders.dtype.kind != "i" or not set(orders.tolist()) <= set(
+            range(attributes["harmonics"] + 1)):
+        raise DamagedError(f"the attribute 'orders' is {shown(orders)}")
     count = (2 * attributes["harmonics"] + 1) * layout.harmonic
     if not (2 * layout.displacements + layout.memory <= layout.states and layout.nodes <= (
             layout.memory) and all(count < len(each) for each in u)):

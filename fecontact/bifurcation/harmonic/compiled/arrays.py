@@ -74,7 +74,8 @@ class Equations(NamedTuple):
     folds are located, whether all forces at rest have no mean; and of Newton's method the size of a
     second step over the square of the first, negative if unknown, with the number of times it was
     relied on; and whether contact forces may have kinks. ``limits`` (m,) bound the scales of the
-    displacements; ``nodes`` have internal variables.
+    displacements; ``nodes`` have internal variables. ``kept`` are the rows of the coefficients
+    (2 H + 1, m) that are unknown, the others are zero.
     """
 
     contact: SystemArrays
@@ -96,6 +97,7 @@ class Equations(NamedTuple):
     limits: Vector
     numbers: Vector
     nodes: int
+    kept: IntegerVector
     room: Room
 
 

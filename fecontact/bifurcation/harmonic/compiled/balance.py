@@ -49,7 +49,7 @@ class CompiledBalance:
     contact_field: ContactField
     affine: AffineArrays | None = None
     held: tuple[int, float | None, bytes] | None = None
-    known: dict[tuple[int, int, int], arrays.Equations] = field(default_factory=dict)
+    known: dict[tuple[Any, ...], arrays.Equations] = field(default_factory=dict)
 
     @classmethod
     def of(cls, problem: Any) -> "CompiledBalance | None":
@@ -64,10 +64,11 @@ class CompiledBalance:
         """Equations about a value of the parameter; None where its arrays are not affine in it.
 
         There is one room for all equations of a size: what is found there has to be copied. None
-        also for more unknowns with internal variables, or with loads that are not affine.
+        also for more unknowns with internal variables, a list of harmonics, or loads that are not
+        affine.
         """
         small = problem.size <= MOST_UNKNOWNS
-        if not problem.size or not (small or not problem.layout.memory):
+        if not problem.size or not (small or not (problem.layout.memory or problem.orders)):
             return None
         near, others = self.affine, problem.values.copy()
         others[problem.free] = 0.0
@@ -80,7 +81,7 @@ class CompiledBalance:
             self.known.clear()
         if near is None:
             return None
-        key = problem.harmonics, problem.samples, problem.periods
+        key = problem.harmonics, problem.samples, problem.periods, problem.orders
         if key not in self.known:
             self.known[key] = self._made(problem, near, value)
         found = self.known[key]
@@ -120,7 +121,7 @@ class CompiledBalance:
             series.projection, series.cosines, series.sines, body, given,
             series.projection @ given, problem.kept.rows, problem.kept.offsets,
             problem.kept.blocks, problem.onsets,
-            np.full(m, np.inf), numbers, layout.nodes, room)
+            np.full(m, np.inf), numbers, layout.nodes, problem.rows_kept, room)
 
     def _without_contact(
         self, problem: Any, near: AffineArrays

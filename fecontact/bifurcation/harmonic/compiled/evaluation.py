@@ -108,7 +108,9 @@ def balance(u, T, loads, e, out):
     pushed = e.room.coefficients[0]
     for j in range(m):
         project(e.projection, e.room.pushes[j], pushed[j])
-    for k in range(L):
+    for k in range(L * m):
+        out[k] = 0.0
+    for k in e.kept:
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
             total = pushed[j, k] + loads * (e.pulls[0, k, j] + p * e.pulls[1, k, j])

@@ -119,14 +119,18 @@ def factorise_with(row, T, e):
     """Factorise ``condensed`` with a further row (n + 1,)."""
     room = e.room
     m, L, count, n = e.springs.shape[1], e.values.shape[1], room.coupled[0], len(room.residual)
-    k = L * count
-    condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
+    whole, k = L * count, len(e.kept) * count
+    condensed = room.condensed[: whole * (whole + 1)].reshape((whole, whole + 1))
     a = room.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
-    for q in range(L):
+    for r in range(len(e.kept)):
+        q = e.kept[r]
         for place in range(count):
-            i = q * count + place
-            for j in range(k + 1):
-                a[i, j] = condensed[i, j]
+            i, found = r * count + place, condensed[q * count + place]
+            for other in range(len(e.kept)):
+                first, column = other * count, e.kept[other] * count
+                for j in range(count):
+                    a[i, first + j] = found[column + j]
+            a[i, k] = found[whole]
             a[k, i] = row[q * m + room.order[place]]
     a[k, k] = row[n]
     if count < m:
@@ -145,7 +149,7 @@ def _once(row, T, e, x):
     """Replace x (n + 1,) by the solution, modes that are left alone being so."""
     room, parts = e.room, e.room.vectors[7]
     m, L, count, n = e.springs.shape[1], e.values.shape[1], room.coupled[0], len(room.residual)
-    k = L * count
+    k = len(e.kept) * count
     a = room.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
     if count < m:
         _each_alone(T, e, x)
@@ -154,14 +158,14 @@ def _once(row, T, e, x):
                 i = q * m + room.order[place]
                 x[n] -= row[i] * x[i]
     known = parts[: k + 1]
-    for q in range(L):
+    for r in range(len(e.kept)):
         for place in range(count):
-            known[q * count + place] = x[q * m + room.order[place]]
+            known[r * count + place] = x[e.kept[r] * m + room.order[place]]
     known[k] = x[n]
     solve(a, room.pivots[: k + 1], known)
-    for q in range(L):
+    for r in range(len(e.kept)):
         for place in range(count):
-            x[q * m + room.order[place]] = known[q * count + place]
+            x[e.kept[r] * m + room.order[place]] = known[r * count + place]
     x[n] = known[k]
     for place in range(count, m):
         for q in range(L):
