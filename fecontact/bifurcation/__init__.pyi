@@ -25,6 +25,7 @@ from .fields import VectorField, vector_field
 from .fields.contact_field import ContactField, contact_field
 from .harmonic.method import HarmonicBalance
 from .harmonic.response import FrequencyResponse, frequency_response
+from .nonlinear_modes.controlled_response import controlled_response
 from .nonlinear_modes.mode_response import ModeResponse, Resonance, mode_response
 from .nonlinear_modes.nonlinear_mode import NonlinearMode, nonlinear_mode
 from .nonlinear_modes.resonance_curve import ResonanceCurve, resonance_curve
@@ -82,6 +83,7 @@ __all__ = [
     "branch_tree",
     "codim2_curve",
     "contact_field",
+    "controlled_response",
     "equilibrium_branch",
     "find_equilibrium",
     "floquet_multipliers",

@@ -46,6 +46,11 @@ class ResponseSettings:
         For collocation: mesh intervals of an orbit.
     segments : int
         For shooting: pieces of an orbit that are run for themselves; more for unstable orbits.
+    amplitudes : list of float, optional
+        In place of levels: amplitudes of what is observed that are held, half the range [m, rad], a
+        response for each, in which the level of the force is free; by harmonic balance.
+    force : str, optional
+        Dotted name of that level; by default the amplitude of the drive along ``component``.
     harmonics : int or list of int
         Harmonics of the period of the excitation: all up to a number, or those of a list alone,
         ``[1, 3, 5]``; 0 is the mean.
@@ -81,6 +86,8 @@ class ResponseSettings:
     bounds_hz: tuple[float, float] | None = None
     start: float | None = None
     levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    amplitudes: tuple[float, ...] = ()
+    force: str | None = None
     method: Literal["harmonic balance", "collocation", "shooting"] = "harmonic balance"
     intervals: int = 50
     segments: int = 4
@@ -112,6 +119,7 @@ class ResponseSettings:
                              f"angular frequency, but parameter = '{self.parameter}'; give its "
                              f"bounds by the key 'bounds'.")
         self._check_levels()
+        self._check_amplitudes()
         self._check_bounds()
         _ = self.harmonic_balance(), self.orbit_method()
 
@@ -126,6 +134,24 @@ class ResponseSettings:
             if name == self.parameter:
                 raise InputError(f"ResponseSettings: levels names '{name}', over which the "
                                  f"responses go; take another parameter for the levels.")
+
+    def _check_amplitudes(self) -> None:
+        given = list(self.amplitudes)
+        if not given and self.force is not None:
+            raise InputError(f"ResponseSettings: force = '{self.force}' is the level that is free "
+                             f"where amplitudes are held; give amplitudes too.")
+        if not all(0.0 < one < math.inf for one in given):
+            raise InputError(f"ResponseSettings: amplitudes = {given} must be a list of numbers "
+                             f"above zero.")
+        if given and self.levels:
+            raise InputError(f"ResponseSettings: amplitudes = {given} are held, so that the force "
+                             f"has no levels; leave out one of the two.")
+        if given and self.method != "harmonic balance":
+            raise InputError(f"ResponseSettings: method = '{self.method}' cannot hold amplitudes; "
+                             f"take 'harmonic balance'.")
+        if given and self.force == self.parameter:
+            raise InputError(f"ResponseSettings: force names '{self.force}', over which the "
+                             f"responses go; take another one.")
 
     def _check_bounds(self) -> None:
         given = self.bounds if self.bounds_hz is None else self.bounds_hz

@@ -10,6 +10,7 @@ from fecontact.analysis.histories import usual_component
 from fecontact.analysis.summaries import usual_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, titled
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, frequency_response
+from fecontact.bifurcation.nonlinear_modes.controlled_response import controlled_response
 from fecontact.core.errors import FecontactError
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def follow_responses(
     wanted : ResponseSettings
         Range, levels, method.
     progress : callable, optional
-        Told the level that is being followed, and which part of its range is done.
+        Told the level or amplitude that is being followed, and which part of its range is done.
     earlier : FrequencyResponse, optional
         What an interrupted computation of the same has left: finished levels are taken from it, the
         one that was interrupted is followed anew, so that the numbers are those of a computation
@@ -82,19 +83,27 @@ def follow_responses(
     """
     observe, result = observed_point(system, wanted), Responses()
     failed: FecontactError | None = None
-    for value in next(iter(wanted.levels.values()), (np.nan,)):
-        title = "Response" if wanted.level_name is None else f"{wanted.level_name} = {value:g}"
+    start = None if wanted.start is None else wanted.first
+    held = bool(wanted.amplitudes)
+    name = "amplitude" if held else wanted.level_name
+    for value in wanted.amplitudes or next(iter(wanted.levels.values()), (np.nan,)):
+        title = "Response" if name is None else f"{name} = {value:g}"
         known = _level_of(earlier, value)
         try:
             options = titled(wanted.options(), title, progress)
             if known is not None and known.branches[0].status is not BranchStatus.INTERRUPTED:
                 found = known
+            elif held:
+                force = wanted.force or _force_along(observe[1])
+                found = controlled_response(
+                    system, wanted.checked_bounds, [value], force, wanted.parameter,
+                    observe=observe, method=wanted.harmonic_balance(), options=options,
+                    start=start, preload=preload)
             else:
                 found = frequency_response(
                     system, wanted.checked_bounds, wanted.parameter, observe=observe,
-                    levels=None if wanted.level_name is None else {wanted.level_name: [value]},
-                    method=wanted.orbit_method(), options=options,
-                    start=None if wanted.start is None else wanted.first, preload=preload)
+                    levels=None if name is None else {name: [value]},
+                    method=wanted.orbit_method(), options=options, start=start, preload=preload)
         except KeyboardInterrupt:
             if result.response is None:
                 raise
@@ -113,6 +122,11 @@ def follow_responses(
     if result.response is None and failed is not None:
         raise failed
     return result
+
+
+def _force_along(component: str) -> str:
+    """The drive's amplitude along a component of displacement; along x for a rotation."""
+    return f"drive.amplitude_{'x' if component.startswith('phi') else component}"
 
 
 def _level_of(earlier: FrequencyResponse | None, value: float) -> FrequencyResponse | None:

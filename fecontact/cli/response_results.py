@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("level", "kind", "parameter", "frequency_hz", "stable", "amplitude", "minimum",
             "maximum", "first_harmonic", "phase", "third_harmonic", "truncation_error",
-            "parameter_error", "beyond_basis")
+            "parameter_error", "beyond_basis", "force")
 
 
 def response_file(study: "Study", folder: Path) -> Path:
@@ -59,12 +59,14 @@ def write_response_results(
 def response_csv(response: FrequencyResponse, usable_hz: float = math.inf) -> str:
     """All points of a response as CSV, special points with their kind; SI units, phases in rad.
 
-    ``beyond_basis`` is 1 for frequencies above ``usable_hz``.
+    ``beyond_basis`` is 1 for frequencies above ``usable_hz``; ``force`` is the level of the force
+    where the amplitude is held, else empty.
     """
     rows: list[Sequence[Any]] = [_COLUMNS]
     for level, branch in enumerate(response.branches):
         first, phase = np.abs(response.harmonic(1, level)), response.phase(level)
-        third = _third(response, level)
+        third, held = _third(response, level), response.force_name is not None
+        force = [repr(one) for one in response.force(level).tolist()] if held else []
         for place, point in enumerate(branch.points):
             values = point.values
             rows.append([
@@ -76,7 +78,7 @@ def response_csv(response: FrequencyResponse, usable_hz: float = math.inf) -> st
                 repr(float(first[place])), repr(float(phase[place])), third[place],
                 (repr(float(values["truncation_error"])) if "truncation_error" in values else ""),
                 "" if math.isnan(point.parameter_error) else repr(point.parameter_error),
-                int(1.0 / float(values["period"]) > usable_hz)])
+                int(1.0 / float(values["period"]) > usable_hz), force[place] if held else ""])
     return csv_text(rows)
 
 
@@ -99,15 +101,15 @@ def response_table(
     """Table of peaks and special points of all levels; those above ``usable_hz`` are marked."""
     from fecontact.cli.tables import table
     from fecontact.core.units import quantity
-    from fecontact.output.plots.responses.response import level_texts
+    from fecontact.output.plots.responses.response import drawn, drawn_label, level_texts
 
-    unit = "rad" if response.observed.rpartition(" ")[2].startswith("phi") else "m"
+    label, _, unit = drawn_label(response).removesuffix("]").rpartition(" [")
     # An angular frequency is told in Hz; the frequency of the response is then the same.
     over_frequency = response.parameter_name.endswith("angular_frequency")
     name, texts = ("", [""]) if response.level_name is None else level_texts(response)
     rows = []
     for level, branch in enumerate(response.branches):
-        amplitude, peak = response.amplitude(level), response.peak(level)
+        values, peak = drawn(response, level), response.peak(level)
         for place, point in enumerate(branch.points):
             if point is not peak and point.kind is None:
                 continue
@@ -117,7 +119,7 @@ def response_table(
             remarks = ", ".join(filter(None, (_stability(point), beyond_basis(hertz, usable_hz))))
             rows.append((*([texts[level]] if name else []), words,
                          *([] if over_frequency else [f"{point.parameter:.7g}"]),
-                         f"{hertz:.7g}", quantity(float(amplitude[place]), unit, 5), remarks))
+                         f"{hertz:.7g}", quantity(float(values[place]), unit, 5), remarks))
     return table(*([name] if name else []), "point",
                  *([] if over_frequency else [response.parameter_name]), "frequency [Hz]",
-                 f"amplitude of {response.observed}", "", rows=rows, left=2)
+                 label, "", rows=rows, left=2)

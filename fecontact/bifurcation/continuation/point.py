@@ -149,11 +149,14 @@ class BranchPoint(Summarised):
         Raises
         ------
         InputError
-            If the point is on no branch over one parameter, or the field has other parameters or
+            If the point is on no branch over one parameter, or of orbits under a condition over
+            two, or the field has other parameters or
             another number of states.
         """
         require_field(field)
         known, values = self.branch.attributes, field.values
+        if "condition" in known:
+            return self._curve_values(field)
         if "parameters" in known or "parameter_values" not in known:
             raise InputError(f"{self.place} is on no branch of equilibria or orbits over one "
                              f"parameter; at a value on a curve over two an event of "
@@ -168,7 +171,7 @@ class BranchPoint(Summarised):
         return values
 
     def _curve_values(self, field: VectorField) -> Array:
-        """Values (k,) of all parameters of a field at a point of a curve of homoclinic orbits."""
+        """Values (k,) of all parameters of a field at a point of a curve over two of them."""
         known, values = self.branch.attributes, field.values
         for name, value in zip(known["parameter_names"], np.asarray(known["parameter_values"]),
                                strict=True):

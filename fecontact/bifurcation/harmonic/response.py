@@ -117,16 +117,40 @@ class FrequencyResponse(Summarised):
         """
         return np.unwrap(np.angle(1j * self.harmonic(1, level)))
 
+    @property
+    def force_name(self) -> str | None:
+        """Name of the level of the force where amplitudes are held, which is free then."""
+        return self.branches[0].parameter_names[1] if len(
+            self.branches[0].parameter_names) > 1 else None
+
+    def force(self, level: int = 0) -> Array:
+        """Level (N,) of the force that holds the amplitude, in its unit.
+
+        Raises
+        ------
+        InputError
+            If the amplitude is not held.
+        """
+        if self.force_name is None:
+            raise InputError("FrequencyResponse.force: amplitudes follow from a given force; those "
+                             "of controlled_response are held.")
+        return np.asarray(self.branches[level].column(self.force_name))
+
+    def _gain(self, level: int) -> Array:
+        """Amplitude (N,), over the level of the force where the amplitude is held."""
+        found = self.amplitude(level)
+        return found if self.force_name is None else found / np.abs(self.force(level))
+
     def peak(self, level: int = 0) -> BranchPoint:
-        """The regular or special point of largest amplitude of a branch."""
-        return self.branches[level].points[int(np.argmax(self.amplitude(level)))]
+        """The point of largest amplitude of a branch, or of smallest force at a held one."""
+        return self.branches[level].points[int(np.argmax(self._gain(level)))]
 
     def peak_reached(self, level: int = 0) -> bool:
         """Whether the amplitude falls on both sides of the peak, which is then no end of a branch.
 
-        Closed branches have no ends.
+        Or the force rises. Closed branches have no ends.
         """
-        branch, place = self.branches[level], int(np.argmax(self.amplitude(level)))
+        branch, place = self.branches[level], int(np.argmax(self._gain(level)))
         return branch.status is BranchStatus.CLOSED or 0 < place < len(branch) - 1
 
     def summary(self) -> list[tuple[str, str]]:
@@ -138,6 +162,7 @@ class FrequencyResponse(Summarised):
         rising = [f"{value:.5g}" for level, value in enumerate(self.levels)
                   if not self.peak_reached(level)]
         where = f" at {listed(rising, 6)}" if self.level_name else ""
+        extreme = "amplitude is largest" if self.force_name is None else "force is smallest"
         return [("parameter", self.parameter_name), ("range", span(ranges)),
                 *([(self.level_name, listed([f"{level:.5g}" for level in self.levels], 6))]
                   if self.level_name else []),
@@ -147,7 +172,7 @@ class FrequencyResponse(Summarised):
                 *([(UNRESOLVED, UNRESOLVED_MEANING)]
                   if any(point.kind == UNRESOLVED for branch in self.branches
                          for point in branch.special) else []),
-                *([("peak", f"not reached{where}: the amplitude is largest at an end")]
+                *([("peak", f"not reached{where}: the {extreme} at an end")]
                   if rising else []),
                 ("ends", ", ".join(ends))]
 
@@ -238,6 +263,13 @@ def frequency_response(
         if branch.status is BranchStatus.INTERRUPTED:
             break
     return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
+
+
+def amplitude_label(observed: str) -> str:
+    """Label of an amplitude: displacements of points have units, states of vector fields none."""
+    names = observed.split()
+    unit = "" if len(names) != 2 else " [rad]" if names[1].startswith("phi") else " [m]"
+    return f"amplitude of {observed}{unit}"
 
 
 def preloaded(

@@ -1,7 +1,8 @@
-"""Continuation problem of resonances: forced orbits at the peak of their response.
+"""Continuation problem of forced orbits under one condition, such as the peak of their response.
 
-The unknowns are u = [coefficients, frequency, parameter]: to the equations G(y) = 0 of a forced
-orbit, y = [coefficients, frequency], comes one of two conditions.
+The unknowns are u = [coefficients, p, parameter], with the frequency or the level of the force as
+p. To the equations G(y) = 0 of a forced orbit, y = [coefficients, p], comes one of three
+conditions.
 
 Amplitude: along the response, whose direction v is ``[[G_y], [border]] v = [0, 1]``, the observed
 amplitude a does not change, g = a_y v = 0. With ``[[G_y], [border]]^T z = [a_y]`` its derivative is
@@ -12,7 +13,10 @@ The orbits y+ and y- a window away on both sides along the response then have th
 a(y+) = a(y-): G(y+) = G(y-) = 0, [border] (y+ - y) = [border] (y - y-) = window. The peak lies
 between them but for the square of the window, and its amplitude but for the fourth power.
 
-Phase: the given force does no work in phase with the displacements, Re(P^H X_1) = 0.
+Phase: the displacements lag behind the given force by an angle, Im(P^H X_1 exp(i angle)) = 0. At
+pi / 2 the force does no work in phase with them.
+
+Held: the observed amplitude has a given value, a(y) = a_0.
 """
 
 from collections.abc import Sequence
@@ -41,16 +45,17 @@ _PARAMETER_STEP, _ALONG_STEP = 1e-5, 1e-4
 _SAMPLES, _REFINED = 512, 4
 # Of orbits beside the resonance: relative size of the last Newton step, and Newton steps.
 _TOLERANCE, _ITERATIONS = 1e-9, 12
+HELD = "held"
 
 
 @dataclass(frozen=True, eq=False)
 class PeakProblem(Problem):
-    """Forced orbits at resonance over a parameter.
+    """Forced orbits under a condition over a parameter.
 
     Attributes
     ----------
     orbit : HarmonicProblem
-        Orbits over the frequency.
+        Orbits over the frequency, or another parameter p.
     second : int
         Index of the parameter.
     width : float
@@ -58,15 +63,17 @@ class PeakProblem(Problem):
     row : (d,) array
         What is observed.
     condition : str
-        'amplitude' or 'phase'.
+        'amplitude', 'phase' or 'held'.
     border : (n + 1,) array
         Row that normalises the direction of the response.
     rest : (d,) array
         State at which the given force is evaluated.
     size : float
-        Scale of the condition: an amplitude, or that times a force.
+        Scale of the condition: an amplitude, or that times a force; the amplitude that is held.
     window : float
         Distance of the orbits that are compared, in the inner product of the orbit; 0 for none.
+    lag : float
+        Angle [rad] by which displacements are behind the force.
     """
 
     orbit: HarmonicProblem
@@ -78,6 +85,7 @@ class PeakProblem(Problem):
     rest: Array
     size: float = 1.0
     window: float = 0.0
+    lag: float = 0.5 * np.pi
 
     keeps_matrix: ClassVar[bool] = True
 
@@ -90,11 +98,13 @@ class PeakProblem(Problem):
         return PeakLinearised(self, u)
 
     def at(self, u: Array) -> HarmonicProblem:
-        """The problem of orbits over the frequency at the parameter in u."""
-        values = self.orbit.values.copy()
+        """The problem of orbits over p at the parameter in u."""
+        values, fixed = self.orbit.values.copy(), self.orbit.fixed
         values[self.second] = u[-1]
-        # Compiled equations hold all values but that of the frequency.
-        found = replace(self.orbit, values=values, compiled=None)
+        if fixed is not None:
+            fixed = self.orbit.field.forcing_period(values)
+        # Compiled equations hold all values but that of p.
+        found = replace(self.orbit, values=values, compiled=None, fixed=fixed)
         # As it is known to be forced, the system need not be made to find out.
         vars(found)["autonomous"] = False
         return found
@@ -121,17 +131,24 @@ class PeakProblem(Problem):
         orbit, inner = linearisation.orbit, linearisation.inner
         X, T = orbit.coefficients(u[:-1]), orbit.period(u[:-1])
         error, residual = inner.neglected
-        floquet = inner.floquet
         found = observed_values(orbit.layout, X, T, self.row)
         low, high = orbit.extremes(u[:-1], inner.memory)
-        rate = float(linearisation.gradient @ tangent[:-1]) / found["observed_amplitude"]
-        return {"period": T, "angular_frequency": float(u[-2]), "stable": floquet.stable,
-                "multipliers": floquet.multipliers, "truncation_error": error,
-                "residual": residual, "minimum": low, "maximum": high, "amplitude_rate": rate,
-                **found, **({"memory": inner.memory} if orbit.layout.memory else {})}
+        known: dict[str, Any] = {"period": T}
+        if self.condition == HELD:
+            known[list(orbit.field.parameters)[orbit.free]] = float(u[-2])
+        else:
+            rate = float(linearisation.gradient @ tangent[:-1]) / found["observed_amplitude"]
+            known |= {"angular_frequency": float(u[-2]), "amplitude_rate": rate}
+        if orbit.stability is not None:
+            known |= {"stable": inner.floquet.stable, "multipliers": inner.floquet.multipliers}
+        return {**known, "truncation_error": error, "residual": residual, "minimum": low,
+                "maximum": high, **found,
+                **({"memory": inner.memory} if orbit.layout.memory else {})}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """The change of the amplitude along the curve, zero at extrema."""
+        """The change of the amplitude along the curve, zero at extrema, unless it is held."""
+        if self.condition == HELD:
+            return {}
         X, T = self.orbit.coefficients(u[:-1]), linearisation.inner.period
         amplitude = observed_values(self.orbit.layout, X, T, self.row)["observed_amplitude"]
         return {"extremum": float(linearisation.gradient @ tangent[:-1]) / amplitude}
@@ -176,7 +193,7 @@ class PeakLinearised:
 
     @cached_property
     def force_row(self) -> Array:
-        """Row (n,) of Re(P^H X_1) over the coefficients."""
+        """Row (n,) of Im(P^H X_1 exp(i lag)) over the coefficients."""
         return self._force_rows(float(self.u[-2]), float(self.u[-1]))
 
     def _force_rows(self, frequency: float, parameter: float) -> Array:
@@ -186,6 +203,7 @@ class PeakLinearised:
         values[orbit.free], values[problem.second] = frequency, parameter
         period = orbit.period(np.append(self.u[:-2], frequency))
         P = given_force(orbit.field, values, problem.rest, period)
+        P = P * np.exp(1j * (0.5 * np.pi - problem.lag))
         row = np.zeros(orbit.reference.shape)
         row[1, : len(P)], row[2, : len(P)] = P.real, -P.imag
         return np.asarray(row.reshape(-1))
@@ -194,6 +212,8 @@ class PeakLinearised:
     def _condition(self) -> float:
         if self.problem.condition == "phase":
             return float(self.force_row @ self.u[:-2]) / self.problem.size
+        if self.problem.condition == HELD:
+            return float(self.gradient @ self.u[:-1]) / self.problem.size - 1.0
         if self.problem.window:
             below, above = (self._amplitude(y) for y in self._sides)
             return (above - below) / (2.0 * self.problem.window * self.problem.size)
@@ -255,6 +275,8 @@ class PeakLinearised:
                             - self._force_rows(frequency, parameter - self._step)) @ X
             return np.concatenate([self.force_row, [
                 by_frequency, by_parameter / (2.0 * self._step)]]) / self.problem.size
+        if self.problem.condition == HELD:
+            return np.append(self.gradient, 0.0) / self.problem.size
         if self.problem.window:
             return self._compared()
         y, v = self.u[:-1], self.along

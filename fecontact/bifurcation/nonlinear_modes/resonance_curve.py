@@ -1,6 +1,7 @@
 """Curves of resonances over a parameter: backbones over the force, peaks over a normal load."""
 
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -22,6 +23,7 @@ from fecontact.bifurcation.harmonic.response import (
     preloaded,
     rest_state,
 )
+from fecontact.bifurcation.nonlinear_modes.given_force import given_force
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice
@@ -117,7 +119,7 @@ def resonance_curve(
     system: ContactSystem | VectorField, bounds: tuple[float, float], parameter: str,
     frequencies: tuple[float, float], *, frequency: str = "drive.angular_frequency",
     observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
-    condition: Literal["amplitude", "phase"] = "amplitude",
+    condition: Literal["amplitude", "phase"] = "amplitude", lag: float = 0.5 * np.pi,
     method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
     start: float | None = None, preload: LoadHistory | RestState | Array | None = None,
 ) -> ResonanceCurve:
@@ -143,8 +145,11 @@ def resonance_curve(
         As for :func:`fecontact.bifurcation.frequency_response`.
     condition : 'amplitude' or 'phase'
         The peak of the observed amplitude, with memory midway between two orbits of the same; or
-        phase resonance of a contact system, where the force does no work in phase with the
-        displacements.
+        a phase of a contact system that is held, by default phase resonance, where the force does
+        no work in phase with the displacements.
+    lag : float
+        For ``condition="phase"``: the angle phi [rad], 0 < phi < pi, by which the displacements X_1
+        are behind the given force P, Im(P^H X_1 exp(i phi)) = 0.
     method, options, preload
         As for :func:`fecontact.bifurcation.frequency_response`; by default up to 400 points,
         largest_step 0.05.
@@ -160,6 +165,10 @@ def resonance_curve(
     require_kind("resonance_curve", (ContactSystem, VectorField), system=system)
     require_kind("resonance_curve", (HarmonicBalance, type(None)), method=method)
     require_choice("resonance_curve", "condition", condition, _CONDITIONS)
+    require_kind("resonance_curve", Real, lag=lag)
+    if not 0.0 < lag < np.pi:
+        raise InputError(f"resonance_curve: lag = {lag!r} must be an angle between 0 and pi rad; "
+                         f"pi / 2 is phase resonance.")
     chosen = options_of(
         options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
     field = system if isinstance(system, VectorField) else contact_field(
@@ -175,7 +184,7 @@ def resonance_curve(
     low, high = chosen.bounds
     values = field.values
     values[second] = inside(low if start is None else float(start), chosen)
-    problem, u = _first(field, values, free, second, frequencies, row, condition,
+    problem, u = _first(field, values, free, second, frequencies, row, condition, float(lag),
                         method or HarmonicBalance(), chosen, preloaded(system, preload))
     branch = continue_branch(
         problem, u, chosen, name=parameter, direction=1.0 if u[-1] < high else -1.0,
@@ -201,7 +210,7 @@ def resonances_of(branch: Branch) -> ResonanceCurve:
 
 def _first(
     field: VectorField, values: Array, free: int, second: int, frequencies: tuple[float, float],
-    row: Array, condition: str, method: HarmonicBalance, options: ContinuationOptions,
+    row: Array, condition: str, lag: float, method: HarmonicBalance, options: ContinuationOptions,
     held: Array | None,
 ) -> tuple[PeakProblem, Array]:
     """The problem, and the peak of a response."""
@@ -216,12 +225,14 @@ def _first(
         raise AnalysisError(f"The response has no peak between the frequencies "
                             f"{given.bounds[0]:.6g} and {branch.points[-1].parameter:.6g}; choose "
                             f"others.")
-    orbit, u, tangent = starts.restored(field, branch.points[place])
     rest = (rest_state(field, values) if isinstance(field, ContactField)
             else np.zeros(field.dimension))
+    if condition == "phase" and isinstance(field, ContactField):
+        place = _place_of_phase(field, values, free, branch, rest, lag, place)
+    orbit, u, tangent = starts.restored(field, branch.points[place])
     width = width_of(None, options, float(values[second]))
     problem = PeakProblem(orbit, second, width, row, condition, orbit.weights() * tangent, rest,
-                          float(sizes[place]))
+                          float(sizes[place]), lag=lag)
     start = np.append(u, values[second])
     if condition == "amplitude" and layout_of(field).memory:
         # In the scales of the orbit a distance is about a change of phase.
@@ -229,6 +240,26 @@ def _first(
     if condition == "phase":
         problem = replace(problem, size=_work(problem, start))
     return problem, start
+
+
+def _place_of_phase(
+    field: ContactField, values: Array, free: int, branch: Branch, rest: Array, lag: float,
+    peak: int,
+) -> int:
+    """Index of the point nearest to the peak beside which the displacements pass the lag."""
+    values, m, b, off = values.copy(), field.system().basis.modes, layout_of(field).harmonic, []
+    for point in branch.points:
+        values[free] = point.parameter
+        P = given_force(field, values, rest, float(point.values["period"]))
+        cosines, sines = point.u[b : 3 * b].reshape(2, b)[:, :m]
+        off.append(float((np.vdot(P, cosines - 1j * sines) * np.exp(1j * lag)).imag))
+    signs = np.sign(off)
+    passed = np.flatnonzero(signs[:-1] * signs[1:] <= 0.0)
+    if not len(passed):
+        raise AnalysisError(f"The displacements do not pass the lag {lag:.4g} rad behind the force "
+                            f"between the frequencies {branch.points[0].parameter:.6g} and "
+                            f"{branch.points[-1].parameter:.6g}; choose others.")
+    return int(passed[np.argmin(np.abs(passed - peak))])
 
 
 def _work(problem: PeakProblem, u: Array) -> float:

@@ -30,6 +30,11 @@ def response(
     levels: Annotated[str | None, Parameter(
         help="Another parameter and its values, `drive.amplitude_x=1e-5,2e-5`; a response for "
         "each.")] = None,
+    amplitudes: Annotated[str | None, Parameter(
+        help="Amplitudes that are held, `1e-5,2e-5` [m], while the level of the force is free; "
+        "override `[response]` and its levels.")] = None,
+    force: Annotated[str | None, Parameter(
+        help="The level that is free then; by default the amplitude of the drive.")] = None,
     method: Annotated[Literal["harmonic balance", "collocation", "shooting"] | None, Parameter(
         help="How orbits are found; overrides `[response]`.")] = None,
     harmonics: Annotated[str | None, Parameter(
@@ -60,7 +65,7 @@ def response(
     described = read_study(study, set_)
     with located(f"{described.title}: [response]:", "ResponseSettings"):
         wanted = _wanted(described.response, parameter, hz, bounds, levels, method, harmonics,
-                         samples, tolerance)
+                         samples, tolerance, amplitudes, force)
     with located(f"{described.title}:"):
         _ = wanted.checked_bounds
     described = replace(described, response=wanted)
@@ -118,11 +123,12 @@ def response(
 def _wanted(
     given: "ResponseSettings", parameter: str | None, hz: tuple[float, float] | None,
     bounds: tuple[float, float] | None, levels: str | None, method: str | None,
-    harmonics: str | None, samples: int | None, tolerance: float | None,
+    harmonics: str | None, samples: int | None, tolerance: float | None, amplitudes: str | None,
+    force: str | None,
 ) -> "ResponseSettings":
     """The section [response] with the options of the command line."""
     changes: dict[str, object] = {name: value for name, value in (
-        ("parameter", parameter), ("method", method),
+        ("parameter", parameter), ("method", method), ("force", force),
         ("harmonics", None if harmonics is None else _harmonics(harmonics)), ("samples", samples),
         ("tolerance", tolerance)) if value is not None}
     if hz is not None and bounds is not None:
@@ -133,6 +139,8 @@ def _wanted(
         changes |= {"bounds": None, "bounds_hz": None, "start": None}
     if levels is not None:
         changes["levels"] = _levels(levels)
+    if amplitudes is not None:
+        changes |= {"amplitudes": _amplitudes(amplitudes)} | ({} if levels else {"levels": {}})
     if harmonics is not None and samples is None:
         changes["samples"] = None
     return replace(given, **changes)  # type: ignore[arg-type]
@@ -149,6 +157,15 @@ def _levels(text: str) -> dict[str, tuple[float, ...]]:
         raise InputError(f"--levels {text} must have the form KEY=VALUE,VALUE, like "
                          f"drive.amplitude_x=1e-5,2e-5.")
     return {name: values}
+
+
+def _amplitudes(text: str) -> tuple[float, ...]:
+    """Amplitudes from ``1e-5,2e-5``."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--amplitudes {text} must be numbers with commas between them, like "
+                         f"1e-5,2e-5.") from None
 
 
 def _harmonics(text: str) -> int | tuple[int, ...]:
@@ -175,5 +192,5 @@ def _earlier(study: "Study", file: Path) -> "FrequencyResponse":
     if not file.is_file():
         raise InputError(f"There is no interrupted response to go on with: {file} does not exist; "
                          f"leave out --resume.")
-    require_same_study(study, file, "levels")
+    require_same_study(study, file, "levels", "amplitudes")
     return read_response(file)

@@ -33,16 +33,21 @@ def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array)
     ``ground speed [m/s]`` with values up to 4e-3 becomes ``ground speed [mm/s]``, with a tick 4
     there. Labels without a unit, or with one that has no prefixes, stay as they are.
     """
-    name, _, unit = label.rpartition(" [")
-    unit = unit.removesuffix("]")
-    finite = np.abs(values[np.isfinite(values)])
-    factor = 1.0
-    if name and has_prefixes(unit) and len(finite):
-        factor, symbol = suitable_unit(float(finite.max()), unit)
-        label = f"{name} [{symbol}]"
+    factor, label = in_unit(label, values)
     axes.set(**{f"{which}label": label})
     if factor != 1.0:
         (axes.xaxis if which == "x" else axes.yaxis).set_major_formatter(_InUnit(factor))
+
+
+def in_unit(label: str, values: Array) -> tuple[float, str]:
+    """Factor of the unit that suits some values, and the label with this unit."""
+    name, _, unit = label.rpartition(" [")
+    unit = unit.removesuffix("]")
+    finite = np.abs(values[np.isfinite(values)])
+    if not (name and has_prefixes(unit) and len(finite)):
+        return 1.0, label
+    factor, symbol = suitable_unit(float(finite.max()), unit)
+    return factor, f"{name} [{symbol}]"
 
 
 def branch_label(branch: "Branch", name: str | int = "parameter") -> str:

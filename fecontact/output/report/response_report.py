@@ -9,8 +9,14 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.checks import require_kind
-from fecontact.core.units import quantity, suitable_unit
-from fecontact.output.plots.responses.response import frequency_axis, level_texts
+from fecontact.core.units import quantity
+from fecontact.output.plots.parameter_labels import in_unit
+from fecontact.output.plots.responses.response import (
+    drawn,
+    drawn_label,
+    frequency_axis,
+    level_texts,
+)
 from fecontact.output.report.branch_report import COLUMNS, shown_of
 from fecontact.output.report.diagram_page import Diagram, point_texts, write_diagrams
 from fecontact.output.report.run_report import require_page
@@ -58,17 +64,17 @@ def report_response(
     require_kind("report_response", FrequencyResponse, response=response)
     require_kind("report_response", ContactSystem, system=system)
     path = require_page(path)
-    names = [response.parameter_name, *([response.level_name] if response.level_name else [])]
+    names = [*response.branches[0].parameter_names,
+             *([response.level_name] if response.level_name and not response.force_name else [])]
     field = contact_field(system, dict.fromkeys(names))
     named = dict(zip(_names(response), response.branches, strict=True))
     factor, x_label = frequency_axis(response)
     x = [branch.parameter / factor for branch in response.branches]
-    amplitudes = [response.amplitude(level) for level in range(len(named))]
+    curves = [drawn(response, level) for level in range(len(named))]
     unit = "rad" if observe[1].startswith("phi") else "m"
-    scale, symbol = suitable_unit(max(float(one.max()) for one in amplitudes), unit)
+    scale, y_label = in_unit(drawn_label(response), np.concatenate(curves))
     diagrams = [
-        Diagram("", f"amplitude of {response.observed} [{symbol}]", x,
-                [one / scale for one in amplitudes], height=330),
+        Diagram("", y_label, x, [one / scale for one in curves], height=330),
         Diagram(x_label, "phase [°]", x,
                 [np.degrees(response.phase(level)) for level in range(len(named))], height=170)]
     shown = shown_of(field, observe)

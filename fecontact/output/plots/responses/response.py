@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.bifurcation.harmonic.response import FrequencyResponse
+from fecontact.bifurcation.harmonic.response import FrequencyResponse, amplitude_label
 from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
 from fecontact.core.units import has_prefixes, suitable_unit
@@ -32,9 +32,9 @@ def plot_response(
 ) -> "Figure":
     """Plot a frequency response: amplitude and phase, a colour for each level.
 
-    Above half the range of the observed quantity, below the phase of its first harmonic against a
-    sine drive. Stable parts are solid, unstable ones dashed, special points marked. Angular
-    frequencies are shown in Hz.
+    Above half the range of the observed quantity, or the force that holds it, below the phase of
+    its first harmonic against a sine drive. Stable parts are solid, unstable ones dashed, special
+    points marked. Angular frequencies are shown in Hz.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def plot_response(
         for level, (branch, colour) in enumerate(zip(response.branches, colours, strict=True)):
             x, stable = branch.parameter / factor, stable_pieces(branch)
             dashed |= not stable.all()
-            curves = (response.amplitude(level), np.degrees(response.phase(level)))
+            curves = (drawn(response, level), np.degrees(response.phase(level)))
             for panel, curve in zip((upper, lower), curves, strict=True):
                 for first, last in runs_of(stable):
                     panel.plot(x[first : last + 1], curve[first : last + 1], color=colour,
@@ -80,7 +80,7 @@ def plot_response(
             upper.set_yscale("log")
         else:
             upper.set_ylim(bottom=0.0)
-        name_axis(upper, "y", y_label or _amplitude_label(response), _range(response))
+        name_axis(upper, "y", y_label or drawn_label(response), _range(response))
         lower.set_ylabel("phase [°]")
         lower.set_yticks(_degrees(lower.get_ylim()))
         name_axis(lower, "x", label, np.array(lower.dataLim.intervalx))
@@ -111,17 +111,20 @@ def level_texts(response: FrequencyResponse) -> tuple[str, list[str]]:
     return words or label, [f"{level / factor:.4g} {symbol}".strip() for level in levels]
 
 
-def _amplitude_label(response: FrequencyResponse) -> str:
-    """Displacements of contact systems are lengths; states of a vector field have no unit."""
-    names = response.observed.split()
-    if len(names) == 2:
-        unit = "rad" if names[1].startswith("phi") else "m"
-        return f"amplitude of {response.observed} [{unit}]"
-    return f"amplitude of {response.observed}"
+def drawn(response: FrequencyResponse, level: int) -> Array:
+    """Amplitude (N,) over the parameter, or the force where the amplitude is held."""
+    return response.amplitude(level) if response.force_name is None else response.force(level)
+
+
+def drawn_label(response: FrequencyResponse) -> str:
+    """Label of what is drawn over the parameter, with its unit."""
+    if response.force_name is None:
+        return amplitude_label(response.observed)
+    return branch_label(response.branches[0], response.force_name)
 
 
 def _range(response: FrequencyResponse) -> Array:
-    return np.concatenate([response.amplitude(level) for level in range(len(response.branches))])
+    return np.concatenate([drawn(response, level) for level in range(len(response.branches))])
 
 
 def _degrees(limits: tuple[float, float]) -> Array:

@@ -1,0 +1,173 @@
+"""Responses at a held amplitude: the level of the force follows from the motion."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from numbers import Real
+from types import NoneType
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    options_of,
+    width_of,
+)
+from fecontact.bifurcation.continuation.pseudo_arclength import inside
+from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.observed_row import observed_row
+from fecontact.bifurcation.harmonic import starts
+from fecontact.bifurcation.harmonic.branches import attributes_of
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.response import (
+    FrequencyResponse,
+    amplitude_label,
+    branch_of_response,
+    observed_amplitudes,
+    preloaded,
+    rest_state,
+)
+from fecontact.bifurcation.nonlinear_modes.peak_problem import HELD, PeakProblem
+from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.resources.blas_threads import one_blas_thread
+from fecontact.core.types import Array, ArrayLike
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.vector_field import VectorField
+from fecontact.system.quasistatic.history import LoadHistory
+from fecontact.system.quasistatic.rest_state import RestState
+
+# Points at most, and largest step, unless options say so.
+_POINTS, _LARGEST = 2000, 0.03
+# First level, relative to the one at which the linear response has the amplitude, factor by which
+# the range of levels grows, and how often.
+_FIRST, _WIDER, _TIMES = 1e-3, 8.0, 5
+_REACHED = "amplitude reached"
+
+
+@one_blas_thread
+def controlled_response(
+    system: ContactSystem | VectorField, bounds: tuple[float, float], amplitudes: ArrayLike,
+    force: str = "drive.amplitude_x", parameter: str | None = None, *,
+    observe: tuple[str | int, str] | Sequence[float] | Array = ("B", "x"),
+    method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
+    start: float | None = None, preload: LoadHistory | RestState | Array | None = None,
+) -> FrequencyResponse:
+    r"""Responses at held amplitudes, as under amplitude control: the level of the force is free.
+
+    With the forced orbit x(t) of frequency w and force P the equations
+
+    .. math:: M \ddot x + f(x, \dot x) = P \cos w t, \qquad
+        \tfrac12 (\max_t y - \min_t y) = a, \qquad y = b^T x
+
+    are followed over w with x and P unknown. Orbits between the folds of a response at a constant
+    force lie on one branch without folds. ``response.force(level)`` is P, ``response.peak(level)``
+    the point of smallest force over amplitude, the resonance. 'stable' is the stability under the
+    constant force P, without control.
+
+    Parameters
+    ----------
+    system : ContactSystem or VectorField
+        Excited with a common period.
+    bounds : (float, float)
+        Range of the parameter [rad/s for a frequency].
+    amplitudes : float or sequence
+        a above zero, half the range of the observed displacement: a branch for each.
+    force : str
+        Dotted name of the level that is free, such as 'drive.amplitude_x', zero without motion.
+    parameter : str, optional
+        Dotted name, by default 'drive.angular_frequency'.
+    observe, method, options, start, preload
+        As for :func:`fecontact.bifurcation.frequency_response`, by harmonic balance.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        For a parameter or point that does not exist, no excitation with a period, or an amplitude
+        that no level of the force reaches at the start.
+    """
+    require_kind("controlled_response", (ContactSystem, VectorField), system=system)
+    require_kind("controlled_response", (str, NoneType), parameter=parameter)
+    require_kind("controlled_response", str, force=force)
+    require_kind("controlled_response", (Real, NoneType), start=start)
+    require_kind("controlled_response", (HarmonicBalance, NoneType), method=method)
+    held = np.atleast_1d(as_floats(amplitudes, "controlled_response: amplitudes"))
+    if held.ndim != 1 or not len(held) or not (held > 0.0).all():
+        raise InputError(f"controlled_response: amplitudes = {amplitudes!r} must be one or several "
+                         f"numbers above zero.")
+    chosen = options_of(
+        options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
+    name = parameter or "drive.angular_frequency"
+    if name == force:
+        raise InputError(f"controlled_response: parameter and force are both {force!r}; take "
+                         f"another parameter.")
+    field = system if isinstance(system, VectorField) else contact_field(system, [force, name])
+    row, observed = observed_row(field, observe)
+    low, high = chosen.bounds
+    first = inside(low if start is None else float(start), chosen)
+    state = preloaded(system, preload)
+    found: list[Branch] = []
+    for amplitude in held.tolist():
+        try:
+            problem, u = _started(field, field.index(force), field.index(name), first, amplitude,
+                                  row, method or HarmonicBalance(), chosen, state)
+            found.append(continue_branch(
+                problem, u, chosen, name=name, direction=1.0 if first < high else -1.0,
+                both=low < first < high, attributes={
+                    **attributes_of(problem.orbit), "parameters": [name, force],
+                    "observed": observed, "condition": HELD, "level": amplitude,
+                    "level_name": "amplitude", "level_label": amplitude_label(observed)}))
+        except KeyboardInterrupt:
+            if not found:
+                raise
+            break
+        if found[-1].status is BranchStatus.INTERRUPTED:
+            break
+    return FrequencyResponse(tuple(found), "amplitude", held[: len(found)], observed)
+
+
+def _started(
+    field: VectorField, force: int, second: int, first: float, amplitude: float, row: Array,
+    method: HarmonicBalance, options: ContinuationOptions, held: Array | None,
+) -> tuple[PeakProblem, Array]:
+    """Problem, and the orbit of the amplitude at the first value of the parameter.
+
+    The response over the level of the force begins close to rest, and ends at the amplitude.
+    """
+    values, plain = field.values, replace(method, tolerance=None)
+    values[second] = first
+    failed: FecontactError = AnalysisError("")
+    highest = abs(float(values[force])) or 1.0
+    for _ in range(_TIMES):
+        given = ContinuationOptions(
+            points=2000, largest_step=_LARGEST, locate=False, bounds=(_FIRST * highest, highest),
+            events={_REACHED: lambda found: found["observed_amplitude"] / amplitude - 1.0},
+            stop_at=[_REACHED])
+        try:
+            branch = branch_of_response(field, values, force, None, given.bounds[0],
+                                        replace(plain, stability=None), given, held, both=False,
+                                        row=row)
+        except FecontactError as error:
+            failed = error
+            break
+        sizes = observed_amplitudes(branch, row)
+        if sizes[0] >= amplitude:
+            highest *= _FIRST * amplitude / sizes[0]
+        elif branch.points[-1].kind == _REACHED:
+            orbit, u, tangent = starts.restored(field, branch.points[-1])
+            orbit = replace(orbit, stability=method.stability)
+            width = width_of(None, options, first)
+            rest = (rest_state(field, values) if isinstance(field, ContactField)
+                    else np.zeros(field.dimension))
+            problem = PeakProblem(orbit, second, width, row, HELD, orbit.weights() * tangent, rest,
+                                  amplitude)
+            return problem, np.append(u, first)
+        else:
+            # At a constant slope the amplitude would be reached half-way.
+            highest *= max(_WIDER, 2.0 * amplitude / sizes[-1])
+    names = list(field.parameters)
+    raise AnalysisError(f"The amplitude {amplitude:g} was not reached at {names[second]} = "
+                        f"{first:g} with any {names[force]} up to {highest:g}; start at another "
+                        f"value, or hold a smaller one. {failed}".rstrip())
