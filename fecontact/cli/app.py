@@ -4,6 +4,7 @@ Slow libraries are imported inside the commands, so that help appears at once.
 """
 
 from collections.abc import Callable
+from inspect import cleandoc
 from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
@@ -61,13 +62,21 @@ app = App(
     name="fecontact",
     help="Elastic bodies in contact with friction: from a study file to modes, motion and movies.",
     version=_version,
-    help_format="markdown",
+    help_format="plaintext",
     suppress_keyboard_interrupt=False,
     default_parameter=Parameter(negative=()),
 )
 app.meta.suppress_keyboard_interrupt = False
+
+
+def _plain(docstring: str) -> str:
+    """Paragraphs of one line each, as plain text is shown; Markdown takes long to load."""
+    return "\n\n".join(text.replace("\n", " ") for text in cleandoc(docstring).split("\n\n"))
+
+
 for _place, _command in enumerate(COMMANDS):
-    app.command(_command, name=_command.__name__.rstrip("_"), sort_key=_place)
+    app.command(_command, name=_command.__name__.rstrip("_"), sort_key=_place,
+                help=_plain(_command.__doc__ or ""))
 
 
 @app.meta.default

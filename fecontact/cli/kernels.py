@@ -16,7 +16,14 @@ from typing import Any
 
 from fecontact.core.errors import FecontactError, InputError, choices
 from fecontact.core.progress import counting_bar
-from fecontact.core.stored_code import FAMILIES, FOLDER, MADE_WITH, PACKAGE, made_with
+from fecontact.core.stored_code import (
+    FAMILIES,
+    FOLDER,
+    MADE_WITH,
+    PACKAGE,
+    made_with,
+    size_on_disk,
+)
 
 # Modules whose kernels are compiled, then members that are compiled for their address, or size by
 # size. Kernels that share much of their code are neighbours.
@@ -60,8 +67,11 @@ _PARTS = {
 _LAWS = ("fecontact.laws", "fecontact.system")
 
 
-def compile_kernels(part: str) -> int:
-    """Compile 'runs', what runs need, or 'all' kernels, by two processes; how many there are."""
+def compile_kernels(part: str) -> tuple[int, int]:
+    """Compile 'runs', what runs need, or 'all' kernels, by two processes.
+
+    Returns their number, and the bytes of all code that is stored with theirs.
+    """
     # Linear algebra needs no threads here.
     quiet = os.environ | dict.fromkeys(
         ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -81,7 +91,7 @@ def compile_kernels(part: str) -> int:
             # Compiled here: kernels that it left out; all others are only read.
             for compile_one in found:
                 compile_one()
-    return len(found)
+    return len(found), size_on_disk(import_module("fecontact.core.compiled").KERNELS)
 
 
 def _jobs(part: str) -> list[Callable[[], Any]]:

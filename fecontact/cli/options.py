@@ -5,14 +5,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-StudyFile = Annotated[Path, Parameter(help="Study file; `fecontact init` writes one.")]
+StudyFile = Annotated[Path, Parameter(help="Study file; fecontact init writes one.")]
 RunFile = Annotated[Path, Parameter(
-    help="A file written by `fecontact run`, its folder, or its study.")]
+    help="A file written by fecontact run, its folder, or its study.")]
 Trust = Annotated[bool, Parameter(
     negative=(), help="Execute user-defined laws in Python files that the run names.")]
 Changes = Annotated[list[str] | None, Parameter(
     name="--set", negative=(), show_default=False,
-    help="Override a key of the study, `ground.speed=0.1`; may be repeated.")]
+    help="Override a key of the study, ground.speed=0.1; may be repeated.")]
 Folder = Annotated[Path | None, Parameter(
     name=["--output", "-o"], help="Folder of the results; by default that of the study.")]
 Branches = Annotated[str | None, Parameter(

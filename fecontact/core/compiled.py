@@ -8,6 +8,8 @@ the kernel from Python spends no time on converting function objects.
 import dis
 import hashlib
 import inspect
+import math
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -31,11 +33,15 @@ from fecontact.core.errors import InputError
 from fecontact.core.kernel_parts import BorrowingCompiler, kernel_compiler, part
 from fecontact.core.progress import said_if_slow
 from fecontact.core.records import is_record, signature_of
-from fecontact.core.stored_code import keep_on_disk
+from fecontact.core.stored_code import (
+    keep_on_disk,
+    note_seconds_to_compile,
+    seconds_to_compile,
+)
 
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
-_COMPILING = ("Compiling what is used for the first time, once on this machine; "
-              "'fecontact compile --all' compiles everything ahead.")
+_COMPILING = ("Compiling {}{}, once on this machine; 'fecontact compile --all' compiles everything "
+              "ahead.")
 
 
 def source_digest(function: Any) -> str:
@@ -156,9 +162,15 @@ class _Kernel(CPUDispatcher):
         """Itself, compiled."""
         with global_compiler_lock:
             if not self.overloads:
+                begin, last = time.perf_counter(), seconds_to_compile(self)
+                about = "" if last is None else f", about {math.ceil(last)} s"
+                name = f"{self.__module__}.{self.__name__}".removeprefix("fecontact.")
                 # Code that is on disk is no miss.
-                with said_if_slow(_COMPILING, lambda: bool(self._cache_misses)):
+                with said_if_slow(_COMPILING.format(name, about),
+                                  lambda: bool(self._cache_misses)):
                     self.compile(self.signature)
+                if self._cache_misses:
+                    note_seconds_to_compile(self, time.perf_counter() - begin)
                 self.disable_compile()
         return self
 

@@ -11,6 +11,7 @@ import json
 import os
 import re
 import warnings
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
@@ -86,6 +87,23 @@ class _StoredCode(IndexDataCacheFile):
 
     package: IndexDataCacheFile | None = None
 
+    @property
+    def _times(self) -> Path:
+        return Path(self._index_path).with_suffix(".seconds")
+
+    @property
+    def seconds(self) -> float | None:
+        """What compiling took last on this machine [s]; None if that is not known."""
+        try:
+            return float(self._times.read_text(encoding="ascii"))
+        except (OSError, ValueError):
+            return None
+
+    @seconds.setter
+    def seconds(self, seconds: float) -> None:
+        with suppress(OSError):
+            self._times.write_text(f"{seconds:.3f}", encoding="ascii")
+
     def load(self, key: Any) -> Any:
         """The code of a key, or None."""
         found = super().load(key)
@@ -127,6 +145,25 @@ class _StoredCode(IndexDataCacheFile):
 def _remove(path: str) -> None:
     with suppress(OSError):
         Path(path).unlink()
+
+
+def seconds_to_compile(compiled: Any) -> float | None:
+    """What compiling a kernel took last on this machine [s]; None if that is not known."""
+    stored = getattr(compiled._cache, "_cache_file", None)
+    return stored.seconds if isinstance(stored, _StoredCode) else None
+
+
+def note_seconds_to_compile(compiled: Any, seconds: float) -> None:
+    """Keep beside the code of a kernel how long it took to compile."""
+    stored = getattr(compiled._cache, "_cache_file", None)
+    if isinstance(stored, _StoredCode):
+        stored.seconds = seconds
+
+
+def size_on_disk(kernels: Iterable[Any]) -> int:
+    """Bytes of the stored code of kernels."""
+    folders = {Path(kernel._cache.cache_path) for kernel in kernels}
+    return sum(file.stat().st_size for folder in folders for file in folder.glob("*.nb[ci]"))
 
 
 def keep_on_disk(

@@ -4,6 +4,8 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import nullcontext
+from importlib import import_module
 from itertools import product
 from pathlib import Path
 from unittest import mock
@@ -232,3 +234,24 @@ def test_code_is_compiled_in_memory_where_no_folder_can_store_it(tmp_path, code,
     assert "ModelWarning: Compiled code cannot be stored" in done.stderr
     assert "environment variable NUMBA_CACHE_DIR" in done.stderr
     assert not list(tmp_path.rglob("*.nb?"))
+
+
+def test_the_time_that_compiling_took_is_told_at_the_next_one(tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text("from fecontact.core.compiled import kernel\n"
+                                      "@kernel\n"
+                                      "def double(x: float) -> float:\n"
+                                      "    return 2.0 * x\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    told = []
+    monkeypatch.setattr(compiled, "said_if_slow",
+                        lambda text, applies: told.append(text) or nullcontext())
+    for seconds in (None, 8.2, "nonsense"):
+        if seconds is not None:
+            next(tmp_path.rglob("*.seconds")).write_text(str(seconds))
+            for file in tmp_path.rglob("*.nbc"):
+                file.unlink()
+        sys.modules.pop("mine", None)
+        assert import_module("mine").double(2.0) == 4.0
+        assert 0.0 < float(next(tmp_path.rglob("*.seconds")).read_text()) < 60.0
+    assert [text.partition(", once")[0] for text in told] == [
+        "Compiling mine.double", "Compiling mine.double, about 9 s", "Compiling mine.double"]

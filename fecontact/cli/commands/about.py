@@ -75,7 +75,7 @@ def compile_(
 ) -> int:
     """Compile ahead what runs need, once on this machine; a first run then begins at once.
 
-    ``pip install 'fecontact[kernels]'`` brings compiled kernels, with which this is not needed.
+    pip install 'fecontact[kernels]' brings compiled kernels, with which this is not needed.
     """
     from fecontact.cli.kernels import build_package, compile_kernels
 
@@ -86,8 +86,8 @@ def compile_(
         return 0
     if cpu:
         raise InputError("--cpu is for a package of kernels; give --wheel FOLDER too.")
-    count = compile_kernels("all" if everything else "runs")
-    echo(f"{count} kernels are compiled.")
+    count, size = compile_kernels("all" if everything else "runs")
+    echo(f"{count} kernels are compiled; the cache has {size / 1e6:.0f} MB.")
     return 0
 
 

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 def branch(
     study: StudyFile,
     parameter: Annotated[str | None, Parameter(
-        help="Continuation parameter, such as `ground.speed`; overrides `[branch]`.")] = None,
+        help="Continuation parameter, such as ground.speed; overrides [branch].")] = None,
     /,
     *,
     bounds: Annotated[tuple[float, float] | None, Parameter(
-        help="Lower and upper bound of the parameter; overrides `[branch]`.")] = None,
+        help="Lower and upper bound of the parameter; overrides [branch].")] = None,
     start: Annotated[float | None, Parameter(
         help="Starting value; the lower bound by default.")] = None,
     set_: Changes = None,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def compare(
     *files: Annotated[Path, Parameter(help=(
-        "Files written by `fecontact run`, their folders or studies; or files of branches."))],
+        "Files written by fecontact run, their folders or studies; or files of branches."))],
     point: Annotated[list[str] | None, Parameter(
         negative=(), show_default=False,
         help="Name of a point or number of a contact node; B by default. May be repeated.")] = None,

@@ -19,31 +19,31 @@ if TYPE_CHECKING:
 def response(
     study: StudyFile,
     parameter: Annotated[str | None, Parameter(
-        help="What changes along a response; overrides `[response]`. By default "
-        "`drive.angular_frequency`.")] = None,
+        help="What changes along a response; overrides [response]. By default "
+        "drive.angular_frequency.")] = None,
     /,
     *,
     hz: Annotated[tuple[float, float] | None, Parameter(
-        help="Lowest and highest frequency [Hz]; overrides `[response]`.")] = None,
+        help="Lowest and highest frequency [Hz]; overrides [response].")] = None,
     bounds: Annotated[tuple[float, float] | None, Parameter(
-        help="Least and largest value of another parameter; overrides `[response]`.")] = None,
+        help="Least and largest value of another parameter; overrides [response].")] = None,
     levels: Annotated[str | None, Parameter(
-        help="Another parameter and its values, `drive.amplitude_x=1e-5,2e-5`; a response for "
+        help="Another parameter and its values, drive.amplitude_x=1e-5,2e-5; a response for "
         "each.")] = None,
     amplitudes: Annotated[str | None, Parameter(
-        help="Amplitudes that are held, `1e-5,2e-5` [m], while the level of the force is free; "
-        "override `[response]` and its levels.")] = None,
+        help="Amplitudes that are held, 1e-5,2e-5 [m], while the level of the force is free; "
+        "override [response] and its levels.")] = None,
     force: Annotated[str | None, Parameter(
         help="The level that is free then; by default the amplitude of the drive.")] = None,
     method: Annotated[Literal["harmonic balance", "collocation", "shooting"] | None, Parameter(
-        help="How orbits are found; overrides `[response]`.")] = None,
+        help="How orbits are found; overrides [response].")] = None,
     harmonics: Annotated[str | None, Parameter(
-        help="All harmonics up to a number, `7`, or those of a list, `1,3,5`; overrides "
-        "`[response]`.")] = None,
+        help="All harmonics up to a number, 7, or those of a list, 1,3,5; overrides "
+        "[response].")] = None,
     samples: Annotated[int | None, Parameter(
-        help="Samples a period; overrides `[response]`.")] = None,
+        help="Samples a period; overrides [response].")] = None,
     tolerance: Annotated[float | None, Parameter(
-        help="Largest truncation error; overrides `[response]`.")] = None,
+        help="Largest truncation error; overrides [response].")] = None,
     set_: Changes = None,
     output: Folder = None,
     resume: Annotated[bool, Parameter(

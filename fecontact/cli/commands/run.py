@@ -74,7 +74,7 @@ def open(
 ) -> None:
     """Show a result file in ParaView or in the browser.
 
-    A run, branches or a response are shown in the browser as the page that `fecontact report`
+    A run, branches or a response are shown in the browser as the page that fecontact report
     writes. Without --trust no code is run that the file contains or names.
     """
     from fecontact.cli import viewers
@@ -179,7 +179,7 @@ def plot(
     set_: Changes = None,
     point: Annotated[list[str] | None, Parameter(
         negative=(), show_default=False,
-        help="Name of a point, number of a contact node, or place `x,y` or `x,y,z`; B by default. "
+        help="Name of a point, number of a contact node, or place x,y or x,y,z; B by default. "
         "A history takes several.")] = None,
     component: Annotated[Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None, Parameter(
         help="Component of the motion, of solids x, y, z, phi_x, phi_y or phi_z, else x, y or phi; "
@@ -241,8 +241,8 @@ def export(
     *,
     set_: Changes = None,
     format_: Annotated[Literal["pvd", "csv", "mat", "netcdf"], Parameter(
-        name="--format", help="`pvd` with VTU files, for ParaView before 5.12; `csv` for "
-        "spreadsheets; `mat` for MATLAB and Octave; `netcdf` for xarray.")] = "pvd",
+        name="--format", help="pvd with VTU files, for ParaView before 5.12; csv for "
+        "spreadsheets; mat for MATLAB and Octave; netcdf for xarray.")] = "pvd",
     output: Annotated[Path | None, Parameter(
         name=["--output", "-o"], help="Output file, or a folder for pvd.")] = None,
     frames: Annotated[int, Parameter(help="Number of fields over the body, for pvd.")] = 200,

@@ -105,7 +105,7 @@ def modes(
     counted through. With --nonlinear, frequency and damping over the amplitude are written
     (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page whose points play the motion (.html);
     harmonics, the observed displacement and preload are those of [response]. It is stored as it
-    grows; Ctrl-C stops it, --resume goes on where it was. With a `tolerance` it is stored at the
+    grows; Ctrl-C stops it, --resume goes on where it was. With a tolerance it is stored at the
     end only, and followed anew.
     """
     import numpy as np

@@ -39,11 +39,11 @@ def sweep(
     workers: Annotated[int | None, Parameter(
         help="Processes on this machine; one per core by default.")] = None,
     dask: Annotated[str | None, Parameter(
-        help="Address of a running Dask scheduler, such as `tcp://node1:8786`.")]
+        help="Address of a running Dask scheduler, such as tcp://node1:8786.")]
     = None,
     cases: Annotated[str | None, Parameter(
         help="Run nothing, but print cases of a stored sweep with the command that runs each "
-        "alone: `failed`, `missing`, or numbers like `3,17`.")] = None,
+        "alone: failed, missing, or numbers like 3,17.")] = None,
 ) -> int:
     """Run many cases of a study on all cores or a cluster; write a table (index.csv), a page
     (index.html) and plots.
