@@ -26,12 +26,16 @@ print(fc.simulate(system, 1.0).status.value)
 
 
 def call(*command, cwd, cache):
-    """Seconds of a command, away from the sources and with a cache of its own."""
+    """Seconds and peak memory [MB] of a command, away from the sources, with a cache of its own."""
     free = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     begin = time.perf_counter()
-    subprocess.run(command, cwd=cwd, check=True, env=free | {"NUMBA_CACHE_DIR": str(cache)},
-                   stdout=subprocess.DEVNULL)
-    return time.perf_counter() - begin
+    process = subprocess.Popen(command, cwd=cwd, env=free | {"NUMBA_CACHE_DIR": str(cache)},
+                               stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        sys.exit(f"{command} ended with exit code {process.returncode}")
+    return time.perf_counter() - begin, used.ru_maxrss / 1e3
 
 
 def size(folder):
@@ -59,9 +63,10 @@ def first_commands(programs, folder, what):
     }
     for name, command in commands.items():
         with tempfile.TemporaryDirectory() as cache, tempfile.TemporaryDirectory() as place:
-            seconds = call(*command, cwd=place, cache=cache)
+            seconds, peak = call(*command, cwd=place, cache=cache)
             compiled = len([*Path(cache).rglob("*.nbc")])
-        print(f"{what:24s} {name:38s} {seconds:6.1f} s  {compiled:4d} compiled", flush=True)
+        print(f"{what:24s} {name:38s} {seconds:6.1f} s {peak:6.0f} MB {compiled:4d} compiled",
+              flush=True)
 
 
 def main():
