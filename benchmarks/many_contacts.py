@@ -63,7 +63,7 @@ def step_time(nodes: int, crown: float, pieces: int, steps: int) -> tuple[float,
         before, begin = run.attempts, time.process_time()
         run.advance(steps)
         found.append((time.process_time() - begin) / (run.attempts - before))
-    force = tried.contact_history(np.array([run.time]), run.progress.state[None])[0, :, 0]
+    force = tried.at(run.progress.state, time=run.time).normal_force
     return float(np.median(found)) * 1e6, float((force != 0.0).mean())
 
 

@@ -69,7 +69,7 @@ def stuck(system: fc.ContactSystem) -> NDArray[np.float64]:
     """State of the pressed body that moves with the belt."""
     modes = system.basis.modes
     state = np.zeros(system.size)
-    state[:modes] = fc.static_equilibrium(system, friction=True)
+    state[:modes] = fc.equilibrium(system, "sliding").modal_coordinates
     start = fc.RigidStart(velocity=(system.ground.speed, 0.0, 0.0))
     state[modes : 2 * modes] = initial_state(system, start, 0.0)[modes : 2 * modes]
     return state

@@ -36,7 +36,7 @@ from fecontact import (
     load_history,
 )
 from fecontact.fem import pair_faces
-from fecontact.laws import Constant, ConstantFriction, PrescribedForce
+from fecontact.laws import ConstantFriction, PrescribedForce
 from fecontact.reduction import reduce_bodies
 from fecontact.system import LoadHistory
 
@@ -80,7 +80,7 @@ def layers(columns: int = 40, nodes: Literal["all"] | int = 20) -> ContactSystem
         load=Load(
             boundaries=tuple(BoundaryLoad(name, pressure=1.0)
                              for name in ("upper.top", "lower.bottom")),
-            forces=tuple(PointLoad(f"{name}.end", "y", signal=Constant(0.0)) for name in bases)))
+            forces=tuple(PointLoad(f"{name}.end", "y", signal=0.0) for name in bases)))
 
 
 def cycle(system: ContactSystem, limit: float, steps: int = 10) -> LoadHistory:

@@ -15,16 +15,17 @@ import numpy as np
 
 from fecontact import (
     Beam,
+    ContactState,
     ContactSystem,
     Drive,
     ElasticBody,
     Ground,
     Load,
     Patch,
+    equilibrium,
     generate,
     modal_basis,
     simulate,
-    static_equilibrium,
 )
 from fecontact.laws import ExponentialFriction, RoughSurface
 
@@ -68,17 +69,17 @@ def row(element_size: float, nodes: int, *, spread: bool = True, moving: bool = 
     """Steady sliding of the pressed beam, and with ``moving`` two periods of a drive of 95 Hz."""
     pressed = system(element_size, nodes, spread=spread)
     basis = pressed.basis
-    q = static_equilibrium(pressed, friction=True)
-    force = pressed.contact_history(np.zeros(1), np.concatenate([q, 0.0 * q])[None])[0, :, 0]
+    sliding = equilibrium(pressed, "sliding")
+    force = sliding.normal_force
     middle = np.abs(basis.contact_x - LENGTH / 2) < LENGTH / 10
     share = basis.tributary / LENGTH
     stick = slipped = float("nan")
     if moving:
         reduced = system(element_size, nodes, spread=spread, tolerance=0.05)
         run = simulate(reduced, 4.0 * np.pi / 600.0, initial="sliding", outputs=801, rtol=1e-5)
-        stick = float(((run.contact_state == 1).mean(axis=0) * share).sum())
+        stick = float(((run.contact_state == ContactState.STICK).mean(axis=0) * share).sum())
         slipped = float(run.displacement("B")[:, 0].max())
-    return Row(element_size, nodes, basis.modes, -float(basis.T[1, 1] @ q),
+    return Row(element_size, nodes, basis.modes, -float(sliding.displacement("C")[1]),
                float((force / basis.contact_areas).max()), float(share[force > 0.0].sum()),
                float(force[middle].sum()), stick, slipped)
 

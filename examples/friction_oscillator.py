@@ -70,9 +70,7 @@ def oscillator(modes: int, ground: fc.Ground = EVEN, **laws: Any) -> fc.ContactS
 
 def prescribed(modes: int = 1) -> fc.ContactSystem:
     """The same normal force without a mode across the belt: found from the static equilibrium."""
-    resting = oscillator(2)
-    state = np.concatenate([fc.static_equilibrium(resting), np.zeros(2)])
-    force = resting.contact_history(np.zeros(1), state[None])[0, 0, 0]
+    force = fc.equilibrium(oscillator(2)).normal_force[0]
     return oscillator(modes, normal=PrescribedForce(float(force)), load=fc.Load())
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import fecontact as fc
 from fecontact.fem import pair_faces
 from fecontact.integrate import initial_state
-from fecontact.laws import Constant, JenkinsFriction, LinearContact
+from fecontact.laws import JenkinsFriction, LinearContact
 from fecontact.plot import COLOURS, new_figure, plot_loop
 from fecontact.reduction import Spring, reduce_bodies
 
@@ -48,7 +48,7 @@ def joint(shortening: float = 1e-5, component: Literal["x", "y"] = "x",
         bodies=bases, links=bolts, interfaces=[fc.Interface(
             "lap", face, LinearContact(STIFFNESS, damping=100.0),
             JenkinsFriction(RATIO * STIFFNESS, COEFFICIENT))],
-        load=fc.Load(forces=(fc.PointLoad("upper.end", component, signal=Constant(0.0)),)))
+        load=fc.Load(forces=(fc.PointLoad("upper.end", component, signal=0.0),)))
 
 
 def bolted(system: fc.ContactSystem) -> Any:

@@ -28,7 +28,7 @@ from fecontact import (
     load_history,
     modal_basis,
 )
-from fecontact.laws import Constant, ConstantFriction, LinearContact
+from fecontact.laws import ConstantFriction, LinearContact
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,7 +122,7 @@ def pressed(poisson_ratio: float, elements: int = 12, size: float = 60.0) -> Lin
         # So stiff that the body alone gives way.
         basis, LinearContact(1e6 * peak / b * basis.tributary.sum()),
         ConstantFriction(MU, smoothing_slope=1e6),
-        load=Load(LINE_FORCE, forces=(PointLoad("C", "x", signal=Constant(0.0)),)),
+        load=Load(LINE_FORCE, forces=(PointLoad("C", "x", signal=0.0),)),
         gap=basis.contact_x**2 / (2.0 * RADIUS))
     history = load_history(system, LoadPath(forces=[(0.0, 0.5 * MU * LINE_FORCE)], steps=10))
     area = basis.tributary

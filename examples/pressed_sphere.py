@@ -36,7 +36,7 @@ from two_spheres import MODULUS, MU, RADIUS, WIDTH, ClosedForm
 
 import fecontact as fc
 from fecontact.fem import SphereSegment
-from fecontact.laws import Constant, ConstantFriction, LinearContact
+from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.system import LoadHistory
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def pressed(elements: int, part: float = PART) -> PressedSphere:
         # So stiff that the body alone gives way.
         basis, LinearContact(1e5 * exact.peak / WIDTH * basis.tributary.sum()),
         ConstantFriction(MU),
-        load=fc.Load(exact.load, (fc.PointLoad("C", "x", signal=Constant(0.0)),)),
+        load=fc.Load(exact.load, (fc.PointLoad("C", "x", signal=0.0),)),
         gap=basis.contact_places[:, 2])
     Q = part * MU * exact.load
     history = fc.load_history(system, fc.LoadPath(forces=[(0.0, Q, -Q, Q)], steps=STEPS),

@@ -88,7 +88,8 @@ def thrown_mass(smoothing: Smoothing, slope: float) -> Throw:
     system = fc.ContactSystem(mass, LinearContact(stiffness=1e6), friction(smoothing, slope),
                               ground=fc.Ground(speed=BELT[0]), load=fc.Load(gravity=(0.0, 0.0, -G)))
     rows = mass.contact_T[0, :3]
-    state = np.concatenate([fc.static_equilibrium(system), np.linalg.solve(rows, [*THROWN, 0.0])])
+    rest = fc.equilibrium(system).modal_coordinates
+    state = np.concatenate([rest, np.linalg.solve(rows, [*THROWN, 0.0])])
     run = fc.simulate(system, 1.5 * STOP, initial=state, outputs=301, rtol=1e-9)
     return Throw(run, run.displacement(0)[:, :2], run.velocity(0)[:, :2])
 
@@ -105,7 +106,8 @@ def thrown_block(slope: float = 1e4, modes: int = 12, nodes: int = 24) -> Throw:
         load=fc.Load(gravity=(0.0, 0.0, -G)))
     rows = basis.inertia_rows / body.total_mass
     # Mass-normalised modes: the velocities of a translation are its products with them.
-    state = np.concatenate([fc.static_equilibrium(system), THROWN @ basis.inertia_rows[:2]])
+    rest = fc.equilibrium(system).modal_coordinates
+    state = np.concatenate([rest, THROWN @ basis.inertia_rows[:2]])
     run = fc.simulate(system, 1.2 * STOP, initial=state, outputs=2401, rtol=1e-6)
     return Throw(run, run.modal_coordinates @ rows[:2].T, run.modal_velocities @ rows[:2].T)
 

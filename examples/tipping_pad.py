@@ -18,7 +18,6 @@ import numpy as np
 
 import fecontact as fc
 from fecontact.fem import SolidBlock
-from fecontact.integrate import initial_state
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.plot import COLOURS, new_figure
 
@@ -48,9 +47,8 @@ def system(friction: float, angle: float = 0.0, modes: int = 12) -> fc.ContactSy
 
 def forces(system: fc.ContactSystem) -> tuple[np.ndarray, np.ndarray]:
     """Normal forces (n,) and friction forces (n, 2) of the nodes in steady sliding [N]."""
-    state = initial_state(system, "sliding", 0.0)
-    found = system.contact_history(np.zeros(1), state[None])[0]
-    return found[:, 0], found[:, [1, 6]]
+    sliding = fc.equilibrium(system, "sliding")
+    return sliding.normal_force, sliding.friction_forces
 
 
 def resultant(normal: np.ndarray) -> np.ndarray:

@@ -26,11 +26,11 @@ from fecontact import (
     Mesh,
     ModalBasis,
     PointLoad,
+    equilibrium,
     load_history,
-    static_equilibrium,
 )
 from fecontact.fem import pair_faces
-from fecontact.laws import Constant, ConstantFriction, LinearContact
+from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.reduction import reduce_bodies
 
 if TYPE_CHECKING:
@@ -146,22 +146,15 @@ def contact(cylinder: Material, block: Material, elements: int) -> ContactSystem
     return ContactSystem(
         bodies=bases,
         interfaces=[Interface("line", pairing, stiff, ConstantFriction(MU, smoothing_slope=1e6))],
-        load=Load(LINE_FORCE, forces=(PointLoad("C", "x", signal=Constant(0.0)),)))
+        load=Load(LINE_FORCE, forces=(PointLoad("C", "x", signal=0.0),)))
 
 
 def pressed(cylinder: Material, block: Material, elements: int = 12) -> HertzContact:
     """The contact under the line force alone."""
     system = contact(cylinder, block, elements)
-    q = static_equilibrium(system)
-    force = load_forces(system, q)
+    force = equilibrium(system).normal_force
     return HertzContact(system.basis.contact_x, force / system.basis.tributary,
                         *hertz(cylinder, block))
-
-
-def load_forces(system: ContactSystem, q: np.ndarray) -> np.ndarray:
-    """Normal forces (n,) [N] at rest."""
-    state = np.concatenate([q, np.zeros(system.size - len(q))])
-    return system.contact_history(np.zeros(1), state[None])[0, :, 0]
 
 
 def sheared(elements: int = 12) -> ShearedContact:

@@ -221,7 +221,7 @@ def cycle(rings: int, part: float = PART) -> Cycle:
     """Pressed without friction first, then moved to and fro."""
     system = spheres(rings, part=part)
     state = np.zeros(system.size)
-    state[: system.basis.modes] = fc.static_equilibrium(system)
+    state[: system.basis.modes] = fc.equilibrium(system).modal_coordinates
     run = fc.simulate(system, 1.25, initial=state, outputs=501, rtol=1e-4)
     return Cycle(run, ClosedForm(RATIO), part)
 

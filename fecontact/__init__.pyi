@@ -25,7 +25,6 @@ from .fem.material import Material
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
 from .fem.points import Patch
-from .integrate.contact_quantities import ContactState
 from .integrate.ensembles import ensemble
 from .integrate.events import Event, event
 from .integrate.initial_state import RigidStart
@@ -43,14 +42,15 @@ from .reduction.modal_basis import ModalBasis
 from .reduction.reduce_body import modal_basis
 from .study.study import Study
 from .sweeps.sweep import sweep
+from .system.contact_quantities import ContactState
 from .system.contact_system import ContactSystem
-from .system.equilibrium.static_solution import static_solution
-from .system.equilibrium.statics import static_equilibrium
 from .system.forcing_period import forcing_period
 from .system.gap import Crown
 from .system.interfaces import Interface
 from .system.quasistatic.loading import load_history
 from .system.quasistatic.path import LoadPath
+from .system.statics.equilibrium import equilibrium
+from .system.statics.static_solution import static_solution
 
 __version__: str
 
@@ -91,6 +91,7 @@ __all__ = [
     "basis_from_modes",
     "bifurcation",
     "ensemble",
+    "equilibrium",
     "event",
     "fem",
     "forcing_period",
@@ -107,7 +108,6 @@ __all__ = [
     "render",
     "sensitivity",
     "simulate",
-    "static_equilibrium",
     "static_solution",
     "study",
     "sweep",

@@ -5,7 +5,7 @@ from comparison import Comparison, comparisons
 from scipy.optimize import brentq
 from single_masses import in_plane, mass_in_plane
 
-from fecontact import ContactSystem, Drive, Ground, Load, simulate, static_equilibrium
+from fecontact import ContactSystem, Drive, Ground, Load, equilibrium, simulate
 from fecontact.integrate import Rodas5P, SetValued
 from fecontact.laws import (
     ConstantFriction,
@@ -114,7 +114,7 @@ def hopf() -> list[Comparison]:
 
     def growth(speed: float, slope: float) -> float:
         system = oscillator(speed, slope)
-        q = static_equilibrium(system, friction=True)
+        q = equilibrium(system, "sliding").modal_coordinates
         values = np.linalg.eigvals(system.jacobian(0.0, np.concatenate([q, np.zeros(2)])))
         # The pair of the motion along the ground; that of the contact lies near 970 rad/s.
         return float(values[np.abs(values.imag) < 100.0].real.max())
@@ -133,7 +133,7 @@ def flutter() -> list[Comparison]:
         system = mass_in_plane(stiffness=np.array([[2.0, 1.0], [1.0, 2.0 - 4.0 / 3.0]]),
                                normal=LinearContact(4.0 / 3.0), ground=Ground(speed=-1.0),
                                friction=ConstantFriction(coefficient), load=Load(1.0))
-        q = static_equilibrium(system, friction=True)
+        q = equilibrium(system, "sliding").modal_coordinates
         values = np.linalg.eigvals(system.jacobian(0.0, np.concatenate([q, np.zeros(2)])))
         return np.sort_complex(-values**2)[[0, -1]]
 

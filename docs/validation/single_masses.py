@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fecontact import ContactSystem, basis_from_matrices, static_equilibrium
+from fecontact import ContactSystem, basis_from_matrices, equilibrium
 from fecontact.laws import RoughSurface
 
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
@@ -38,5 +38,5 @@ def above(system: ContactSystem, height: float, rate: float) -> np.ndarray:
 def in_plane(system: ContactSystem, x: float, rate: float = 0.0) -> np.ndarray:
     """State of a mass that rests on the ground, from its x [m] and rate [m/s]."""
     rows = system.basis.T[2, :2]
-    return np.concatenate([static_equilibrium(system) + np.linalg.solve(rows, [x, 0.0]),
+    return np.concatenate([equilibrium(system).modal_coordinates + np.linalg.solve(rows, [x, 0.0]),
                            np.linalg.solve(rows, [rate, 0.0])])

@@ -3,10 +3,10 @@
 import numpy as np
 
 from fecontact.core.units import quantity
-from fecontact.integrate.contact_quantities import ContactState
 from fecontact.integrate.events import Events
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
+from fecontact.system.contact_quantities import ContactState
 
 ROUGH_SLOPE = 0.3  # of the ground, above which friction along x is a rough assumption
 

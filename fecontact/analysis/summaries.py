@@ -14,10 +14,10 @@ from fecontact.analysis.sampling import warn_of_aliases
 from fecontact.core.docstrings import summary
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
-from fecontact.integrate.contact_quantities import ContactState
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.contact_quantities import ContactState
 from fecontact.system.powers import POWERS
 
 Point = str | int

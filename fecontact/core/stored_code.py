@@ -93,7 +93,7 @@ class _StoredCode(IndexDataCacheFile):
 
     @property
     def seconds(self) -> float | None:
-        """What compiling took last on this machine [s]; None if that is not known."""
+        """Seconds that compiling took last on this machine; None if that is not known."""
         try:
             return float(self._times.read_text(encoding="ascii"))
         except (OSError, ValueError):
@@ -148,7 +148,7 @@ def _remove(path: str) -> None:
 
 
 def seconds_to_compile(compiled: Any) -> float | None:
-    """What compiling a kernel took last on this machine [s]; None if that is not known."""
+    """Seconds that compiling a kernel took last on this machine; None if that is not known."""
     stored = getattr(compiled._cache, "_cache_file", None)
     return stored.seconds if isinstance(stored, _StoredCode) else None
 

@@ -15,11 +15,10 @@ from fecontact.fem.faces.frames import turned
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.equilibrium.statics import equilibrium
-from fecontact.system.friction_memory import settled
 from fecontact.system.quasistatic.given import travelled
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
+from fecontact.system.statics.equilibrium import equilibrium_state
 
 RigidMotion = (tuple[float, float, float]
                | tuple[float, float, float, float, float, float])
@@ -160,7 +159,7 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
         rest under friction after quasi-static loading; or a state (2 m + n s,). Internal variables
         of friction with memory are zero, in steady sliding their steady values. What friction does
         not hold on waves begins to slide down their slopes:
-        :func:`fecontact.static_equilibrium` finds where it rests.
+        :func:`fecontact.equilibrium` finds where it rests.
 
         After loading, Jenkins and Iwan elements keep their deflections, and with ``SetValued``
         friction is again what equilibrium needs. Smoothed friction without memory has no force at
@@ -182,9 +181,7 @@ def initial_state(system: ContactSystem, initial: Initial, time: float) -> Array
             names = ("rest", "sliding")
             raise InputError(f"initial = '{initial}' must be one of {choices(names)}"
                              f"{nearest(initial, names)}, or a rigid displacement and velocity.")
-        q = equilibrium(system, initial == "sliding", time, standing=initial == "rest")
-        state = np.concatenate([q, np.zeros(system.size - m)])
-        return settled(time, state, system.arrays) if initial == "sliding" else state
+        return equilibrium_state(system, initial, time, standing=initial == "rest")
     if isinstance(initial, RigidStart):
         return np.concatenate([_rigid(system.basis, initial.displacement, "displacement"),
                                _rigid(system.basis, initial.velocity, "velocity"),

@@ -24,7 +24,6 @@ from fecontact.integrate.trajectory import Solution, Status, Trajectory
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time
 from fecontact.system.fields.vector_field import VectorField
-from fecontact.system.kernels import PENETRATION
 from fecontact.system.model_limits import Planned, implausible_values, warn_of_limits
 from fecontact.system.powers import POWERS
 from fecontact.system.quasistatic.history import LoadHistory
@@ -245,8 +244,7 @@ def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
 
 
 def _depth(system: ContactSystem, state: Array, time: float) -> float:
-    history = system.contact_history(np.array([time]), state[None])
-    return float(history[0, :, PENETRATION].max(initial=-np.inf))
+    return float(system.at(state, time=time).penetration.max(initial=-np.inf))
 
 
 def _depth_at_rest(system: ContactSystem, time: float) -> float:

@@ -12,7 +12,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
-from fecontact.integrate.contact_quantities import ContactQuantities
+from fecontact.integrate.contact_works import ContactWorks
 from fecontact.integrate.events import Events
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.loads import load_rows
@@ -197,7 +197,7 @@ class Solution:
 
 @read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(ContactQuantities, Summarised):
+class Trajectory(ContactWorks, Summarised):
     """Motion of a contact system at N output times.
 
     Attributes
@@ -289,43 +289,6 @@ class Trajectory(ContactQuantities, Summarised):
         time = kept["time"]
         events = None if self.events is None else self.events.between(time[0], time[-1])
         return replace(self, **kept, **counted, events=events)
-
-    def displacement(self, point: str | int | tuple[float, ...]) -> Array:
-        """Displacement x, y [m] and rotation phi [rad] (N, 3) of a point.
-
-        Of solids x, y, z and the rotations about them (N, 6); of contact nodes in their own frame,
-        along the first tangent, the second one in space, and the normal.
-
-        Parameters
-        ----------
-        point : str, int or (x, y)
-            'B', 'C' or a further named point; a contact node by its number from 0; or the
-            displacement node of the body nearest to a place (then without rotations).
-        """
-        return self.modal_coordinates @ self._rows(point).T
-
-    def velocity(self, point: str | int | tuple[float, ...]) -> Array:
-        """Velocity [m/s] and angular velocity [rad/s] (N, 3) of a point; see displacement."""
-        return self.modal_velocities @ self._rows(point).T
-
-    def _rows(self, point: str | int | tuple[float, ...]) -> Array:
-        basis = self.system.basis
-        if isinstance(point, str | int | np.integer):
-            return basis.T[basis.point_index(point if isinstance(point, str) else int(point))]
-        if basis.mode_shapes is None:
-            raise InputError(f"The point {point} cannot be found: the modal basis holds no mode "
-                             f"shapes; use a named point or a contact node.")
-        if np.shape(point) != (basis.dimension,):
-            axes = "x, y" if basis.dimension == 2 else "x, y, z"
-            raise InputError(f"The point {point} must have {basis.dimension} coordinates, {axes} "
-                             f"in m.")
-        distance = np.linalg.norm(basis.mode_shapes.nodes - np.asarray(point, dtype=float), axis=1)
-        nearest_node = int(np.argmin(distance))
-        reach = np.ptp(basis.mode_shapes.nodes, axis=0).max()
-        if distance[nearest_node] > 0.1 * reach:
-            raise InputError(f"The point {point} lies outside the body, {distance.min():.3g} m "
-                             f"away from it.")
-        return basis.mode_shapes.shapes[nearest_node]
 
     @cached_property
     def limits_exceeded(self) -> tuple[str, ...]:

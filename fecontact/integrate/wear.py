@@ -24,8 +24,8 @@ from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.equilibrium.statics import equilibrium
 from fecontact.system.forcing_period import forcing_period
+from fecontact.system.statics.equilibrium import equilibrium_coordinates
 
 # Difference of depth along the face in one block, relative to the penetration, that is warned of.
 _UNEVEN = 0.5
@@ -230,8 +230,8 @@ def _end(run: Trajectory, where: str) -> Trajectory:
 def _sunk(state: Array, before: ContactSystem, worn: ContactSystem, time: float) -> Array:
     """The state after the body has sunk by the change of its normal equilibrium."""
     try:
-        change = (equilibrium(worn, False, time, standing=True)
-                  - equilibrium(before, False, time, standing=True))
+        change = (equilibrium_coordinates(worn, "rest", time, standing=True)
+                  - equilibrium_coordinates(before, "rest", time, standing=True))
     except AnalysisError:
         # Nothing presses it: an impacting body has no equilibrium on the ground.
         return state

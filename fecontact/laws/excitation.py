@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
-from fecontact.laws.signals.harmonic import Harmonic, Signal
+from fecontact.laws.signals.harmonic import Constant, Harmonic, Signal
 
 AXES = ("x", "y", "z")
 BOUNDARY_STRESSES = ("pressure", "shear", "shear_across")
@@ -157,8 +157,8 @@ class PointLoad:
         A force along +x, along +y (away from the ground), or a moment counter-clockwise. On solids
         'x', 'y', 'z' (away from the ground), or moments 'phi_x', 'phi_y', 'phi_z'; at contact nodes
         along their first and second tangent and their normal.
-    signal : Signal
-        Its history [N], [N m].
+    signal : float or Signal
+        Its history, or its constant value [N], [N m].
 
     Raises
     ------
@@ -168,7 +168,7 @@ class PointLoad:
 
     point: Annotated[str | int | Coordinates, Unit("m")] = "C"
     component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] = "y"
-    signal: Signal = field(kw_only=True)
+    signal: float | Signal = field(kw_only=True)
 
     def __post_init__(self) -> None:
         if isinstance(self.point, Integral) and not isinstance(self.point, bool):
@@ -182,7 +182,9 @@ class PointLoad:
             raise InputError(f"PointLoad: component = {self.component!r} must be one of "
                              f"{choices(_COMPONENTS)}"
                              f"{nearest(str(self.component), _COMPONENTS)}.")
-        _require_signal("PointLoad", "signal", self.signal)
+        if isinstance(self.signal, Real) and not isinstance(self.signal, bool):
+            object.__setattr__(self, "signal", Constant(float(self.signal)))
+        _require_signal("PointLoad", "signal", self.signal, ", or a number")
 
 
 @dataclass(frozen=True)
@@ -301,7 +303,7 @@ class Load:
         return {name: value for name, value in given if isinstance(value, Signal)}
 
 
-def _require_signal(owner: str, name: str, given: object) -> None:
+def _require_signal(owner: str, name: str, given: object, or_number: str = "") -> None:
     if not isinstance(given, Signal):
         raise InputError(f"{owner}: {name} = {given!r} must be a Signal, such as "
-                         f"Harmonic(amplitude, angular_frequency).")
+                         f"Harmonic(amplitude, angular_frequency){or_number}.")

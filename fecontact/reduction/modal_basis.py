@@ -355,8 +355,8 @@ class ModalBasis(Summarised):
     def fields(self, q: ArrayLike) -> BodyFields:
         """Displacement and stress over the body at modal coordinates q (m,).
 
-        For example ``basis.fields(static_equilibrium(system))``. Stresses are as good as the modes
-        are for the loads: see ``loads`` of :func:`~fecontact.modal_basis`.
+        For example ``basis.fields(equilibrium(system).modal_coordinates)``. Stresses are as good
+        as the modes are for the loads: see ``loads`` of :func:`~fecontact.modal_basis`.
 
         Raises
         ------

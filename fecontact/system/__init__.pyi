@@ -1,10 +1,14 @@
+from .instant import Instant
 from .interfaces import PrescribedMotion
 from .nodes import SystemArrays
 from .quasistatic.history import LoadHistory, Loop
 from .quasistatic.pose import Sliders
 from .quasistatic.rest_state import RestState
+from .statics.equilibrium import ContactEquilibrium
 
 __all__ = [
+    "ContactEquilibrium",
+    "Instant",
     "LoadHistory",
     "Loop",
     "PrescribedMotion",

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
-from fecontact.core.types import Array, ArrayLike, ComplexArray
+from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.core.units import Summarised, span
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -161,3 +161,20 @@ def _biorthonormal(
         if np.linalg.svd(overlap, compute_uv=False)[-1] > _DEFECTIVE:
             found[:, group] = left[:, group] @ np.linalg.inv(overlap).T
     return found
+
+
+def sorted_eigenvalues(jacobian: Array) -> ComplexArray:
+    """Eigenvalues (d,), the largest real part first, pairs with the positive frequency first."""
+    found = np.linalg.eigvals(jacobian).astype(complex)
+    return np.asarray(found[np.lexsort((-found.imag, -found.real))])
+
+
+def unstable_count(eigenvalues: ComplexArray) -> Integers:
+    """Number (...) of eigenvalues (..., d) with positive real parts.
+
+    Real parts below 1e-10 of the eigenvalue, or 1e-13 of the largest one, count as zero: those of
+    undamped modes and of rigid ones are round-off.
+    """
+    size = np.abs(eigenvalues)
+    least = 1e-10 * size + 1e-13 * size.max(axis=-1, keepdims=True)
+    return np.asarray((eigenvalues.real > least).sum(axis=-1))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, quantity
 from fecontact.laws.base import FrictionLaw, NormalLaw
@@ -28,6 +28,7 @@ from fecontact.system.arrays import excited, system_arrays
 from fecontact.system.elastic_sliders import exact_arrays, slider_counts
 from fecontact.system.friction_memory import bristle_history, memory_scales, velocity_scale
 from fecontact.system.gap import Gap, gap_values
+from fecontact.system.instant import Instant
 from fecontact.system.interfaces import (
     Interface,
     PrescribedMotion,
@@ -376,6 +377,15 @@ class ContactSystem(Summarised):
         arrays = exact_arrays(self.arrays, slider_counts(self))
         contact_jacobian.jacobian(float(t), self._checked(y), arrays, out)
         return out
+
+    def at(self, state: Array, *, time: float = 0.0) -> Instant:
+        """Forces, gaps, slip, accelerations and eigenvalues in one state y = [q, q', z].
+
+        InputError for a state of wrong shape.
+        """
+        require_finite("at", time=time)
+        y, m = self._checked(state), self.basis.modes
+        return Instant(self, float(time), y[:m], y[m : 2 * m], y[2 * m :])
 
     def contact_history(self, times: Array, states: Array) -> Array:
         """Contact quantities (N, n, 6) at N times and states (N, 2 m + n s).

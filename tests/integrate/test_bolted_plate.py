@@ -17,7 +17,7 @@ def force_for(mode, deflection):
 def test_bolts_press_as_much_as_they_are_stretched(mode):
     system = example.plate()
     basis, q = system.basis, mode.rest[: system.basis.modes]
-    normal = system.contact_history(np.zeros(1), mode.rest[None])[0, :, 0]
+    normal = system.at(mode.rest).normal_force
     heads, nuts = ([basis.T[basis.point_index(name), 2] @ q for name in names]
                    for names in (("upper.head1", "upper.head2"), ("lower.nut2", "lower.nut1")))
     tension = example.BOLT * (np.subtract(heads, nuts) + example.SHORTENING)

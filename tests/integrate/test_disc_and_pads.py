@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eig
 
-from fecontact import static_equilibrium
+from fecontact import equilibrium
 from fecontact.analysis import complex_modes
 from fecontact.integrate import initial_state
 
@@ -22,7 +22,7 @@ def modes(brake):
 
 def forces(system):
     """Normal and friction forces of the nodes in steady sliding, by the laws."""
-    q = static_equilibrium(system, friction=True)
+    q = equilibrium(system, "sliding").modal_coordinates
     penetration = -(system.arrays.rows[:, 1] @ q) - np.asarray(system.gap)
     law = system.normal["pad1"]
     depth = penetration / law.roughness_height

@@ -33,7 +33,7 @@ def test_rigid_mode_across_the_belt_replaces_the_iteration_for_the_normal_force(
     assert iterated.normal.force == pytest.approx(14.0, rel=1e-9)
     resting = example.oscillator(2)
     # Uniform roughness below R_Z: F = c u^2 / (2 R_Z).
-    depth = -resting.basis.T[2, 1] @ fc.static_equilibrium(resting)
+    depth = -resting.basis.T[2, 1] @ fc.equilibrium(resting).modal_coordinates
     assert depth == pytest.approx(np.sqrt(2.0 * 14.0 * 10e-6 / 10e6), rel=1e-9)
     one, two = example.settled(iterated, 4, 6), example.settled(resting, 4, 6)
     swing = np.ptp(two.displacement("B")[:, 0])

@@ -14,8 +14,8 @@ from fecontact import (
     Status,
     Trajectory,
     basis_from_matrices,
+    equilibrium,
     simulate,
-    static_equilibrium,
 )
 from fecontact.integrate import EventDriven, SetValued, TimeStepping, smoothing_cost
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
@@ -50,7 +50,7 @@ def block(mass=1.0, spring=1.0, nodes=1, **parts):
 
 def start(system, x, x_rate=0.0):
     T = system.basis.T[2, :2]
-    return np.concatenate([static_equilibrium(system) + np.linalg.solve(T, [x, 0.0]),
+    return np.concatenate([equilibrium(system).modal_coordinates + np.linalg.solve(T, [x, 0.0]),
                            np.linalg.solve(T, [x_rate, 0.0])])
 
 
@@ -188,7 +188,7 @@ def test_two_independent_nodes_against_two_single_masses(method, rtol, tolerance
     expected = np.array([along(one, integrate_set_valued(one, start(one, 0.03), times,
                                                          rtol=1e-11))[0] for one in single])
     T = basis.T[2:, :2].reshape(4, 4)
-    depth = [(one.basis.T[2, :2] @ static_equilibrium(one))[1] for one in single]
+    depth = [(one.basis.T[2, :2] @ equilibrium(one).modal_coordinates)[1] for one in single]
     state = np.concatenate([np.linalg.solve(T, [0.03, depth[0], 0.03, depth[1]]), np.zeros(4)])
     run = integrate_set_valued(both, state, times, rtol=rtol, method=method)
     found = (run.states[:, :4] @ basis.T[2:, 0].T).T

@@ -14,9 +14,9 @@ from fecontact import (
     Material,
     Status,
     Trajectory,
+    equilibrium,
     modal_basis,
     simulate,
-    static_equilibrium,
 )
 from fecontact.integrate import Scipy
 from fecontact.integrate.nonsmooth.driver import integrate_set_valued
@@ -48,7 +48,7 @@ def velocity_of_b(basis, states):
 @pytest.fixture(scope="module")
 def reference(basis):
     system = beam(basis)
-    state = np.concatenate([static_equilibrium(system), np.zeros(basis.modes)])
+    state = equilibrium(system).state
     run = integrate_set_valued(system, state, TIMES, rtol=1e-6)
     return state, run
 

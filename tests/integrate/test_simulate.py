@@ -31,9 +31,9 @@ from fecontact import (
     Status,
     Trajectory,
     basis_from_matrices,
+    equilibrium,
     modal_basis,
     simulate,
-    static_equilibrium,
 )
 from fecontact.integrate import Rodas5P, Scipy, initial_state
 from fecontact.laws import ExponentialFriction, RoughSurface
@@ -47,7 +47,7 @@ def at(system, x=0.0, y=0.0, x_rate=0.0, y_rate=0.0):
     T = system.basis.T[2, :2]
     if system.basis.modes == 1:
         return np.array([y / T[1, 0], y_rate / T[1, 0]])
-    q = static_equilibrium(system) if y == 0.0 else np.zeros(2)
+    q = equilibrium(system).modal_coordinates if y == 0.0 else np.zeros(2)
     return np.concatenate([q + np.linalg.solve(T, [x, y]), np.linalg.solve(T, [x_rate, y_rate])])
 
 
@@ -189,7 +189,7 @@ def oscillator(speed=1e-3, amplitude=0.0, smoothing=1e6):
 def test_hopf_point_of_steady_sliding(smoothing, critical, tolerance):
     def growth(speed):
         system = oscillator(speed, smoothing=smoothing)
-        q = static_equilibrium(system, friction=True)
+        q = equilibrium(system, "sliding").modal_coordinates
         values = np.linalg.eigvals(system.jacobian(0.0, np.concatenate([q, np.zeros(2)])))
         # The pair of the motion along the ground; that of the contact lies near 970 rad/s.
         return values[np.abs(values.imag) < 100.0].real.max()

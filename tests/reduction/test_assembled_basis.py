@@ -14,8 +14,8 @@ from fecontact import (
     Load,
     Mesh,
     basis_from_matrices,
+    equilibrium,
     modal_basis,
-    static_equilibrium,
 )
 from fecontact.fem import Rotation, pair_faces
 from fecontact.fem.body_forces import inertia_forces
@@ -121,7 +121,7 @@ def test_pad_pressed_on_a_disc_sinks_as_statics_of_both_meshes_say(pair):
     system = ContactSystem(bodies=bases, interfaces=[
         Interface("face", pairing, LinearContact(k), ConstantFriction(0.0))],
         load=Load(gravity=(0.0, -1e4)))
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     weight = 1e4 * 7850.0 * 0.4
     forces = k * pairing.tributary / pairing.tributary.sum() * np.maximum(
         -(system.basis.contact_T[:, 1] @ q), 0.0)

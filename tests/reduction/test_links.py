@@ -14,9 +14,9 @@ from fecontact import (
     Material,
     Mesh,
     basis_from_matrices,
+    equilibrium,
     generate,
     modal_basis,
-    static_equilibrium,
 )
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.reduction import (
@@ -155,7 +155,7 @@ def test_a_bolt_presses_two_masses_together_with_its_preload(bolt):
                               LinearContact(contact), ConstantFriction(0.0))],
         links=[Spring("top.p", "floor.p", k, direction=(0.0, 1.0), **bolt),
                Bushing("floor.p", None, (1e5, 1e5, 1e5)), Bushing("top.p", None, (1e5, 0.0, 1e5))])
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     basis = system.basis
     top, floor = (basis.T[basis.point_index(name), 1] @ q for name in ("top.p", "floor.p"))
     force = contact * (floor - top)

@@ -21,11 +21,11 @@ from fecontact import (
     Rayleigh,
     RigidStart,
     Study,
+    equilibrium,
     generate,
     modal_basis,
     read_case,
     simulate,
-    static_equilibrium,
     static_solution,
     write_case,
     write_mesh,
@@ -487,7 +487,7 @@ def test_loads_of_a_study(tmp_path):
         np.testing.assert_array_equal(getattr(again.arrays, name), getattr(system.arrays, name))
     # At rest the modes and the elements agree where the beam does not touch.
     free = study.with_(gap=1.0).system()
-    q = static_equilibrium(free)
+    q = equilibrium(free).modal_coordinates
     fields = static_solution(study.elastic_body(), Load(
         gravity=(0.0, -9.81), forces=load.forces,
         boundaries=[BoundaryLoad("top", 2e4)]))

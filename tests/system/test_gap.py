@@ -9,7 +9,7 @@ from fecontact import (
     InputError,
     Load,
     basis_from_matrices,
-    static_equilibrium,
+    equilibrium,
 )
 from fecontact.laws import RoughSurface
 from fecontact.system.gap import gap_values
@@ -39,7 +39,7 @@ def test_pressed_cylinder_on_independent_springs():
         rigid_mass(4000, length),
         normal=RoughSurface(stiffness=stiffness * length, roughness_height=1e-12, damping=0.0),
         load=Load(load), gap=Crown(radius))
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     approach = -(system.basis.T[1, 1] @ q)
     expected = (1.5 * load / stiffness / np.sqrt(8.0 * radius)) ** (2.0 / 3.0)
     assert approach == pytest.approx(expected, rel=2e-4)

@@ -357,7 +357,7 @@ def test_a_slow_run_gives_the_same_loop():
         motion=HarmonicSpeed(radius * w, w, phase=0.5 * np.pi),
         motion_y=HarmonicSpeed(radius * w, w)))
     state = np.zeros(system.size)
-    state[:3] = fc.static_equilibrium(system)
+    state[:3] = fc.equilibrium(system).modal_coordinates
     run = fc.simulate(system, 1.0, initial=state, outputs=101)
     t = np.linspace(0.0, 2.0 * np.pi, 2001)
     x, y = radius * np.sin(t), radius * (1.0 - np.cos(t))

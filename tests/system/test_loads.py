@@ -9,6 +9,7 @@ from meshes_for_tests import rectangle
 import fecontact as fc
 from fecontact import BoundaryLoad, Load, PointLoad
 from fecontact.core.errors import InputError
+from fecontact.core.tables import from_table
 from fecontact.integrate import SetValued
 from fecontact.laws import (
     Constant,
@@ -111,8 +112,8 @@ def test_the_ground_carries_all_loads():
     pressure, force = 2e4, 30.0
     system = beam(Load(5.0, gravity=(0.0, -G), boundaries=[BoundaryLoad("top", pressure)],
                        forces=[PointLoad((0.11, 0.012), signal=Constant(-force))]))
-    q = fc.static_equilibrium(system)
-    forces = system.contact_history(np.zeros(1), np.append(q, 0.0 * q)[None])[0, :, 0]
+    q = fc.equilibrium(system).modal_coordinates
+    forces = system.at(np.append(q, 0.0 * q)).normal_force
     total = 5.0 + WEIGHT + pressure * LENGTH * THICKNESS + force
     assert forces.sum() == pytest.approx(total, rel=1e-9)
     # Moments about the middle: the force alone acts beside it.
@@ -330,7 +331,7 @@ def test_completed_modes_deflect_as_the_whole_body(reduction):
                            loads=names, tolerance=0.0)
     system = fc.ContactSystem(basis, normal=LinearContact(1e6), friction=ConstantFriction(0.1),
                               load=load, gap=1.0)
-    found = basis.fields(fc.static_equilibrium(system))
+    found = basis.fields(fc.equilibrium(system).modal_coordinates)
     wanted = fc.static_solution(clamped, load)
     scale = np.abs(wanted.displacement).max()
     np.testing.assert_allclose(found.displacement, wanted.displacement, atol=1e-8 * scale)
@@ -378,3 +379,12 @@ def test_gravity_does_not_deform_a_free_body():
 def test_bad_loads_are_refused(make, message):
     with pytest.raises(fc.InputError, match=message):
         make()
+
+
+def test_a_number_is_a_constant_signal():
+    assert fc.PointLoad("B", "x", signal=3) == fc.PointLoad("B", "x", signal=Constant(3.0))
+    table = {"point": "B", "component": "x", "signal": 3}
+    assert from_table(fc.PointLoad, table, "forces") == fc.PointLoad("B", "x", signal=3.0)
+    for wrong in (True, np.nan, "3", None):
+        with pytest.raises(fc.InputError, match=r"signal|value"):
+            fc.PointLoad("B", "x", signal=wrong)

@@ -124,7 +124,7 @@ def test_elongation_at_rest_and_modes_about_it(spring, tension, load):
     bodies = {"a": fc.basis_from_matrices(np.diag([1.0, 2.0]), np.diag([1e3, 0.0]), {
         "p": [[1, 0], [0, 1], [0, 0]], "C": [[1, 0], [0, 1], [0, 0]]})}
     system = fc.ContactSystem(bodies=bodies, links={"mount": spring}, load=fc.Load(load))
-    rest = height(system, fc.static_equilibrium(system))
+    rest = height(system, fc.equilibrium(system).modal_coordinates)
     expected = brentq(lambda e: tension(e) + load, -1.0, 1.0, xtol=1e-14)
     assert rest == pytest.approx(expected, rel=1e-8)
     run = fc.simulate(system, 0.01, initial="rest", outputs=3)
@@ -169,10 +169,11 @@ def test_folds_of_a_spring_with_two_places_of_rest():
         "p": [[1, 0], [0, 1], [0, 0]], "C": [[1, 0], [0, 1], [0, 0]]})}
     system = fc.ContactSystem(bodies=bodies, load=fc.Load(-2.0), links={
         "arch": CubicSpring("a.p", None, -k, cubic, 1.0, UP)})
-    rest = height(system, fc.static_equilibrium(system))
+    rest = height(system, fc.equilibrium(system).modal_coordinates)
     assert -k * rest + cubic * rest**3 == pytest.approx(2.0, rel=1e-6)
     # Without load it leaves the crest between both places of rest.
-    freed = abs(height(system, fc.static_equilibrium(system.with_(**{"load.normal": 0.0}))))
+    unloaded = system.with_(**{"load.normal": 0.0})
+    freed = abs(height(system, fc.equilibrium(unloaded).modal_coordinates))
     assert freed == pytest.approx(np.sqrt(k / cubic), rel=1e-6)
     branch = equilibrium_branch(contact_field(system, ["load.normal"]), parameter="load.normal",
                                 bounds=(-2.0, 2.0))
@@ -334,7 +335,7 @@ def test_springs_without_a_place_of_rest(stiffness, cubic, preload):
     """Equilibrium ends in a sentence, a run with a status."""
     system = oscillator(CubicSpring("a.p", None, stiffness, cubic, 0.0, UP, preload))
     with pytest.raises(fc.AnalysisError, match="force of the spring mount falls with its elong"):
-        fc.static_equilibrium(system)
+        fc.equilibrium(system)
     assert complex_modes(system).summary()
     run = fc.simulate(system, 100.0, initial=released(system, 0.1), outputs=3)
     assert run.status in (
@@ -345,6 +346,6 @@ def test_springs_without_a_place_of_rest(stiffness, cubic, preload):
 def test_a_softening_spring_rests_beside_zero_elongation(preload):
     """At the root of N = 0 at which the spring still holds."""
     system = oscillator(CubicSpring("a.p", None, 50.0, -3e4, 0.0, UP, preload))
-    rest = abs(height(system, fc.static_equilibrium(system)))
+    rest = abs(height(system, fc.equilibrium(system).modal_coordinates))
     assert 50.0 * rest - 3e4 * rest**3 == pytest.approx(preload, abs=1e-9)
     assert 3.0 * 3e4 * rest**2 < 50.0

@@ -17,8 +17,8 @@ from fecontact import (
     Material,
     ModelWarning,
     basis_from_matrices,
+    equilibrium,
     modal_basis,
-    static_equilibrium,
 )
 from fecontact.integrate import initial_state
 from fecontact.laws import ExponentialFriction, RoughSurface
@@ -66,7 +66,7 @@ def penetration_of(force):
 @pytest.mark.parametrize("gap", [0.0, 3e-6])
 def test_mass_on_the_ground(force, gap):
     system = mass_point(load=Load(force), gap=gap)
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     depth = -system.basis.T[2, 1] @ q - gap
     assert depth == pytest.approx(penetration_of(force), rel=1e-9)
     assert contact(system, q)[0] == pytest.approx([force], rel=1e-9)
@@ -76,7 +76,7 @@ def test_mass_on_the_ground(force, gap):
 def test_spring_and_contact_carry_the_load_together():
     system = mass_point(drive=Drive(stiffness_y=2e6), load=Load(14.0))
     depth = brentq(lambda u: STIFFNESS * u**2 / (2.0 * R) + 2e6 * u - 14.0, 0.0, R)
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     assert -system.basis.T[2, 1] @ q == pytest.approx(depth, rel=1e-10)
     assert contact(system, q)[0] == pytest.approx([14.0 - 2e6 * depth], rel=1e-8)
 
@@ -84,14 +84,14 @@ def test_spring_and_contact_carry_the_load_together():
 def test_held_above_the_ground():
     """The spring alone carries the load: no contact."""
     system = mass_point(drive=Drive(stiffness_y=1000.0), load=Load(14.0), gap=0.02)
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     assert system.basis.T[2, 1] @ q == pytest.approx(-0.014, rel=1e-10)
     assert contact(system, q)[0].tolist() == [0.0]
 
 
 def test_pulled_off_the_ground_against_a_spring():
     system = mass_point(drive=Drive(stiffness_y=1000.0), load=Load(-5.0))
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     assert system.basis.T[2, 1] @ q == pytest.approx(0.005, rel=1e-10)
 
 
@@ -99,7 +99,7 @@ def test_pulled_off_the_ground_against_a_spring():
 def test_steady_sliding(speed):
     """x = mu N / c, dragged along by the ground."""
     system = mass_point(ground=Ground(speed=speed), drive=Drive(stiffness_x=5610.0))
-    q = static_equilibrium(system, friction=True)
+    q = equilibrium(system, "sliding").modal_coordinates
     v = abs(speed)
     mu = (0.25 * np.exp(-1000.0 * v) + 0.55) * 2.0 / np.pi * np.arctan(1e6 * v)
     x, y = system.basis.T[2, :2] @ q
@@ -114,8 +114,9 @@ def test_drive_is_at_its_mean():
     drive = Drive(stiffness_x=5610.0, stiffness_y=1e5, amplitude_x=0.5e-3, amplitude_y=1e-3,
                   angular_frequency=13.8)
     for time in (0.0, 0.1):
-        q = static_equilibrium(mass_point(drive=drive), time=time)
-        still = static_equilibrium(mass_point(drive=Drive(stiffness_x=5610.0, stiffness_y=1e5)))
+        q = equilibrium(mass_point(drive=drive), time=time).modal_coordinates
+        undriven = mass_point(drive=Drive(stiffness_x=5610.0, stiffness_y=1e5))
+        still = equilibrium(undriven).modal_coordinates
         assert q == pytest.approx(still, rel=1e-12)
 
 
@@ -156,7 +157,7 @@ def energy_minimum(system):
 @pytest.mark.parametrize("load", [1.4, 400.0])
 def test_pressed_beam_against_energy_minimum(load, C_at):
     system = beam(C=C_at, load=Load(load))
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     force = contact(system, q)[0]
     assert force.sum() == pytest.approx(load, rel=1e-9)
     moment = force @ (system.basis.contact_x - C_at[0])
@@ -177,7 +178,7 @@ def test_stiff_body_pressed_off_its_middle():
         contact_nodes=8, C=(0.12, 0.1))
     system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0),
                            friction=ExponentialFriction(0.8, 0.55, 1e3))
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     force = contact(system, q)[0]
     s = basis.contact_x - 0.1
     factor = 12.0 / (1.0 - 1.0 / 8**2)
@@ -193,7 +194,7 @@ def test_stiff_body_lifts_off_on_one_side():
                         contact_nodes=n, C=(0.15, 0.1))
     system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, 1e-9, 0.0), load=Load(400.0),
                            friction=ExponentialFriction(0.8, 0.55, 1e3))
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     force = contact(system, q)[0]
     reach = 3.0 * 0.05
     from_edge = LENGTH - basis.contact_x
@@ -212,13 +213,13 @@ def test_number_of_nodes_does_not_matter_for_a_uniformly_pressed_body():
                             contact_nodes=n, C=(0.1, 0.02))
         system = ContactSystem(basis, normal=RoughSurface(STIFFNESS, R, 0.0), load=Load(14.0),
                                friction=ExponentialFriction(0.8, 0.55, 1e3))
-        depth = contact(system, static_equilibrium(system))[2]
+        depth = contact(system, equilibrium(system).modal_coordinates)[2]
         assert depth == pytest.approx(np.full(len(depth), penetration_of(14.0)), rel=1e-8)
 
 
 def test_pressure_converges_with_the_number_of_nodes():
     """The total moment-free distribution, as the depth at the ends, tends to a limit."""
-    depths = [contact(s, static_equilibrium(s))[2][[0, -1]].mean() / penetration_of(400.0)
+    depths = [equilibrium(s).penetration[[0, -1]].mean() / penetration_of(400.0)
               for s in (beam(n, load=Load(400.0)) for n in (8, 16, 33))]
     assert abs(depths[2] - depths[1]) < 0.02
     assert abs(depths[1] - depths[0]) < 0.05
@@ -228,7 +229,7 @@ def test_sliding_beam_leans_on_its_leading_edge():
     """Friction at the face tips the body about the height of the spring at B."""
     system = beam(12, C=(0.1, 0.02), ground=Ground(speed=0.05),
                   drive=Drive(stiffness_x=1e5), load=Load(400.0))
-    q = static_equilibrium(system, friction=True)
+    q = equilibrium(system, "sliding").modal_coordinates
     F, friction, _ = contact(system, q)
     v = 0.05
     mu = (0.25 * np.exp(-1000.0 * v) + 0.55) * 2.0 / np.pi * np.arctan(1e6 * v)
@@ -257,7 +258,7 @@ def slope(ground, xi):
 def test_mass_on_a_wave(time, stiffness):
     """It leans on the slope: c_x x = -F y_R', on the side of the trough."""
     system = mass_point(ground=WAVE, drive=Drive(stiffness_x=stiffness))
-    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=time)
+    x, y = system.basis.T[2, :2] @ equilibrium(system, time=time).modal_coordinates
 
     def pull(x):
         return stiffness * x + 14.0 * slope(WAVE, x - 1e-3 * time)
@@ -274,7 +275,7 @@ def test_mass_on_a_wave(time, stiffness):
 def test_mass_with_a_vertical_contact_force_stays_where_it_is():
     ground = Ground(speed=1e-3, amplitude=200e-6, wavelength=2.5e-3, normal="vertical")
     system = mass_point(ground=ground, drive=Drive(stiffness_x=5610.0))
-    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=0.7)
+    x, y = system.basis.T[2, :2] @ equilibrium(system, time=0.7).modal_coordinates
     assert x == pytest.approx(0.0, abs=1e-12)
     assert y == pytest.approx(200e-6 * np.sin(-K * 0.7e-3) - penetration_of(14.0), rel=1e-8)
 
@@ -283,10 +284,10 @@ def test_mass_with_a_vertical_contact_force_stays_where_it_is():
 def test_free_mass_rests_in_the_next_trough(time):
     """At 0.625 s it stands in a trough, at 1.875 s balanced on a crest."""
     system = mass_point(ground=WAVE)
-    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=time)
+    x, y = system.basis.T[2, :2] @ equilibrium(system, time=time).modal_coordinates
     assert x == pytest.approx(1e-3 * time - 0.625e-3, abs=1e-12)
     assert y == pytest.approx(-200e-6 - penetration_of(14.0), rel=1e-9)
-    x, y = system.basis.T[2, :2] @ static_equilibrium(system, time=1.875)
+    x, y = system.basis.T[2, :2] @ equilibrium(system, time=1.875).modal_coordinates
     assert abs(x) == pytest.approx(1.25e-3, rel=1e-9)
     assert y == pytest.approx(-200e-6 - penetration_of(14.0), rel=1e-9)
 
@@ -300,7 +301,7 @@ def test_runs_from_rest_start_where_the_body_stands(time):
     assert x == pytest.approx(0.0, abs=1e-18)
     assert y == pytest.approx(200e-6 * np.sin(-K * 1e-3 * time) - penetration_of(14.0), rel=1e-9)
     vertical = system.with_(**{"ground.normal": "vertical"})
-    assert state[:2] == pytest.approx(static_equilibrium(vertical, time=time), rel=1e-12)
+    assert state[:2] == pytest.approx(equilibrium(vertical, time=time).modal_coordinates, rel=1e-12)
 
 
 def test_beam_on_waves_is_in_balance():
@@ -309,7 +310,7 @@ def test_beam_on_waves_is_in_balance():
     system = beam(16, ground=ground, drive=Drive(stiffness_x=1e5), load=Load(40.0),
                   normal=RoughSurface(STIFFNESS, R, 0.0))
     for time in (0.7, 1.6, 3.0):
-        q = static_equilibrium(system, time=time)
+        q = equilibrium(system, time=time).modal_coordinates
         F, _, u = contact(system, q, time)
         spring = 1e5 * system.basis.T[0, 0] @ q
         x = system.basis.contact_T[:, 0] @ q
@@ -330,7 +331,7 @@ def test_light_body_slides_off_a_crest_until_its_nodes_carry_it():
     ground = Ground(amplitude=2e-4, wavelength=0.15)
     system = ContactSystem(basis, normal=RoughSurface(1e7, 1e-6, 0.0), load=Load(2.0),
                            ground=ground, friction=ExponentialFriction(0.8, 0.55, 1e3))
-    q = static_equilibrium(system)
+    q = equilibrium(system).modal_coordinates
     F = contact(system, q)[0]
     x = basis.contact_T[:, 0] @ q
     assert F.sum() == pytest.approx(2.0, rel=1e-8)
@@ -351,18 +352,18 @@ def test_light_body_slides_off_a_crest_until_its_nodes_carry_it():
 def test_steady_sliding_needs_flat_ground():
     system = mass_point(ground=Ground(speed=1e-3, amplitude=1e-6))
     with pytest.raises(AnalysisError, match="wavy ground"):
-        static_equilibrium(system, friction=True)
+        equilibrium(system, "sliding")
 
 
 def test_nothing_holds_the_sliding_mass():
     system = mass_point(ground=Ground(speed=1e-3))
     with pytest.raises(AnalysisError, match=r"steady sliding.*translation along the ground \(x\)"):
-        static_equilibrium(system, friction=True)
+        equilibrium(system, "sliding")
 
 
 def test_nothing_presses_the_mass():
     with pytest.raises(AnalysisError, match=r"static equilibrium.*load\.normal = -5 N.*lifts off"):
-        static_equilibrium(mass_point(load=Load(-5.0)))
+        equilibrium(mass_point(load=Load(-5.0)))
 
 
 def test_load_beside_the_face_tips_the_body():
@@ -373,7 +374,7 @@ def test_load_beside_the_face_tips_the_body():
     with pytest.raises(AnalysisError, match=r"tips over \(its loads have the resultant -14 N in y, "
                                             r"which meets the ground at x = 0\.15 m; the contact "
                                             r"nodes hold it at x = 0\.0125 to 0\.0875 m\)"):
-        static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
+        equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
                                          friction=ExponentialFriction(0.8, 0.55, 1e3)))
 
 
@@ -387,10 +388,10 @@ def test_sliding_block_tips_over_its_short_face():
                            friction=friction, ground=Ground(speed=0.1),
                            drive=Drive(stiffness_x=1e5))
     with pytest.raises(AnalysisError, match=r"tips over"):
-        static_equilibrium(system, friction=True)
+        equilibrium(system, "sliding")
     low = system.with_(**{"friction.static_coefficient": 0.05,
                           "friction.kinetic_coefficient": 0.05})
-    F = contact(low, static_equilibrium(low, friction=True))[0]
+    F = contact(low, equilibrium(low, "sliding").modal_coordinates)[0]
     assert F.sum() == pytest.approx(14.0, rel=1e-9)
 
 
@@ -398,13 +399,13 @@ def test_body_that_only_one_point_holds():
     """One contact node, load beside it: nothing holds the rotation."""
     system = beam(1, C=(0.15, 0.02))
     with pytest.raises(AnalysisError, match="rotation"):
-        static_equilibrium(system)
+        equilibrium(system)
 
 
 def test_body_without_load_just_touches():
     for system in (mass_point(load=Load(0.0)), beam(load=Load(0.0)), mass_point(
             load=Load(0.0), drive=Drive(stiffness_y=99.0))):
-        assert (static_equilibrium(system) == 0.0).all()
+        assert (equilibrium(system).modal_coordinates == 0.0).all()
 
 
 def test_point_pushed_across_names_both():
@@ -415,7 +416,7 @@ def test_point_pushed_across_names_both():
     basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": slanted})
     with pytest.raises(AnalysisError, match=r"translation along the ground \(x\)"):
-        static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
+        equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0),
                                          friction=ExponentialFriction(0.8, 0.55, 1e3)))
 
 
@@ -428,8 +429,9 @@ def test_ground_far_from_the_reference_place(height):
     basis = basis_from_matrices(np.eye(2), np.zeros((2, 2)),
                                 {"contact": rows[None], "C": rows},
                                 contact_x=[np.sign(height) * 0.02])
-    q = static_equilibrium(ContactSystem(basis, normal=NORMAL, load=Load(14.0), ground=ground,
-                                         friction=ExponentialFriction(0.8, 0.55, 1e3)))
+    system = ContactSystem(basis, normal=NORMAL, load=Load(14.0), ground=ground,
+                           friction=ExponentialFriction(0.8, 0.55, 1e3))
+    q = equilibrium(system).modal_coordinates
     assert q[1] == pytest.approx(height - penetration_of(14.0), rel=1e-9)
 
 
@@ -448,7 +450,7 @@ def test_light_bodies_on_waves_and_gaps(seed):
             ground=Ground(amplitude=2e-4, wavelength=10.0 ** rng.uniform(-1.5, 0.0),
                           normal="vertical"),
             gap=tuple(rng.uniform(0.0, 1e-5, n)), friction=ExponentialFriction(0.8, 0.55, 1e3))
-        F, _, u = contact(system, static_equilibrium(system))
+        F, _, u = contact(system, equilibrium(system).modal_coordinates)
         assert F.sum() == pytest.approx(load, rel=1e-6)
         assert F @ (basis.contact_x - at) == pytest.approx(0.0, abs=1e-6 * load * LENGTH)
         assert ((F > 0.0) == (u > 0.0)).all()
@@ -475,7 +477,7 @@ def test_rounding_of_a_runaway_is_no_balance(friction, reduction, stiffness):
     system = bracket(reduction, normal=RoughSurface(stiffness, 1e-6, 0.0),
                      ground=Ground(speed=0.1 if friction else 0.0))
     with pytest.raises(AnalysisError, match="tips over"):
-        static_equilibrium(system, friction=friction)
+        equilibrium(system, "sliding" if friction else "rest")
 
 
 def test_a_spring_that_holds_the_bracket_far_off_is_reported():
@@ -484,18 +486,18 @@ def test_a_spring_that_holds_the_bracket_far_off_is_reported():
                      normal=RoughSurface(1e9, 1e-6, 0.0))
     edge = system.basis.contact_x.max()
     with pytest.warns(ModelWarning, match=r"In equilibrium points of the body move by"):
-        q = static_equilibrium(system)
+        q = equilibrium(system).modal_coordinates
     tilt = -(100.0 * (0.19 - edge)) / (100.0 * (LENGTH - edge) ** 2)
     assert system.basis.contact_T[0, 2] @ q == pytest.approx(tilt, rel=1e-2)
     stiff = system.with_(**{"drive.stiffness_y": 1e6})
-    static_equilibrium(stiff)
+    equilibrium(stiff)
 
 
 def test_pressed_deeper_than_a_hundred_roughness_heights():
     soft = mass_point(normal=RoughSurface(1e3, 1e-5, 0.0))
     with pytest.warns(ModelWarning, match="contact node 0 is 0.014 m deep .* 1.4e.03 times"):
-        static_equilibrium(soft)
+        equilibrium(soft)
     # 14 N on 14.2e3 N/m: 99.1 heights.
-    static_equilibrium(mass_point(normal=RoughSurface(14.0 / (98.6 * 1e-5), 1e-5, 0.0)))
+    equilibrium(mass_point(normal=RoughSurface(14.0 / (98.6 * 1e-5), 1e-5, 0.0)))
     with pytest.warns(ModelWarning, match="101 times|1e.02 times"):
-        static_equilibrium(mass_point(normal=RoughSurface(14.0 / (100.6 * 1e-5), 1e-5, 0.0)))
+        equilibrium(mass_point(normal=RoughSurface(14.0 / (100.6 * 1e-5), 1e-5, 0.0)))

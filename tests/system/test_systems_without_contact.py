@@ -11,10 +11,10 @@ from fecontact import (
     PointLoad,
     basis_from_matrices,
     ensemble,
+    equilibrium,
     read_case,
     sensitivity,
     simulate,
-    static_equilibrium,
     write_case,
 )
 from fecontact.analysis import complex_modes
@@ -120,7 +120,7 @@ def test_modes_are_those_of_the_matrices():
 
 def test_rest_and_branches_of_it_under_a_load():
     given = system(load=Load(normal=3.0))
-    q = static_equilibrium(given)
+    q = equilibrium(given).modal_coordinates
     assert q == pytest.approx(np.array([0.0, -3.0 / STIFFNESS[1] * np.sqrt(MASS)]), rel=1e-9)
     branch = equilibrium_branch(contact_field(given, ["load.normal"]), parameter="load.normal",
                                 bounds=(0.0, 6.0))

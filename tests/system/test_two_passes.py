@@ -41,7 +41,7 @@ def two_passes(above=(8, 3), below=(8, 4), nodes="all"):
 
 
 def at_rest(system):
-    q = fc.static_equilibrium(system)
+    q = fc.equilibrium(system).modal_coordinates
     state = np.concatenate([q, np.zeros(system.size - len(q))])
     return q, system.contact_history(np.zeros(1), state[None])[0]
 

@@ -96,8 +96,8 @@ def test_many_rings_converge():
     """By increments alone: the force to 1e-4, the loss to 0.15 % with 44 rings."""
     exact, system = ts.ClosedForm(ts.RATIO), ts.spheres(44)
     state = np.zeros(system.size)
-    state[: system.basis.modes] = fc.static_equilibrium(system)
-    pressing = system.contact_history(np.zeros(1), state[None])[0, :, 0]
+    state[: system.basis.modes] = fc.equilibrium(system).modal_coordinates
+    pressing = system.at(state).normal_force
     travels = exact.displacement(0.75) * np.linspace(0.0, 1.0, 801)[1:]
     forces = increments(system, ts.MU * pressing, travels)
     assert forces[-1] == pytest.approx(0.75 * ts.MU * exact.load, rel=1e-4)

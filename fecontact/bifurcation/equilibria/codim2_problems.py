@@ -21,12 +21,13 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.codim2_forms import codim2_form
-from fecontact.bifurcation.equilibria.equilibrium import solution, sorted_eigenvalues
+from fecontact.bifurcation.equilibria.equilibrium import solution
 from fecontact.bifurcation.equilibria.normal_forms import hopf, null_vectors
 from fecontact.bifurcation.equilibria.problem import pair_test
 from fecontact.bifurcation.fields.multilinear_forms import bend
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.system.complex_modes import sorted_eigenvalues
 from fecontact.system.fields.vector_field import VectorField
 
 # Smallest |w^2| in divisions by l, relative to w^2 at the start.

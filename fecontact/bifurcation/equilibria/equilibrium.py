@@ -11,8 +11,8 @@ from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
-from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
-from fecontact.system.complex_modes import ComplexModes
+from fecontact.core.types import Array, ArrayLike, ComplexArray
+from fecontact.system.complex_modes import ComplexModes, sorted_eigenvalues, unstable_count
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 _RESIDUAL = 1e-8
@@ -128,23 +128,6 @@ class Equilibrium:
         return self.modes.sensitivity(np.asarray(change) / step)
 
 
-def sorted_eigenvalues(jacobian: Array) -> ComplexArray:
-    """Eigenvalues (d,), the largest real part first, pairs with the positive frequency first."""
-    found = np.linalg.eigvals(jacobian).astype(complex)
-    return np.asarray(found[np.lexsort((-found.imag, -found.real))])
-
-
-def unstable_count(eigenvalues: ComplexArray) -> Integers:
-    """Number (...) of eigenvalues (..., d) with positive real parts.
-
-    Real parts below 1e-10 of the eigenvalue, or 1e-13 of the largest one, count as zero: those of
-    undamped modes and of rigid ones are round-off.
-    """
-    size = np.abs(eigenvalues)
-    least = 1e-10 * size + 1e-13 * size.max(axis=-1, keepdims=True)
-    return np.asarray((eigenvalues.real > least).sum(axis=-1))
-
-
 @one_blas_thread
 def find_equilibrium(
     field: VectorField,
@@ -163,8 +146,7 @@ def find_equilibrium(
         Values that differ from the field's base values, by name.
     start : (d,) sequence, optional
         Where to begin; for contact systems that of
-        :func:`fecontact.static_equilibrium` with friction (steady sliding) by
-        default, else zero.
+        steady sliding (:func:`fecontact.equilibrium`) by default, else zero.
     tolerance : float
         Size of the last Newton step, relative to the state.
 
@@ -243,13 +225,9 @@ def _simplified(J: Array, f: Array) -> float:
 
 def steady_sliding(field: ContactField, values: Array) -> Array:
     """State [q, 0, z] of steady sliding of a contact system, to start Newton's method."""
-    from fecontact.system.equilibrium.statics import equilibrium
-    from fecontact.system.friction_memory import settled
+    from fecontact.system.statics.equilibrium import equilibrium_state
 
-    system = field.system(values)
-    state = np.zeros(field.dimension)
-    state[: system.basis.modes] = equilibrium(system, True, 0.0)
-    return settled(0.0, state, system.arrays)
+    return equilibrium_state(field.system(values), "sliding", 0.0)
 
 
 def require_autonomous(field: VectorField, values: Array) -> None:

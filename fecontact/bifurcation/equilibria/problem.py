@@ -15,8 +15,6 @@ from fecontact.bifurcation.equilibria.equilibrium import (
     default_scales,
     require_autonomous,
     solution,
-    sorted_eigenvalues,
-    unstable_count,
 )
 from fecontact.bifurcation.equilibria.normal_forms import (
     branching_tangents,
@@ -29,6 +27,7 @@ from fecontact.bifurcation.equilibria.normal_forms import (
 from fecontact.bifurcation.fields.multilinear_forms import bend
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.system.complex_modes import sorted_eigenvalues, unstable_count
 from fecontact.system.fields.vector_field import VectorField
 
 # Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.

@@ -5,12 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecontact.bifurcation.equilibria.equilibrium import (
-    Equilibrium,
-    find_equilibrium,
-    newton,
-    unstable_count,
-)
+from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, find_equilibrium, newton
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, InputError
@@ -19,6 +14,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray, Integers
 from fecontact.core.units import Summarised, span
+from fecontact.system.complex_modes import unstable_count
 from fecontact.system.fields.vector_field import VectorField, require_field
 from fecontact.system.parameter_labels import parameter_label
 

@@ -53,10 +53,10 @@ from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.equilibrium.statics import equilibrium
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
+from fecontact.system.statics.equilibrium import equilibrium_coordinates
 
 # Points of a branch at most, and largest step, unless options say so.
 _POINTS, _LARGEST = 2000, 0.03
@@ -462,7 +462,7 @@ def rest_state(field: ContactField, values: Array) -> Array:
     """State (d,) of rest under the loads' means, of the normal problem alone."""
     state = np.zeros(field.dimension)
     try:
-        q = equilibrium(field.system(values), False, 0.0, standing=True)
+        q = equilibrium_coordinates(field.system(values), "rest", 0.0, standing=True)
     except FecontactError:
         return state
     state[: len(q)] = q

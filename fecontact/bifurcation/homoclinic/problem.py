@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
-from fecontact.bifurcation.equilibria.equilibrium import sorted_eigenvalues
 from fecontact.bifurcation.homoclinic import open_mesh
 from fecontact.bifurcation.homoclinic.linearisation import HomoclinicLinearised, OpenOrbit
 from fecontact.bifurcation.homoclinic.saddle import (
@@ -34,6 +33,7 @@ from fecontact.bifurcation.homoclinic.saddle import (
 from fecontact.bifurcation.orbits.floquet import resting
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
+from fecontact.system.complex_modes import sorted_eigenvalues
 
 # Distance of both ends from the saddle, in that of the farthest point, and the factor by which it
 # may differ before the interval is lengthened or shortened.

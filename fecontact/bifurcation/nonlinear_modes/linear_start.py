@@ -16,7 +16,6 @@ from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import NORMAL_FORCE
 
 XI = "xi"
 # Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
@@ -151,7 +150,7 @@ def _sliding_where_open(system: ContactSystem, state: Array) -> Array:
     """
     found, s = state.copy(), system.memory
     if s:
-        force = system.contact_history(np.zeros(1), state[None])[0, :, NORMAL_FORCE]
+        force = system.at(state).normal_force
         z = found[2 * system.basis.modes :].reshape(-1, s)
         z[force == 0.0] = np.finfo(float).tiny
     return found

@@ -11,11 +11,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
-from fecontact.bifurcation.equilibria.equilibrium import newton, sorted_eigenvalues
+from fecontact.bifurcation.equilibria.equilibrium import newton
 from fecontact.bifurcation.orbits.collocation_kernels import amplitude_along
 from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import compare_halves, interpolate, node_times
 from fecontact.core.types import Array
+from fecontact.system.complex_modes import sorted_eigenvalues
 from fecontact.system.fields.vector_field import VectorField
 
 # Samples of an orbit for the first estimate of the shift.

@@ -13,8 +13,6 @@ from fecontact.core.types import Array
 from fecontact.core.units import count
 from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.equilibrium.balance import Balance
-from fecontact.system.equilibrium.statics import resting
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.quasistatic.given import given_rows, travelled, travelling
@@ -30,6 +28,8 @@ from fecontact.system.quasistatic.pose import (
 )
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.quasistatic.sliders import require_sliders, sliders_of
+from fecontact.system.statics.balance import Balance
+from fecontact.system.statics.equilibrium import resting
 
 
 def load_history(

@@ -10,11 +10,11 @@ from fecontact.core.errors import require_choice
 from fecontact.core.types import Array, Integers
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.equilibrium.statics import at_rest, follower, planar_follower
 from fecontact.system.jacobian import jacobian
 from fecontact.system.quasistatic.given import travelling
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
+from fecontact.system.statics.equilibrium import at_rest, follower, planar_follower
 
 # Part of the largest eigenvalue below which rounding hides rigid modes, which are double roots.
 _ZERO = 1e-7

@@ -29,7 +29,7 @@ def static_solution(
     """Displacement and stress of a body at rest under loads, ``K u = f`` with its supports.
 
     The body is not in contact; for the rest state of a contact system see
-    :func:`~fecontact.static_equilibrium` and :meth:`~fecontact.ModalBasis.fields`. A body with
+    :func:`~fecontact.equilibrium` and :meth:`~fecontact.ModalBasis.fields`. A body with
     rigid modes must be under loads in balance; its displacement has no rigid part then.
 
     Parameters

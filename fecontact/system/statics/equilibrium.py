@@ -1,10 +1,14 @@
 """Static equilibria at rest and in steady sliding."""
 
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
 
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError, require_finite
+from fecontact.core.errors import AnalysisError, require_choice, require_finite
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.core.units import listed
@@ -12,12 +16,18 @@ from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system import kernels
 from fecontact.system.arrays import with_sides
+from fecontact.system.complex_modes import unstable_count
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.equilibrium.balance import Balance
+from fecontact.system.friction_memory import settled
+from fecontact.system.instant import Instant
 from fecontact.system.loads import mean_load
 from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
 from fecontact.system.nodes import SystemArrays
+from fecontact.system.statics.balance import Balance
+
+Kind = Literal["rest", "sliding"]
 
 # Longest step down the slope of waves, as a fraction of a wavelength.
 _LONGEST_SLIDE = 0.125
@@ -48,15 +58,49 @@ def _still(t, p):
     return p[0], 0.0
 
 
-def static_equilibrium(
-    system: ContactSystem, *, friction: bool = False, time: float = 0.0
-) -> Array:
-    """Modal coordinates q (m,) of an equilibrium under the constant load.
+@read_only_arrays
+@dataclass(frozen=True, eq=False)
+class ContactEquilibrium(Instant):
+    """An equilibrium of a contact system, see :func:`equilibrium`.
+
+    Attributes
+    ----------
+    system : ContactSystem
+    time : float
+        [s]
+    modal_coordinates, modal_velocities : (m,) arrays
+        q, and zeros.
+    memory : (n s,) array
+        Internal variables z of friction: zeros at rest, their steady values in sliding.
+    kind : 'rest' or 'sliding'
+        At rest the contacts have no friction and no slip, however the ground moves.
+    stable : bool
+        At rest whether the energy has a minimum; in sliding whether no eigenvalue has a positive
+        real part.
+    """
+
+    kind: Kind
+    stable: bool
+
+    @cached_property
+    def _contact(self) -> Array:
+        found = super()._contact
+        if self.kind == "rest":
+            found = found.copy()
+            found[..., self._columns(kernels.FRICTION_FORCE, kernels.FRICTION_ACROSS)] = 0.0
+            found[..., self._columns(kernels.SLIP_VELOCITY, kernels.SLIP_ACROSS)] = 0.0
+        return found
+
+
+def equilibrium(
+    system: ContactSystem, kind: Kind = "rest", *, time: float = 0.0
+) -> ContactEquilibrium:
+    """Rest without friction, or steady sliding, under the constant load.
 
     Solves ``K q = T^T f``, with the stiffness matrix of the modes and the mean values of drive and
     loads, by Newton's method, with continuation in the load if it does not converge.
 
-    Without friction, waves push a body down their slopes (:class:`fecontact.Ground`): it rests
+    At rest, waves push a body down their slopes (:class:`fecontact.Ground`): it rests
     where the springs along the ground carry this, ``c_x x = -sum F y_R'``, and without springs in
     a trough. Of several places of rest the result is the stable one downhill from where the body
     stands. Runs with ``initial="rest"`` start from where it stands: they leave the forces along
@@ -66,9 +110,10 @@ def static_equilibrium(
     ----------
     system : ContactSystem
         Its ground is flat for steady sliding.
-    friction : bool
-        True for steady sliding on flat ground: x' = 0 and slip velocity -V at every node. False for
-        rest without friction on the ground as it is at ``time``.
+    kind : 'rest' or 'sliding'
+        Rest on the ground as it is at ``time``, without friction; or steady sliding on flat ground,
+        x' = 0 and slip velocity -V at every node, with the friction and the internal variables that
+        belong to it.
     time : float
         Time at which position and speed of the ground are evaluated [s].
 
@@ -84,23 +129,40 @@ def static_equilibrium(
         If the body moves by more than its own size, or penetrates the ground by more than a hundred
         times the roughness height.
     """
-    require_kind("static_equilibrium", ContactSystem, system=system)
-    require_finite("static_equilibrium", time=time)
-    q = equilibrium(system, friction, time)
-    state = np.concatenate([q, np.zeros(system.size - len(q))])
+    require_kind("equilibrium", ContactSystem, system=system)
+    require_choice("equilibrium", "kind", kind, get_args(Kind))
+    require_finite("equilibrium", time=time)
+    state = equilibrium_state(system, kind, time)
+    here = system.at(state, time=time)
     warn_of_limits(limits_exceeded(system, np.array([time]), state[None]), "In equilibrium")
-    return q
+    if kind == "rest":
+        problem = Balance(_at_rest_at(system, time), time, system.penetration_scale)
+        stable = problem.stable(here.modal_coordinates)
+    else:
+        stable = not unstable_count(here.eigenvalues)
+    return ContactEquilibrium(system, here.time, here.modal_coordinates, here.modal_velocities,
+                              here.memory, kind, stable)
+
+
+def equilibrium_state(
+    system: ContactSystem, kind: Kind, time: float, *, standing: bool = False
+) -> Array:
+    """State [q, 0, z] of an equilibrium, with friction's steady internal variables in sliding."""
+    q = equilibrium_coordinates(system, kind, time, standing=standing)
+    state = np.concatenate([q, np.zeros(system.size - len(q))])
+    return settled(time, state, system.arrays) if kind == "sliding" else state
 
 
 @one_blas_thread
-def equilibrium(
-    system: ContactSystem, friction: bool, time: float, *, standing: bool = False
+def equilibrium_coordinates(
+    system: ContactSystem, kind: Kind, time: float, *, standing: bool = False
 ) -> Array:
-    """As :func:`static_equilibrium`, without checking the limits of the model.
+    """Modal coordinates (m,) of :func:`equilibrium`, without checking the limits of the model.
 
     ``standing`` leaves forces along the ground out: the normal equilibrium of a body that stays
     where it is.
     """
+    friction = kind == "sliding"
     ground = system.ground
     if friction and ground.wavy:
         raise AnalysisError("There is no steady sliding on wavy ground; start from rest or "
@@ -108,9 +170,7 @@ def equilibrium(
     if friction and ground.friction_scale_kernel is not None:
         raise AnalysisError("There is no steady sliding on ground whose friction varies along it "
                             "(ground.friction_variation); start from rest.")
-    arrays = _at_mean(system)
-    if not friction:
-        arrays = at_rest(arrays, *(one.travel(time) for one in system.prescribed_motion.motions))
+    arrays = _at_mean(system) if friction else _at_rest_at(system, time)
     # On level ground, and with its normal vertical, contact forces have no part along the surface.
     slides = bool(arrays.follows_surface and ground.wavy and arrays.rows[:, ::2].any()
                   and not standing)
@@ -146,6 +206,12 @@ def _among_springs(
             if found is not None:
                 return found
     return None
+
+
+def _at_rest_at(system: ContactSystem, time: float) -> SystemArrays:
+    """Arrays without friction under the mean loads, on the ground as it is at a time."""
+    return at_rest(_at_mean(system),
+                   *(one.travel(time) for one in system.prescribed_motion.motions))
 
 
 def at_rest(

@@ -1,10 +1,8 @@
-"""Forces, slip and losses of the contact nodes in a run."""
+"""Losses of the contact nodes over a run."""
 
-from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
@@ -12,22 +10,13 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.laws.wear import WearLaw
 from fecontact.system import kernels
-from fecontact.system.contact_system import ContactSystem
-
-
-class ContactState(IntEnum):
-    """State of a contact node."""
-
-    OPEN = 0
-    STICK = 1
-    SLIP = 2
+from fecontact.system.contact_quantities import ContactQuantities, ContactState
 
 
 @read_only_arrays
-class ContactQuantities:
-    """What follows at the contact nodes from states, or is held by a run of set-valued contact."""
+class ContactWorks(ContactQuantities):
+    """Contact quantities (N, n) at the times of a run, and what friction has lost until then."""
 
-    system: ContactSystem
     time: Array
     node_friction_work: Array | None
     node_creep_work: Array | None
@@ -49,49 +38,6 @@ class ContactQuantities:
             held = self.held_friction_force
             history[:, :, columns] = held.reshape(*held.shape[:2], len(columns))
         return history
-
-    @property
-    def normal_force(self) -> Array:
-        """Normal forces F (N, n) on the body, zero or above [N]."""
-        return self._contact[:, :, kernels.NORMAL_FORCE]
-
-    @property
-    def friction_force(self) -> Array:
-        """Friction forces R (N, n) along the first tangent; on the body they act in -x [N]."""
-        return self._contact[:, :, kernels.FRICTION_FORCE]
-
-    @property
-    def friction_forces(self) -> Array:
-        """Friction forces (N, n, 1), in space (N, n, 2), against the tangents [N]."""
-        return self._contact[:, :, self._columns(kernels.FRICTION_FORCE, kernels.FRICTION_ACROSS)]
-
-    @property
-    def penetration(self) -> Array:
-        """Penetrations u (N, n), negative where open [m]."""
-        return self._contact[:, :, kernels.PENETRATION]
-
-    @property
-    def penetration_rate(self) -> Array:
-        """Rates u' (N, n) of the penetrations, positive towards the ground [m/s]."""
-        return self._contact[:, :, kernels.PENETRATION_RATE]
-
-    @property
-    def slip_velocity(self) -> Array:
-        """Slip velocities (N, n) relative to the ground, along the first tangent [m/s]."""
-        return self._contact[:, :, kernels.SLIP_VELOCITY]
-
-    @property
-    def slip_velocities(self) -> Array:
-        """Slip velocities (N, n, 1), in space (N, n, 2), along the tangents [m/s]."""
-        return self._contact[:, :, self._columns(kernels.SLIP_VELOCITY, kernels.SLIP_ACROSS)]
-
-    def _columns(self, along: int, across: int) -> list[int]:
-        return [along] if self.system.basis.dimension == 2 else [along, across]
-
-    @property
-    def slip_power(self) -> Array:
-        """Power (N, n) of the friction forces in the slip velocities [W]."""
-        return np.asarray((self.friction_forces * self.slip_velocities).sum(axis=-1))
 
     @property
     def friction_work(self) -> Array:
@@ -156,30 +102,3 @@ class ContactQuantities:
         volume = law.volume(self.slip_work, np.where(slips, power, 0.0),
                             np.where(slips, pressed, 0.0))
         return volume / (self.system.basis.tributary * thickness)
-
-    @property
-    def line_load(self) -> Array:
-        """Normal force per length of a plane body's face (N, n) [N/m]; InputError for solids."""
-        basis = self.system.basis
-        if basis.dimension == 3:
-            raise InputError("Line loads are those of plane bodies; take the pressure of a solid.")
-        return self.normal_force / basis.tributary
-
-    @property
-    def pressure(self) -> Array:
-        """Normal force per area (N, n) [Pa]; InputError if the basis has no thickness."""
-        return self.normal_force / self.system.basis.contact_areas
-
-    @cached_property
-    def contact_state(self) -> NDArray[np.int8]:
-        """State (N, n) of the contact nodes, values of :class:`ContactState`.
-
-        Open without normal force; sticking below the slip velocity of largest friction.
-        """
-        slip, friction = self.slip_velocity, self.friction_force
-        if self.system.basis.dimension == 3:
-            slip, friction = (np.linalg.norm(both, axis=-1)
-                              for both in (self.slip_velocities, self.friction_forces))
-        stick = self.system.sticks(slip, self.normal_force, friction)
-        state = np.where(stick, ContactState.STICK, ContactState.SLIP)
-        return np.where(self.normal_force != 0.0, state, ContactState.OPEN).astype(np.int8)

@@ -1,0 +1,150 @@
+"""Motion of points, and forces, slip and state of the contact nodes."""
+
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
+from fecontact.core.types import Array
+from fecontact.system import kernels
+
+
+class ContactState(IntEnum):
+    """State of a contact node."""
+
+    OPEN = 0
+    STICK = 1
+    SLIP = 2
+
+
+@read_only_arrays
+class ContactQuantities:
+    """Motion of points, and forces, gaps and slip of contact nodes, in states of a system.
+
+    Arrays have the shape (..., n) for n nodes: (N, n) in a run, (n,) in one state.
+    """
+
+    system: Any  # a ContactSystem, whose own module uses this one
+    modal_coordinates: Array
+    modal_velocities: Array
+
+    def displacement(self, point: str | int | tuple[float, ...]) -> Array:
+        """Displacement x, y [m] and rotation phi [rad] (..., 3) of a point.
+
+        Of solids x, y, z and the rotations about them (..., 6); of contact nodes in their own
+        frame, along the first tangent, the second one in space, and the normal.
+
+        Parameters
+        ----------
+        point : str, int or (x, y)
+            'B', 'C' or a further named point; a contact node by its number from 0; or the
+            displacement node of the body nearest to a place (then without rotations).
+        """
+        return self.modal_coordinates @ self._rows(point).T
+
+    def velocity(self, point: str | int | tuple[float, ...]) -> Array:
+        """Velocity [m/s] and angular velocity [rad/s] (..., 3) of a point; see displacement."""
+        return self.modal_velocities @ self._rows(point).T
+
+    def _rows(self, point: str | int | tuple[float, ...]) -> Array:
+        basis = self.system.basis
+        if isinstance(point, str | int | np.integer):
+            return basis.T[basis.point_index(point if isinstance(point, str) else int(point))]
+        if basis.mode_shapes is None:
+            raise InputError(f"The point {point} cannot be found: the modal basis holds no mode "
+                             f"shapes; use a named point or a contact node.")
+        if np.shape(point) != (basis.dimension,):
+            axes = "x, y" if basis.dimension == 2 else "x, y, z"
+            raise InputError(f"The point {point} must have {basis.dimension} coordinates, {axes} "
+                             f"in m.")
+        distance = np.linalg.norm(basis.mode_shapes.nodes - np.asarray(point, dtype=float), axis=1)
+        nearest_node = int(np.argmin(distance))
+        reach = np.ptp(basis.mode_shapes.nodes, axis=0).max()
+        if distance[nearest_node] > 0.1 * reach:
+            raise InputError(f"The point {point} lies outside the body, {distance.min():.3g} m "
+                             f"away from it.")
+        return basis.mode_shapes.shapes[nearest_node]
+
+    @cached_property
+    def _contact(self) -> Array:
+        """Columns of :meth:`ContactSystem.contact_history` (..., n, 6), in space (..., n, 8)."""
+        raise NotImplementedError
+
+    @property
+    def normal_force(self) -> Array:
+        """Normal forces F (..., n) on the body, zero or above [N]."""
+        return self._contact[..., kernels.NORMAL_FORCE]
+
+    @property
+    def friction_force(self) -> Array:
+        """Friction forces R (..., n) along the first tangent; on the body they act in -x [N]."""
+        return self._contact[..., kernels.FRICTION_FORCE]
+
+    @property
+    def friction_forces(self) -> Array:
+        """Friction forces (..., n, 1), in space (..., n, 2), against the tangents [N]."""
+        return self._contact[..., self._columns(kernels.FRICTION_FORCE, kernels.FRICTION_ACROSS)]
+
+    @property
+    def penetration(self) -> Array:
+        """Penetrations u (..., n), negative where open [m]."""
+        return self._contact[..., kernels.PENETRATION]
+
+    @property
+    def gap(self) -> Array:
+        """Distances (..., n) to the ground or the other side, negative in contact [m]."""
+        return -self.penetration
+
+    @property
+    def penetration_rate(self) -> Array:
+        """Rates u' (..., n) of the penetrations, positive towards the ground [m/s]."""
+        return self._contact[..., kernels.PENETRATION_RATE]
+
+    @property
+    def slip_velocity(self) -> Array:
+        """Slip velocities (..., n) relative to the ground, along the first tangent [m/s]."""
+        return self._contact[..., kernels.SLIP_VELOCITY]
+
+    @property
+    def slip_velocities(self) -> Array:
+        """Slip velocities (..., n, 1), in space (..., n, 2), along the tangents [m/s]."""
+        return self._contact[..., self._columns(kernels.SLIP_VELOCITY, kernels.SLIP_ACROSS)]
+
+    def _columns(self, along: int, across: int) -> list[int]:
+        return [along] if self.system.basis.dimension == 2 else [along, across]
+
+    @property
+    def slip_power(self) -> Array:
+        """Power (..., n) of the friction forces in the slip velocities [W]."""
+        return np.asarray((self.friction_forces * self.slip_velocities).sum(axis=-1))
+
+    @property
+    def line_load(self) -> Array:
+        """Normal force per length of a plane body's face (..., n) [N/m]; InputError for solids."""
+        basis = self.system.basis
+        if basis.dimension == 3:
+            raise InputError("Line loads are those of plane bodies; take the pressure of a solid.")
+        return self.normal_force / basis.tributary
+
+    @property
+    def pressure(self) -> Array:
+        """Normal force per area (..., n) [Pa]; InputError if the basis has no thickness."""
+        return self.normal_force / self.system.basis.contact_areas
+
+    @cached_property
+    def contact_state(self) -> NDArray[np.int8]:
+        """State (..., n) of the contact nodes, values of :class:`ContactState`.
+
+        Open without normal force; sticking below the slip velocity of largest friction.
+        """
+        slip, friction = self.slip_velocity, self.friction_force
+        if self.system.basis.dimension == 3:
+            slip, friction = (np.linalg.norm(both, axis=-1)
+                              for both in (self.slip_velocities, self.friction_forces))
+        stick = self.system.sticks(slip, self.normal_force, friction)
+        state = np.where(stick, ContactState.STICK, ContactState.SLIP)
+        return np.where(self.normal_force != 0.0, state, ContactState.OPEN).astype(np.int8)
