@@ -69,8 +69,8 @@ def blade_pair(load: float, angle: float = np.pi, frequency_hz: float = 300.0) -
 
 def excited_at(system: fc.ContactSystem, w: float) -> fc.ContactSystem:
     """The system with both forces at an angular frequency."""
-    return system.with_(**{f"load.forces.{number}.signal.angular_frequency": w
-                           for number in range(2)})
+    return system.with_({f"load.forces.{number}.signal.angular_frequency": w
+                         for number in range(2)})
 
 
 def responses(

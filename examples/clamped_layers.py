@@ -89,7 +89,7 @@ def cycle(system: ContactSystem, limit: float, steps: int = 10) -> LoadHistory:
     Stuck contacts are so stiff that the layers alone give way.
     """
     pressure = limit / (MU * WIDTH * HEIGHT)
-    pressed = system.with_(**{"interfaces.joint.normal.force": pressure * LENGTH * WIDTH})
+    pressed = system.with_({"interfaces.joint.normal.force": pressure * LENGTH * WIDTH})
     half = [0.0, 0.5 * END_LOAD, -0.5 * END_LOAD, 0.5 * END_LOAD]
     path = LoadPath(load_scale=pressure, forces=[half, half], steps=steps)
     return load_history(pressed, path, tangential_stiffness=STUCK * LENGTH * WIDTH, rtol=1e-4)

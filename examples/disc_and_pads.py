@@ -75,8 +75,8 @@ def brake(friction: float = 0.4, *, angles: tuple[float, ...] = (90.0,), speed: 
 
 def with_friction(system: fc.ContactSystem, friction: float) -> fc.ContactSystem:
     """The brake with another friction coefficient of all pads."""
-    return system.with_(**{f"interfaces.{name}.friction.friction_coefficient": friction
-                           for name, _ in system.basis.groups})
+    return system.with_({f"interfaces.{name}.friction.friction_coefficient": friction
+                         for name, _ in system.basis.groups})
 
 
 def flutter_mode(modes: ComplexModes) -> int:

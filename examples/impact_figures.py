@@ -104,7 +104,7 @@ def strobed(system: ContactSystem, count: int, transient: int = 200) -> np.ndarr
 def figures(system: ContactSystem, transient: int = 300,
             points: int = SECTION_POINTS) -> dict[str, Any]:
     """All pictures by name: ``phase``, ``chatter`` and ``sections``."""
-    driven = {w: system.with_(**{"drive.angular_frequency": w}) for w in FREQUENCIES}
+    driven = {w: system.with_({"drive.angular_frequency": w}) for w in FREQUENCIES}
     runs = {w: settled(one, transient=transient, periods=SHOWN_PERIODS[w])
             for w, one in driven.items()}
     sections = {w: strobed(one, points if w == 23.63 else min(points, 40), min(transient, 200))

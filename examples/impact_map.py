@@ -55,7 +55,7 @@ def contact_states(system: ContactSystem, states: np.ndarray) -> np.ndarray:
 def bifurcation(system: ContactSystem, frequencies: np.ndarray, *, transient: int = 50,
                 keep: int = 30) -> Diagram:
     """Follow the motion upwards and downwards, each from the end of the one before."""
-    driven = [system.with_(**{"drive.angular_frequency": float(w)}) for w in frequencies]
+    driven = [system.with_({"drive.angular_frequency": float(w)}) for w in frequencies]
     # Two chains, one on each of two cores.
     found = strobe(driven + driven[::-1], transient_periods=transient, keep=keep,
                    initial=start(system, 1e-4), chain=len(driven), progress=True)
@@ -72,9 +72,9 @@ def regime_map(bendings_hz: np.ndarray, dampings: np.ndarray, ratio: float = 0.6
     pairs = [(f, D) for D in dampings for f in bendings_hz]
     periods = {}
     for frequency in EXPECTED:
-        systems = [two_mode_system(f, ratio, D).with_(**{"drive.angular_frequency": frequency})
+        systems = [two_mode_system(f, ratio, D).with_({"drive.angular_frequency": frequency})
                    for f, D in pairs]
-        base = settled(two_mode_system().with_(**{"drive.angular_frequency": frequency}),
+        base = settled(two_mode_system().with_({"drive.angular_frequency": frequency}),
                        transient=100, periods=10)
         scale = np.ptp(contact_states(systems[0], base.states), axis=0)
         rests = frequency == 9.845

@@ -156,7 +156,7 @@ def main(quick: bool = False) -> None:
     options: dict[str, Any] = {"transient": 100, "periods": 24, "per_period": 400} if quick else {}
     for frequency, reported in list(FREQUENCIES.items())[: 1 if quick else None]:
         for system in (two_mode_system(), mesh_system()):
-            driven = system.with_(**{"drive.angular_frequency": frequency})
+            driven = system.with_({"drive.angular_frequency": frequency})
             run = settled(driven, **options)
             found = regime(run)
             growth, error = exponent(run, found)

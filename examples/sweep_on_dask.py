@@ -45,8 +45,8 @@ def main(quick: bool = False) -> None:
                       str(port))
     workers = [start(folder, "distributed.cli.dask_worker", address, "--nthreads", "1",
                      "--no-nanny") for _ in range(2)]
-    study = fc.Study.read(STUDY).with_(**{"simulation.t_end": 12.0, "simulation.outputs": 1201,
-                                          "sweep.t_start": 9.0})
+    study = fc.Study.read(STUDY).with_({"simulation.t_end": 12.0, "simulation.outputs": 1201,
+                                        "sweep.t_start": 9.0})
 
     def show(done: int, failed: int, total: int) -> None:
         if done >= total // 3 and workers[0].poll() is None:

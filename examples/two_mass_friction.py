@@ -59,7 +59,7 @@ def oscillator(B: float = 1.0, v0: float = 1.0, D: float = 0.1) -> ContactField:
                            friction=ProductFriction(0.14, 1.14, 2.0, 100.0),
                            ground=Ground(speed=v0))
     return contact_field(system, {
-        "B": (B, lambda given, value: given.with_(**{"normal.force": (value, value)})),
+        "B": (B, lambda given, value: given.with_({"normal.force": (value, value)})),
         "ground.speed": None,
         "D": (D, lambda given, value: given.with_(basis=basis(value))),
     })

@@ -45,7 +45,7 @@ class Row:
 
 def measured(system: ContactSystem, frequency: float, with_exponent: bool) -> Row:
     """Settled motion of a model at a frequency."""
-    driven = system.with_(**{"drive.angular_frequency": frequency})
+    driven = system.with_({"drive.angular_frequency": frequency})
     run = settled(driven)
     found = regime(run)
     return Row(frequency, system.basis.modes, found,

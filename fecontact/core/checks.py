@@ -221,3 +221,15 @@ def require_scale(owner: str, scale: float) -> None:
     require_positive(owner, scale=scale)
     if scale > _LARGEST:
         raise InputError(f"{owner}: scale = {scale!r} must be at most {_LARGEST:g}.")
+
+
+def merged(given: object, by_name: Mapping[str, Any]) -> dict[str, Any]:
+    """Changes of ``with_`` from a mapping, or None, and from keywords.
+
+    Raises
+    ------
+    InputError
+        If what is given is no mapping.
+    """
+    require_kind("with_", (Mapping, type(None)), changes=given)
+    return {**(given or {}), **by_name}  # type: ignore[dict-item]

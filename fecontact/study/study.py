@@ -8,7 +8,13 @@ from typing import Any
 
 from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.bifurcation.response_options import ResponseSettings, flat_levels
-from fecontact.core.checks import as_path, require_kind, require_regular_file, whole_number
+from fecontact.core.checks import (
+    as_path,
+    merged,
+    require_kind,
+    require_regular_file,
+    whole_number,
+)
 from fecontact.core.errors import FecontactError, InputError, choices, nearest
 from fecontact.core.files.named_files import content_hashes
 from fecontact.core.tables import (
@@ -325,10 +331,10 @@ class Study(Summarised, StudyModels):
                  if self.content_hashes else "")
         return f"{tomli_w.dumps(self.tables())}\n{files}{_KEYS_GIVEN}{keys}\n"
 
-    def with_(self, **changes: Any) -> "Study":
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **by_name: Any) -> "Study":
         """Copy of the study with other values, given by dotted keys of the file.
 
-        ``study.with_(**{"ground.speed": 0.1, "body.fixed.pivot": "xy"})``; list entries are
+        ``study.with_({"ground.speed": 0.1, "body.fixed.pivot": "xy"})``; list entries are
         numbered, ``load.forces.0.signal.amplitude``. Another ``law`` keeps only the keys that it
         has. Mesh, body and modal basis are reused if nothing they depend on changes.
 
@@ -338,6 +344,7 @@ class Study(Summarised, StudyModels):
             If a key does not exist (the message suggests the nearest), or a value is of the wrong
             type or out of range.
         """
+        changes = merged(changes, by_name)
         tables = self.tables(defaults=False)
         for name, value in changes.items():
             *sections, key = name.split(".")

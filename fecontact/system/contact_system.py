@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.checks import merged
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.types import Array
@@ -418,10 +419,12 @@ class ContactSystem(Summarised):
                             np.ascontiguousarray(states, dtype=float), self.arrays, out)
         return out[0], out[1]
 
-    def with_(self, **changes: Any) -> "ContactSystem":
+    def with_(
+        self, changes: Mapping[str, Any] | None = None, /, **by_name: Any
+    ) -> "ContactSystem":
         """A copy with other parameters, by their dotted names.
 
-        ``system.with_(**{"friction.static_coefficient": 0.7, "gap": 1e-6})``; a whole part can be
+        ``system.with_({"friction.static_coefficient": 0.7, "gap": 1e-6})``; a whole part can be
         replaced too, ``system.with_(ground=Ground(speed=0.1))``. Numbers of the basis are
         ``basis.damping_ratios.I``, ``basis.damping.I.J`` and ``basis.stiffness.I.J``, for modes I
         and J from 0.
@@ -431,6 +434,7 @@ class ContactSystem(Summarised):
         InputError
             If a parameter does not exist, or a value is out of range.
         """
+        changes = merged(changes, by_name)
         inside = {name.removeprefix("basis."): changes.pop(name) for name in tuple(changes)
                   if name.startswith("basis.")}
         if inside:

@@ -5,7 +5,16 @@ import pytest
 from synthetic import basis
 from systems import mass_in_plane
 
-from fecontact import ContactState, ContactSystem, Drive, Ground, Load, equilibrium, simulate
+from fecontact import (
+    ContactState,
+    ContactSystem,
+    Drive,
+    Ground,
+    InputError,
+    Load,
+    equilibrium,
+    simulate,
+)
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,
@@ -100,3 +109,14 @@ def test_rest_on_waves_is_in_a_trough():
     # There the ground is the waves' amplitude below its mean.
     height = found.displacement(0)[1] + found.penetration[0]
     assert height == pytest.approx(-1e-3, rel=1e-2)
+
+
+def test_changes_by_mapping_and_by_name_are_the_same():
+    system = on_belt(ConstantFriction(0.3))
+    both = system.with_({"ground.speed": 0.5, "gap": 1e-6})
+    assert (both.ground.speed, both.gap) == (0.5, 1e-6)
+    assert system.with_({"ground.speed": 0.5}, gap=1e-6).parameters() == both.parameters()
+    assert system.with_(ground=Ground(speed=0.5), gap=1e-6).parameters() == both.parameters()
+    for given in (3, ["ground.speed"]):
+        with pytest.raises(InputError, match="must be a mapping of names"):
+            system.with_(given)

@@ -102,7 +102,9 @@ class RecordedSystem(ContactSystem):
         """Not available: needs the compiled laws."""
         raise InputError(self.needs)
 
-    def with_(self, **changes: Any) -> ContactSystem:
+    def with_(
+        self, changes: Mapping[str, Any] | None = None, /, **by_name: Any
+    ) -> ContactSystem:
         """Not available: needs the laws."""
         raise InputError(self.needs)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import merged, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.types import Array, Integers
 
@@ -85,7 +85,9 @@ class VectorField(ABC):
         """Told how often each column (d,) of Jacobians of the :meth:`kernel` was wrong."""
         return
 
-    def with_(self, **changes: float) -> Self:
+    def with_(
+        self, changes: Mapping[str, float] | None = None, /, **by_name: float
+    ) -> Self:
         """The same field with other base values of some parameters.
 
         Raises
@@ -93,6 +95,7 @@ class VectorField(ABC):
         InputError
             If there is no parameter of such a name, or a value is no finite number.
         """
+        changes = merged(changes, by_name)
         require_finite("with_", **changes)
         changed = self.values_with(**changes).tolist()
         made = copy(self)
