@@ -29,6 +29,7 @@ def completion(
 
 COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.init,
+    study.import_,
     study.mesh,
     study.modes,
     study.preload,

@@ -1,6 +1,8 @@
 from .constraints import Coupling, LinearEquation, Term, Tie
 from .elements.cell_kinds import CellKind
-from .fields import BodyFields
+from .fields import BodyFields, stress_of
+from .material import AnisotropicMaterial
+from .material_axes import CylindricalAxes, MaterialAxes
 from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
 from .rotation import Rotation
@@ -8,13 +10,16 @@ from .solids.shapes import Cylinder, LapStrip, Plate, Ring, SolidBlock, SphereSe
 from .supports import HingeSupport
 
 __all__ = [
+    "AnisotropicMaterial",
     "BodyFields",
     "CellKind",
     "Coupling",
     "Cylinder",
+    "CylindricalAxes",
     "HingeSupport",
     "LapStrip",
     "LinearEquation",
+    "MaterialAxes",
     "Pairing",
     "PairingReport",
     "Plate",
@@ -28,4 +33,5 @@ __all__ = [
     "finer_face",
     "pair_both_faces",
     "pair_faces",
+    "stress_of",
 ]

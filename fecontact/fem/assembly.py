@@ -1,4 +1,4 @@
-"""Stiffness and mass of isotropic bodies, assembled by compiled loops over the cells.
+"""Stiffness and mass of elastic bodies, assembled by compiled loops over the cells.
 
 Cells that are images of the reference cell under an affine map need no quadrature of their own:
 with the inverse Jacobian J of the map and the integrals over the reference cell
@@ -9,6 +9,10 @@ the stiffness between nodes i and j in directions p and q is, with the Lame cons
 
     K_ij,pq = lambda H_ij,pq + mu H_ij,qp + mu delta_pq (H_ij,11 + H_ij,22 + H_ij,33).
 
+and of an anisotropic material with the stiffness c
+
+    K_ij,pq = sum_rs c_pr,qs H_ij,rs.
+
 Other cells, curved or with faces that are not parallel, are integrated point by point. A plane
 cell is a solid one without the third derivatives; K has this form in plane stress, too, with the
 lateral constant for lambda.
@@ -18,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.compiled import kernel
+from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import MeshError
 from fecontact.core.records import (
     Array4,
@@ -40,7 +44,8 @@ _MOST = np.iinfo(np.int32).max
 
 
 def assembled(
-    basis: Any, lateral: float | Array, shear: float | Array, density: float | Array
+    basis: Any, lateral: float | Array, shear: float | Array, density: float | Array,
+    anisotropic: tuple[Array, Integers] | None = None,
 ) -> tuple[Any, Any]:
     """Stiffness and mass of one displacement component, both exactly symmetric.
 
@@ -55,6 +60,9 @@ def assembled(
         ``nu E / (1 - nu^2)`` and mu; of all cells or of each.
     density : float or (c,) array
         rho [kg/m^3].
+    anisotropic : (n, 6, 6) array and (c,) integer array, optional
+        Stiffnesses in the order xx, yy, zz, xy, yz, xz [Pa], and the number of that of each cell,
+        -1 for cells with the constants above.
 
     Returns
     -------
@@ -79,17 +87,19 @@ def assembled(
     constants = np.empty((len(dofs), 3))
     for column, value in enumerate((lateral, shear, density)):
         constants[:, column] = value
+    tensors, which_tensor = anisotropic or (np.empty((0, 6, 6)), np.full(len(dofs), -1))
     affine = _affine_cells(nodes, corners, dimension)
     if affine.any():
         which = np.flatnonzero(affine)
         inverse, scale = _inverse_jacobians(nodes, corners[which], dimension)
         gradients, masses = _reference_integrals(basis.elem)
-        _add_affine(which, inverse, scale, gradients, masses, constants, slots, blocks, mass)
+        _add_affine(which, inverse, scale, gradients, masses, constants, tensors,
+                    which_tensor, slots, blocks, mass)
     if not affine.all():
         at, weights = basis.X, np.ascontiguousarray(basis.W)
         values, slopes = _shapes(basis.elem, at)
         _add_quadrature(np.flatnonzero(~affine), nodes, corners, _shapes(element, at)[1], values,
-                        slopes, weights, constants, slots, blocks, mass)
+                        slopes, weights, constants, tensors, which_tensor, slots, blocks, mass)
     return (sp.bsr_array((blocks, indices, indptr), shape=(dimension * size,) * 2),
             sp.csr_array((mass, indices, indptr), shape=(size, size)))
 
@@ -120,6 +130,28 @@ def pattern(dofs: Integers, size: int) -> tuple[Any, Any, Any]:
     seen[:] = -1
     _rows(dofs, starts, around, seen, indptr, indices, slots)
     return indptr.astype(np.int32), indices, slots
+
+
+def subtract(stiffness: Any, dofs: Integers, matrices: Array) -> None:
+    """Subtract matrices (c, d k, d k) of cells with the nodes (c, k) from a matrix of blocks."""
+    _subtract(np.ascontiguousarray(dofs, dtype=np.int64), np.ascontiguousarray(matrices),
+              stiffness.indptr, stiffness.indices, stiffness.data)
+
+
+@kernel
+def _subtract(
+    dofs: IntegerMatrix, matrices: Block, indptr: ShortVector, indices: ShortVector, blocks: Block,
+) -> None:
+    """Subtract the entries; indices of a row are ascending."""
+    dimension = blocks.shape[1]
+    for e in range(len(dofs)):
+        for i in range(dofs.shape[1]):
+            start, end = indptr[dofs[e, i]], indptr[dofs[e, i] + 1]
+            for j in range(dofs.shape[1]):
+                at = start + np.searchsorted(indices[start:end], dofs[e, j])
+                for p in range(dimension):
+                    for q in range(dimension):
+                        blocks[at, p, q] -= matrices[e, dimension * i + p, dimension * j + q]
 
 
 @kernel
@@ -247,10 +279,23 @@ def _reference_integrals(element: Any) -> tuple[Array, Array]:
             np.einsum("q,qi,qj->ij", weights, values, values))
 
 
+@helper
+def _entry(stiffness: Matrix, H: Matrix, p: int, q: int) -> float:
+    """Stiffness between displacements in p and q for a stiffness (6, 6)."""
+    entry = 0.0
+    for r in range(3):
+        pr = p if p == r else (5 if p + r == 2 else (5 + p + r) // 2)
+        for s in range(3):
+            qs = q if q == s else (5 if q + s == 2 else (5 + q + s) // 2)
+            entry += stiffness[pr, qs] * H[r, s]
+    return entry
+
+
 @kernel
 def _add_affine(
     which: IntegerVector, inverse: Block, scale: Vector, gradients: Array4, masses: Matrix,
-    constants: Matrix, slots: ShortBlock, blocks: Block, mass: Vector,
+    constants: Matrix, tensors: Block, which_tensor: IntegerVector, slots: ShortBlock,
+    blocks: Block, mass: Vector,
 ) -> None:
     """Add the affine cells ``which`` to the blocks of the stiffness and the entries of the mass."""
     width, dimension = slots.shape[1], blocks.shape[1]
@@ -258,6 +303,7 @@ def _add_affine(
     for cell in range(len(which)):
         e, J, volume = which[cell], inverse[cell], scale[cell]
         lateral, shear, density = constants[e]
+        tensor = which_tensor[e]
         for i in range(width):
             for j in range(i, width):
                 G = gradients[i, j]
@@ -276,9 +322,12 @@ def _add_affine(
                     mass[back] += weight
                 for p in range(dimension):
                     for q in range(p if i == j else 0, dimension):
-                        entry = lateral * H[p, q] + shear * H[q, p]
-                        if p == q:
-                            entry += spread
+                        if tensor >= 0:
+                            entry = _entry(tensors[tensor], H, p, q)
+                        else:
+                            entry = lateral * H[p, q] + shear * H[q, p]
+                            if p == q:
+                                entry += spread
                         blocks[there, p, q] += entry
                         if i != j or p != q:
                             blocks[back, q, p] += entry
@@ -287,8 +336,8 @@ def _add_affine(
 @kernel
 def _add_quadrature(
     which: IntegerVector, nodes: Matrix, corners: IntegerMatrix, stretch: Block, values: Matrix,
-    slopes: Block, weights: Vector, constants: Matrix, slots: ShortBlock, blocks: Block,
-    mass: Vector,
+    slopes: Block, weights: Vector, constants: Matrix, tensors: Block,
+    which_tensor: IntegerVector, slots: ShortBlock, blocks: Block, mass: Vector,
 ) -> None:
     """Add the cells ``which`` by quadrature; ``stretch`` (q, g, 3) are slopes of their map."""
     width, dimension, points = slots.shape[1], blocks.shape[1], len(weights)
@@ -297,6 +346,7 @@ def _add_quadrature(
     own = np.empty((width, width))
     for e in which:
         lateral, shear, density = constants[e]
+        tensor = which_tensor[e]
         H[:] = 0.0
         own[:] = 0.0
         for point in range(points):
@@ -336,9 +386,12 @@ def _add_quadrature(
                 spread = shear * (H[i, j, 0, 0] + H[i, j, 1, 1] + H[i, j, 2, 2])
                 for p in range(dimension):
                     for q in range(p if i == j else 0, dimension):
-                        entry = lateral * H[i, j, p, q] + shear * H[i, j, q, p]
-                        if p == q:
-                            entry += spread
+                        if tensor >= 0:
+                            entry = _entry(tensors[tensor], H[i, j], p, q)
+                        else:
+                            entry = lateral * H[i, j, p, q] + shear * H[i, j, q, p]
+                            if p == q:
+                                entry += spread
                         blocks[there, p, q] += entry
                         if i != j or p != q:
                             blocks[back, q, p] += entry

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -13,13 +13,14 @@ from fecontact.core.errors import (
     MeshError,
     choices,
     nearest,
+    require_choice,
     require_positive,
 )
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, Integers
-from fecontact.core.units import Summarised, listed, quantity, span
-from fecontact.fem.assembly import assembled
+from fecontact.core.units import Summarised, listed, span
+from fecontact.fem.assembly import assembled, subtract
 from fecontact.fem.constraints import (
     Constraint,
     LinearEquation,
@@ -28,10 +29,12 @@ from fecontact.fem.constraints import (
 )
 from fecontact.fem.elements.cell_kinds import numbered_rows
 from fecontact.fem.equations import expansion
-from fecontact.fem.material import Material
-from fecontact.fem.mesh import Mesh
+from fecontact.fem.incompatible_modes import in_parts, reductions
+from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
+from fecontact.fem.mesh import Bricks, Mesh
 from fecontact.fem.supports import HingeSupport, check_supports, fixed_dofs, hinges
 
+_MATERIALS = (Material, AnisotropicMaterial)
 # Memory per unknown for modes [bytes], by dimension and number of corners.
 _BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 8): 1.2e4}
 # Order of quadrature by dimension, number of corners and degree: exact for the mass of straight
@@ -56,7 +59,7 @@ class ElasticBody(Summarised):
     ----------
     mesh : Mesh
         Triangles or quadrilaterals; tetrahedra or hexahedra for a solid.
-    material : Material or mapping of name to Material, optional
+    material : Material, AnisotropicMaterial or mapping of name to material, optional
         One material, or that of each group of cells of the mesh, which together hold each cell
         once; by default those of the mesh, or steel if it has none.
     thickness : float
@@ -72,6 +75,10 @@ class ElasticBody(Summarised):
     constraints : sequence of LinearEquation, Tie or Coupling, optional
         Linear equations between displacements, see :mod:`fecontact.fem.constraints`; by default
         those of the mesh, which a file may hold.
+    bricks : 'full' or 'incompatible', optional
+        Of hexahedra with ``degree = 1``: trilinear displacements alone, or with incompatible modes
+        of each cell, which bend without locking; by default those of the mesh. See
+        :mod:`fecontact.fem.incompatible_modes`.
 
     Raises
     ------
@@ -82,18 +89,19 @@ class ElasticBody(Summarised):
     """
 
     mesh: Mesh
-    material: Material | Mapping[str, Material] | None = None
+    material: AnyMaterial | Mapping[str, AnyMaterial] | None = None
     thickness: float = 1.0
     plane: Literal["stress", "strain"] = "stress"
     degree: int = 2
     fixed: Mapping[str, str] = field(default_factory=dict)
     constraints: Sequence[Constraint] | None = None
+    bricks: Bricks | None = None
 
     def __post_init__(self) -> None:
         require_kind("ElasticBody", Mesh, mesh=self.mesh)
         if self.material is None:
             object.__setattr__(self, "material", self.mesh.materials or Material())
-        require_kind("ElasticBody", (Material, Mapping), material=self.material)
+        require_kind("ElasticBody", (*_MATERIALS, Mapping), material=self.material)
         require_kind("ElasticBody", Mapping, fixed=self.fixed)
         for name, directions in self.fixed.items():
             require_kind("ElasticBody: fixed", str, name=name, directions=directions)
@@ -105,13 +113,16 @@ class ElasticBody(Summarised):
         if self.dimension == 3 and (self.thickness, self.plane) != (1.0, "stress"):
             raise InputError("ElasticBody: thickness and plane are those of plane bodies; leave "
                              "them out for a solid.")
+        if self.bricks is None:
+            object.__setattr__(self, "bricks", self.mesh.bricks)
+        require_choice("ElasticBody", "bricks", self.bricks, get_args(Bricks))
         kind, degree = self.mesh.kind, int(self.degree)
         plain = "triangles" if self.dimension == 2 else "tetrahedra"
         require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
                        kind.unknowns(degree) * _BYTES[kind.dimension, kind.corners],
                        f", by a larger element_size, or {plain} or degree = 1")
         check_supports(self.mesh, self.fixed)
-        _ = self.cell_materials
+        _ = self.anisotropic
         if self.constraints is not None:
             require_kind("ElasticBody", Sequence, constraints=self.constraints)
             check_constraints(self.constraints, self.mesh.boundaries, self.mesh.points,
@@ -128,16 +139,20 @@ class ElasticBody(Summarised):
         curved = f", {len(mesh.curved_cells)} curved" if len(mesh.curved_cells) else ""
         return [
             ("mesh", f"{len(mesh.cells)} {mesh.kind.name}{curved}, {len(mesh.nodes)} nodes, degree "
-             f"{self.degree}"),
+             f"{self.degree}{', incompatible modes' if self.has_incompatible_modes else ''}"),
             *((axis, span(values, "m")) for axis, values in zip("xyz", mesh.nodes.T, strict=False)),
             ("thickness", f"{self.thickness:.4g} m, plane {self.plane}") if self.dimension == 2
             else ("volume", f"{mesh.volume:.4g} m³"),
-            *((f"material {name}".rstrip(), f"{quantity(material.youngs_modulus, 'Pa')}, Poisson "
-               f"ratio {material.poisson_ratio:.4g}, {material.density:.4g} kg/m³")
-              for name, material in named),
+            *((f"material {name}".rstrip(), material.description) for name, material in named),
             ("fixed", listed([f"{name} in {way}" for name, way in self.fixed.items()])),
             *([("constraints", counted(self.equations))] if self.equations else []),
         ]
+
+    @property
+    def has_incompatible_modes(self) -> bool:
+        """True for eight-node bricks with incompatible modes."""
+        return (self.dimension, self.mesh.kind.corners, self.degree) == (3, 8, 1) and (
+            self.bricks == "incompatible")
 
     @property
     def dimension(self) -> int:
@@ -163,23 +178,22 @@ class ElasticBody(Summarised):
         return float(self.component_mass.sum())
 
     @property
-    def materials(self) -> tuple[Material, ...]:
+    def materials(self) -> tuple[AnyMaterial, ...]:
         """The materials, in the order in which they are given."""
         assert self.material is not None
-        return (self.material,) if isinstance(self.material, Material) else tuple(
-            self.material.values())
+        return tuple(self.material.values()) if isinstance(self.material, Mapping) else (
+            self.material,)
 
     @cached_property
     def cell_materials(self) -> Integers:
         """Number (M,) of the material of each cell."""
-        if isinstance(self.material, Material):
+        if not isinstance(self.material, Mapping):
             return np.zeros(len(self.mesh.cells), np.int64)
-        assert self.material is not None
         groups = self.mesh.cell_groups
         found = np.full(len(self.mesh.cells), -1)
         for number, (name, one) in enumerate(self.material.items()):
             require_kind("ElasticBody: material", str, name=name)
-            require_kind("ElasticBody: material", Material, **{name: one})
+            require_kind("ElasticBody: material", _MATERIALS, **{name: one})
             if name not in groups:
                 raise MeshError(f"ElasticBody: material names '{name}', which is no group of cells "
                                 f"of the mesh{nearest(name, groups)}; its groups of cells are: "
@@ -242,7 +256,7 @@ class ElasticBody(Summarised):
         if self.dimension == 3:
             rows = self.stiffness_blocks.tocsr()
             return sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
-        if len(self.materials) > 1:
+        if not self.is_uniform:
             return sp.csc_array(self.thickness * self._assembled[0])
         # Three scalar forms of 9 x 9 pairs are much faster than one vector form of 18 x 18 pairs,
         # most of whose products are zero.
@@ -267,7 +281,12 @@ class ElasticBody(Summarised):
     def _assembled(self) -> tuple[Any, Any]:
         """Stiffness and mass of one component of a solid, or of a plane body 1 m thick."""
         _, lateral, shear = self.elasticity.T
-        return assembled(self.basis, lateral, shear, self.densities)
+        K, M = assembled(self.basis, lateral, shear, self.densities, self.anisotropic)
+        if self.has_incompatible_modes:
+            for cells in in_parts(np.arange(len(self.mesh.cells))):
+                lower = reductions(self, cells)
+                subtract(K, self.basis.element_dofs.T[cells], np.swapaxes(lower, 1, 2) @ lower)
+        return K, M
 
     @cached_property
     def component_mass(self) -> Any:
@@ -277,7 +296,7 @@ class ElasticBody(Summarised):
 
         if self.dimension == 3:
             return self._assembled[1]
-        if len(self.materials) > 1:
+        if not self.is_uniform:
             return sp.csr_array(self.thickness * self._assembled[1])
         scalar = BilinearForm(lambda u, v, w: u * v).assemble(self.basis)
         return sp.csr_array(0.5 * self.densities[0] * self.thickness * (scalar + scalar.T))
@@ -296,22 +315,73 @@ class ElasticBody(Summarised):
 
     @cached_property
     def material_gradients(self) -> list[tuple[Array, tuple[Any, ...]]]:
-        """Elastic constants (3,) of each material, and the part of its cells in ``gradients``."""
-        if len(self.materials) == 1:
+        """Elastic constants (3,) of each isotropic material, and its part of ``gradients``."""
+        if self.is_uniform:
             return [(self.elasticity[0], self.gradients)]
         return [(_elasticity(one, self.dimension, self.plane),
                  _nodal_gradients(self.basis, self.cell_materials == number))
-                for number, one in enumerate(self.materials)]
+                for number, one in enumerate(self.materials) if isinstance(one, Material)]
+
+    @property
+    def is_uniform(self) -> bool:
+        """True if the body has one material, which is isotropic."""
+        return len(self.materials) == 1 and isinstance(self.materials[0], Material)
+
+    @cached_property
+    def anisotropic(self) -> tuple[Array, Integers]:
+        """Stiffnesses (n, 6, 6) of anisotropic materials [Pa], and the number (M,) of each cell's.
+
+        Components are xx, yy, zz, xy, yz, xz; see
+        :meth:`fecontact.fem.AnisotropicMaterial.stiffness_at`. Isotropic cells have the number -1.
+        """
+        materials, number = self.cell_materials, np.full(len(self.mesh.cells), -1)
+        tensors = [np.empty((0, 6, 6))]
+        count = 0
+        for which, one in enumerate(self.materials):
+            if isinstance(one, Material):
+                continue
+            cells = np.flatnonzero(materials == which)
+            found = one.stiffness_at(self.cell_centres(cells), self.dimension, self.plane)
+            number[cells] = count + (np.arange(len(cells)) if len(found) > 1 else 0)
+            tensors.append(found)
+            count += len(found)
+        return np.concatenate(tensors), number
+
+    def cell_centres(self, cells: Integers) -> Array:
+        """Mean places (n, 3) of the corners of cells [m]; z is zero in a plane body."""
+        centres = np.zeros((len(cells), 3))
+        centres[:, : self.dimension] = self.mesh.nodes[self.mesh.cells[cells]].mean(axis=1)
+        return centres
+
+    @cached_property
+    def shear_moduli(self) -> Array:
+        """Least stiffness (M,) of each cell of a solid against shear along two axes [Pa]."""
+        tensors, number = self.anisotropic
+        least = np.append(tensors[:, [3, 4, 5], [3, 4, 5]].min(axis=1), 0.0)
+        return np.where(number < 0, self.elasticity[:, 2], least[number])
 
     @property
     def elasticity(self) -> Array:
         """Elastic constants (M, 3) of each cell [Pa].
 
         s_xx = first e_xx + second (e_yy + e_zz), s_xy = third g_xy. Those of a plane body hold
-        without e_zz.
+        without e_zz. Zero for anisotropic materials, see ``anisotropic``.
         """
         constants = [_elasticity(one, self.dimension, self.plane) for one in self.materials]
         return np.array(constants)[self.cell_materials]
+
+    def cell_stiffness(self, cells: Any = slice(None)) -> Array:
+        """Stiffness (n, 6, 6) of cells for xx, yy, zz, xy, yz, xz [Pa].
+
+        In a plane body rows and columns of zz, yz and xz have no meaning.
+        """
+        (direct, lateral, shear), (tensors, number) = self.elasticity[cells].T, self.anisotropic
+        number, axes = number[cells], np.arange(3)
+        found = np.zeros((len(number), 6, 6))
+        found[:, :3, :3] = lateral[:, None, None]
+        found[:, axes, axes], found[:, 3 + axes, 3 + axes] = direct[:, None], shear[:, None]
+        found[number >= 0] = tensors[number[number >= 0]]
+        return found
 
     @property
     def densities(self) -> Array:
@@ -435,7 +505,9 @@ class ElasticBody(Summarised):
         return np.column_stack([edges[:, 0], middle, edges[:, 1]])
 
 
-def _elasticity(material: Material, dimension: int, plane: str) -> Array:
+def _elasticity(material: AnyMaterial, dimension: int, plane: str) -> Array:
+    if not isinstance(material, Material):
+        return np.zeros(3)
     E, nu = material.youngs_modulus, material.poisson_ratio
     shear = E / (2.0 * (1.0 + nu))
     if dimension == 2 and plane == "stress":

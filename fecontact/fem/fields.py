@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from fecontact.core.checks import as_place
+from fecontact.core.errors import InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity, span
@@ -15,7 +16,18 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_geometry import facets_of, oriented_solids
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, numbered_rows
 from fecontact.fem.elements.refinement import PARTS
+from fecontact.fem.incompatible_modes import mode_gradients
 from fecontact.fem.interpolation import element_kind, interpolation
+from fecontact.fem.material import Material
+from fecontact.fem.material_axes import stress_rotation
+
+StressAxes = Literal["global", "material"]
+
+# Values of strains that are computed at once, and the entry of a rotation above which an axis is
+# not normal to a plane.
+_AT_ONCE, _TILTED = 1_000_000, 1e-9
+_PAIRS = {2: ((0, 0), (1, 1), (0, 1)),
+          3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
 
 
 @read_only_arrays
@@ -122,12 +134,24 @@ def _solid_cells(nodes: Array, elements: Integers) -> Integers:
     return oriented_solids(nodes, cells, kind)
 
 
-def stress_of(body: ElasticBody, displacements: Array) -> Array:
+def stress_of(
+    body: ElasticBody, displacements: Array, axes: StressAxes = "global"
+) -> Array:
     """Stresses (N, 4, m) of displacements (2 N, m), or (N, 6, m) of (3 N, m), at the nodes [Pa].
 
-    In the order xx, yy, zz, xy (, yz, xz); means over the adjacent elements.
+    In the order xx, yy, zz, xy (, yz, xz); means over the adjacent elements. With ``axes =
+    'material'`` anisotropic cells give the components 11, 22, 33, 12 (, 23, 13) in their axes.
+
+    Raises
+    ------
+    InputError
+        For material axes of a plane body of which none is normal to its plane.
     """
-    parts = []
+    require_choice("stress_of", "axes", axes, get_args(StressAxes))
+    chosen = np.flatnonzero((body.anisotropic[1] >= 0) | body.has_incompatible_modes)
+    parts = [_stress_by_cells(body, displacements, axes, chosen)] if len(chosen) else []
+    if len(chosen) == len(body.mesh.cells):
+        return parts[0]
     for constants, gradients in body.material_gradients:
         if body.dimension == 3:
             parts.append(_stress_in_space(constants, gradients, displacements))
@@ -139,6 +163,56 @@ def stress_of(body: ElasticBody, displacements: Array) -> Array:
         szz = lateral * (xx + yy) * (body.plane == "strain")
         parts.append(np.stack([sxx, syy, szz, shear * slide], axis=1))
     return parts[0] if len(parts) == 1 else np.asarray(np.sum(parts, axis=0))
+
+
+def _stress_by_cells(
+    body: ElasticBody, displacements: Array, axes: StressAxes, chosen: Integers
+) -> Array:
+    """Part of the chosen cells in the stresses, means over all elements at a node."""
+    import scipy.sparse as sp
+
+    basis, d = body.basis, body.dimension
+    components, used = (4, [0, 1, 3]) if d == 2 else (6, list(range(6)))
+    size = basis.dx.sum(axis=1)
+    members = basis.element_dofs.T
+    count, width = len(body.nodes), members.shape[1]
+    around = np.bincount(members.ravel(), np.repeat(size, width), minlength=count)
+    fields = displacements.reshape(count, d, -1)
+    total = np.zeros((count, components * fields.shape[2]))
+    local = basis.elem.doflocs.T
+    slopes = np.stack([basis.elem.gbasis(basis.mapping, local, i)[0].grad for i in range(width)])
+    blocks = 1 + len(chosen) * width * fields.shape[2] // _AT_ONCE
+    for cells in np.array_split(chosen, blocks):
+        # grad (e, n, i, j, m): derivative of displacement i in direction j at node n of the cell
+        grad = np.einsum("kjen,ekim->enijm", slopes[:, :, cells], fields[members[cells]])
+        if body.has_incompatible_modes:
+            grad += mode_gradients(body, cells, displacements, local.T)
+        strains = np.stack([grad[:, :, i, j] if i == j else grad[:, :, i, j] + grad[:, :, j, i]
+                            for i, j in _PAIRS[d]], axis=2)
+        of_strain = body.cell_stiffness(cells)[:, :components, used]
+        if axes == "material":
+            of_strain = _to_material_axes(body, cells, components) @ of_strain
+        stress = np.einsum("ers,ensm->enrm", of_strain, strains) * size[cells, None, None, None]
+        rows = members[cells].ravel()
+        gather = sp.csr_array((1.0 / around[rows], (rows, np.arange(len(rows)))),
+                              shape=(count, len(rows)))
+        total += gather @ stress.reshape(len(rows), -1)
+    return total.reshape(count, components, -1)
+
+
+def _to_material_axes(body: ElasticBody, cells: Integers, components: int) -> Array:
+    """Matrices (e, s, s) from stresses in x, y (, z) to the axes of the cells' materials."""
+    turn = np.empty((len(cells), 6, 6))
+    for which in np.unique(body.cell_materials[cells]):
+        one = body.materials[which]
+        inside = body.cell_materials[cells] == which
+        turn[inside] = np.eye(6) if isinstance(one, Material) else stress_rotation(
+            one.axes.at(body.cell_centres(cells[inside])))
+    lost = turn[:, components:, :components]
+    if np.abs(lost).max(initial=0.0) > _TILTED:
+        raise InputError("stress_of: axes = 'material' of a plane body are those of a material "
+                         "whose axis 3 is normal to the plane; give such axes, or take 'global'.")
+    return turn[:, :components, :components]
 
 
 def _stress_in_space(

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from fecontact.core.checks import as_floats, as_integers, require_kind
-from fecontact.core.errors import InputError, MeshError, choices, nearest
+from fecontact.core.errors import InputError, MeshError, choices, nearest, require_choice
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
@@ -25,7 +25,10 @@ from fecontact.fem.elements.cell_geometry import (
 )
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
 from fecontact.fem.elements.refinement import refined
-from fecontact.fem.material import Material
+from fecontact.fem.material import AnyMaterial
+
+# Eight-node bricks: trilinear displacements alone, or with incompatible modes of each cell.
+Bricks = Literal["full", "incompatible"]
 
 _FLAT = 1e-12  # area of a degenerate cell, relative to its squared sides
 
@@ -60,8 +63,10 @@ class Mesh(Summarised):
         default.
     cell_groups : mapping of name to (k,) integer array
         Numbers of cells, such as those of one material.
-    materials : mapping of name to Material
+    materials : mapping of name to Material or AnisotropicMaterial
         Materials of groups of cells that a file holds, for bodies of this mesh; none by default.
+    bricks : 'full' or 'incompatible'
+        Kind of the eight-node bricks of a file, for bodies of this mesh with ``degree = 1``.
 
     Raises
     ------
@@ -79,7 +84,8 @@ class Mesh(Summarised):
     curved_middles: Array | None = None
     constraints: Sequence[Constraint] = ()
     cell_groups: Mapping[str, Integers] = field(default_factory=dict)
-    materials: Mapping[str, Material] = field(default_factory=dict)
+    materials: Mapping[str, AnyMaterial] = field(default_factory=dict)
+    bricks: Bricks = "full"
 
     def __post_init__(self) -> None:
         nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
@@ -147,6 +153,7 @@ class Mesh(Summarised):
         require_kind("Mesh", Sequence, constraints=self.constraints)
         check_constraints(self.constraints, boundaries, points, dimension, len(nodes))
         object.__setattr__(self, "constraints", tuple(self.constraints))
+        require_choice("Mesh", "bricks", self.bricks, get_args(Bricks))
         require_kind("Mesh", Mapping, cell_groups=self.cell_groups, materials=self.materials)
         groups = {name: np.unique(as_integers(which, f"The cells of mesh group '{name}'"))
                   for name, which in self.cell_groups.items()}
@@ -284,7 +291,7 @@ class Mesh(Summarised):
                   for name, group in self.cell_groups.items()}
         constraints = [one.refined(self.middle_node) for one in self.constraints]
         return Mesh(nodes, cells, boundaries, self.points, curved, middles, constraints, groups,
-                    self.materials)
+                    self.materials, self.bricks)
 
     def middle_node(self, ends: tuple[int, int]) -> int:
         """Node in the middle of an edge in the refined mesh."""
@@ -333,9 +340,12 @@ class Mesh(Summarised):
         turn = _turn(float(angles)) if self.dimension == 2 else _turn_in_space(angles)
         nodes, middles = (places * signs @ turn.T + by
                           for places in (self.nodes, np.asarray(self.curved_middles)))
+        whole, arm = np.eye(3), np.zeros(3)
+        whole[:self.dimension, :self.dimension], arm[:self.dimension] = turn * signs, by
         return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles,
-                    [one.turned(turn * signs, by) for one in self.constraints],
-                    self.cell_groups, self.materials)
+                    [one.turned(turn * signs, by) for one in self.constraints], self.cell_groups,
+                    {name: one.moved(whole, arm) for name, one in self.materials.items()},
+                    self.bricks)
 
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""

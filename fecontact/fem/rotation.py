@@ -83,14 +83,13 @@ def stress_stiffness(body: ElasticBody, displacement: Array) -> Any:
     import scipy.sparse as sp
     from skfem import BilinearForm
 
-    # Of each cell, at all of its points.
-    direct, lateral, shear = body.elasticity.T[:, :, None]
+    stiffness = body.cell_stiffness()[:, [0, 1, 3]][:, :, [0, 1, 3]]
 
     def form(u: Any, v: Any, w: Any) -> Any:
         (xx, xy), (yx, yy) = w["x"].grad, w["y"].grad
-        along, across = direct * xx + lateral * yy, lateral * xx + direct * yy
+        along, across, slide = np.einsum("crs,scq->rcq", stiffness, np.array([xx, yy, xy + yx]))
         (ux, uy), (vx, vy) = u.grad, v.grad
-        return along * ux * vx + across * uy * vy + shear * (xy + yx) * (ux * vy + uy * vx)
+        return along * ux * vx + across * uy * vy + slide * (ux * vy + uy * vx)
 
     x, y = (body.basis.interpolate(displacement[axis::2]) for axis in range(2))
     one = BilinearForm(form).assemble(body.basis, x=x, y=y)

@@ -1,8 +1,8 @@
-"""Modal damping matrices from damping ratios, Rayleigh factors or a loss factor."""
+"""Modal damping matrices from damping ratios, Rayleigh factors or loss factors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, require_not_negative
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.reduction.eigenmodes import strain_energies
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,23 @@ class LossFactor:
         require_not_negative("LossFactor", loss_factor=self.loss_factor)
 
 
-Damping = float | Rayleigh | LossFactor | Sequence[float] | Array
+Damping = float | Rayleigh | LossFactor | Literal["materials"] | Sequence[float] | Array
+
+
+def material_damping_ratios(body: ElasticBody, shapes: Array) -> Array:
+    """Damping ratios (m,) of modes (d N, m) from the loss factors of a body's materials.
+
+    ``D_k = 1/2 sum_m eta_m E_mk / E_k`` with the elastic energy E_mk of mode k in the material m,
+    of E_k in all; zero of rigid modes (Johnson and Kienholz, AIAA Journal 20, 1982). As
+    :class:`LossFactor` it is right at the resonance of each mode only.
+    """
+    energies = np.zeros((len(body.materials), shapes.shape[1]))
+    for which in range(len(body.materials)):
+        cells = np.flatnonzero(body.cell_materials == which)
+        energies[which] = strain_energies(body, shapes, cells)
+    total = energies.sum(axis=0)
+    losses = np.array([one.loss_factor for one in body.materials])
+    return np.asarray(0.5 * losses @ energies / np.where(total > 0.0, total, 1.0))
 
 
 def modal_damping(

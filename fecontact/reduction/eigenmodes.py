@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
-from fecontact.core.records import Block, IntegerMatrix, Matrix, Vector
+from fecontact.core.records import Block, IntegerMatrix, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.equations import least_squares, selects
@@ -237,29 +237,34 @@ def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
             np.hstack([rigid, shapes * fixed_signs(shapes)]))
 
 
-def strain_energies(body: ElasticBody, shapes: Array) -> Array:
-    """Strain energies (m,) [J] of displacement fields (2 N, m), from the strains in the elements.
+def strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) -> Array:
+    """Strain energies (m,) [J] of displacement fields (d N, m), from the strains in the elements.
+
+    ``cells`` are the cells whose energy counts, all by default.
 
     The product with K would lose as many digits as the stiffest cells exceed the body as a whole,
     which may be all for a slender body with strongly graded cells.
     """
     if body.dimension == 3:
-        return solid_strain_energies(body, shapes)
+        return solid_strain_energies(body, shapes, cells)
     basis = body.basis
-    slopes = np.ascontiguousarray([function[0].grad for function in basis.basis])
+    slopes = np.ascontiguousarray(
+        np.array([function[0].grad for function in basis.basis])[:, :, cells])
     functions, _, elements, points = slopes.shape
     energies = np.empty(shapes.shape[1])
+    tensors, which_tensor = body.anisotropic
     _strain_energies(slopes.reshape(2 * functions, elements, points),
-                     np.ascontiguousarray(basis.dx),
-                     np.ascontiguousarray(basis.element_dofs.T, dtype=np.int64),
-                     np.ascontiguousarray(shapes), body.elasticity, energies)
+                     np.ascontiguousarray(basis.dx[cells]),
+                     np.ascontiguousarray(basis.element_dofs.T[cells], dtype=np.int64),
+                     np.ascontiguousarray(shapes), body.elasticity[cells], tensors,
+                     which_tensor[cells], energies)
     return energies * body.thickness
 
 
 @kernel
 def _strain_energies(
     slopes: Block, dx: Matrix, nodes: IntegerMatrix, shapes: Matrix, elasticity: Matrix,
-    energies: Vector,
+    tensors: Block, which_tensor: IntegerVector, energies: Vector,
 ) -> None:
     """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions in x and y."""
     elements, points = dx.shape
@@ -268,6 +273,7 @@ def _strain_energies(
     energies[:] = 0.0
     for e in range(elements):
         direct, lateral, shear = elasticity[e]
+        tensor = which_tensor[e]
         for p in range(points):
             strains[:] = 0.0
             for k in range(1, corners):
@@ -280,6 +286,15 @@ def _strain_energies(
                     strains[0, i] += x * along
                     strains[1, i] += y * across
                     strains[2, i] += y * along + x * across
+            if tensor >= 0:
+                for r in range(3):
+                    for s in range(3):
+                        # Component 2 of a stiffness is zz.
+                        stiffness = tensors[tensor, r + r // 2, s + s // 2]
+                        for i in range(modes):
+                            energies[i] += 0.5 * dx[e, p] * stiffness * (
+                                strains[r, i] * strains[s, i])
+                continue
             for i in range(modes):
                 xx, yy, xy = strains[0, i], strains[1, i], strains[2, i]
                 energies[i] += 0.5 * dx[e, p] * (

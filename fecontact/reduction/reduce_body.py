@@ -7,7 +7,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError, choices, nearest, require_finite, shown
+from fecontact.core.errors import (
+    InputError,
+    choices,
+    nearest,
+    require_choice,
+    require_finite,
+    shown,
+)
 from fecontact.core.tables import located
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
@@ -23,7 +30,13 @@ from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
 from fecontact.reduction.assembly.face_weld import FaceWeld
 from fecontact.reduction.assembly.links import Bushing, Link, Links, Weld
-from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
+from fecontact.reduction.damping import (
+    Damping,
+    LossFactor,
+    Rayleigh,
+    material_damping_ratios,
+    modal_damping,
+)
 from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
@@ -70,8 +83,8 @@ def modal_basis(
         Excitation and load point, "" for none. Default: the mesh's point of that name, if any.
     points : mapping of name to place, optional
         Further points. A place is a name, coordinates or a :class:`~fecontact.Patch`.
-    damping : float, (m,) sequence, Rayleigh, LossFactor or (m, m) array
-        See :func:`fecontact.reduction.damping.modal_damping`; the last ratio holds on.
+    damping : float, (m,) sequence, Rayleigh, LossFactor, 'materials' or (m, m) array
+        See :mod:`fecontact.reduction.damping`; the last ratio holds; 'materials': loss factors.
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Vibration modes alone; with residual vectors of forces at B, C and contact nodes, for exact
         static deflections there; or fixed-interface and constraint modes.
@@ -139,7 +152,10 @@ def modal_basis(
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
-    if not isinstance(damping, Rayleigh | LossFactor | float | int):
+    if isinstance(damping, str):
+        require_choice("modal_basis", "damping", damping, ("materials",))
+        damping = np.where(elastic, material_damping_ratios(body, shapes), 0.0)
+    elif not isinstance(damping, Rayleigh | LossFactor | float | int):
         given = as_floats(damping, "The damping")
         if given.shape == (modes,) and len(w) > modes:
             damping = np.append(given, np.full(len(w) - modes, given[-1]))

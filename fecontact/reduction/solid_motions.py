@@ -1,13 +1,23 @@
 """Rigid motions that supports and constraints allow, and strain energies of motions of solids."""
 
+from typing import Any
+
 import numpy as np
 
 from fecontact.core.compiled import kernel
-from fecontact.core.records import Array4, Block, IntegerMatrix, Matrix, Vector
+from fecontact.core.records import (
+    Array4,
+    Block,
+    IntegerMatrix,
+    IntegerVector,
+    Matrix,
+    Vector,
+)
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
 from fecontact.fem.equations import least_squares
+from fecontact.fem.incompatible_modes import in_parts, reductions
 
 # Elements whose strains are in memory at once.
 _AT_ONCE = 2000
@@ -71,14 +81,15 @@ def allowed_motions(body: ElasticBody, centre: Array) -> Array:
     return np.asarray(G @ (unknowns @ found))
 
 
-def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
-    """Strain energies (m,) [J] of displacements (3 N, m), from the strains in the elements."""
-    members = body.basis.element_dofs.T
+def solid_strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) -> Array:
+    """Strain energies (m,) [J] of displacements (3 N, m), from the strains in the ``cells``."""
+    members = body.basis.element_dofs.T[cells]
     local, weights = np.ascontiguousarray(body.basis.X.T), body.basis.W
     _, slopes = shape_functions(3, members.shape[1], local)
     straight = body.mesh.kind.corners
     geometry = slopes if body.curved else shape_functions(3, straight, local)[1]
-    constants = body.elasticity
+    constants, (tensors, which_tensor) = body.elasticity[cells], body.anisotropic
+    which_tensor = which_tensor[cells]
     fields = np.ascontiguousarray(shapes, dtype=float).reshape(len(body.nodes), 3, -1)
     energies = np.zeros(shapes.shape[1])
     for first in range(0, len(members), _AT_ONCE):
@@ -90,14 +101,21 @@ def solid_strain_energies(body: ElasticBody, shapes: Array) -> Array:
         gradients = np.einsum("qkj,eqji->eqki", slopes, np.linalg.inv(jacobian))
         _add_strain_energies(np.ascontiguousarray(gradients), volume,
                              np.ascontiguousarray(nodes, dtype=np.int64), fields,
-                             constants[first : first + _AT_ONCE], energies)
+                             constants[first : first + _AT_ONCE], tensors,
+                             which_tensor[first : first + _AT_ONCE], energies)
+    if body.has_incompatible_modes:
+        for part in in_parts(np.arange(len(body.mesh.cells))[cells]):
+            moved = fields[body.basis.element_dofs.T[part]]
+            # Subtract a node: rigid displacements may be much larger than differences.
+            moved = (moved - moved[:, :1]).reshape(len(part), 24, -1)
+            energies -= 0.5 * ((reductions(body, part) @ moved) ** 2).sum(axis=(0, 1))
     return energies
 
 
 @kernel
 def _add_strain_energies(
     gradients: Array4, volume: Matrix, nodes: IntegerMatrix, fields: Block, elasticity: Matrix,
-    energies: Vector,
+    tensors: Block, which_tensor: IntegerVector, energies: Vector,
 ) -> None:
     """Add the energies of some elements; gradients (e, q, k, 3) of their k shape functions."""
     elements, points = volume.shape
@@ -105,6 +123,7 @@ def _add_strain_energies(
     strains = np.empty((6, modes))
     for e in range(elements):
         direct, lateral, shear = elasticity[e]
+        tensor = which_tensor[e]
         first = nodes[e, 0]
         for q in range(points):
             strains[:] = 0.0
@@ -123,6 +142,13 @@ def _add_strain_energies(
                     strains[4, i] += z * v + y * w
                     strains[5, i] += z * u + x * w
             half = 0.5 * volume[e, q]
+            if tensor >= 0:
+                for r in range(6):
+                    for s in range(6):
+                        for i in range(modes):
+                            energies[i] += half * tensors[tensor, r, s] * (
+                                strains[r, i] * strains[s, i])
+                continue
             for i in range(modes):
                 xx, yy, zz = strains[0, i], strains[1, i], strains[2, i]
                 slides = strains[3, i] ** 2 + strains[4, i] ** 2 + strains[5, i] ** 2

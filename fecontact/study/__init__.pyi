@@ -2,6 +2,7 @@ from .bodies_section import BodyBasisSettings, BodySections, InterfaceSettings, 
 from .convergence import study_convergence
 from .geometry_section import MeshFile
 from .links_section import FaceWeldSettings
+from .materials_section import MaterialSettings
 from .preload_section import PreloadSettings
 from .sections import (
     BasisSettings,
@@ -21,6 +22,7 @@ __all__ = [
     "Distribution",
     "FaceWeldSettings",
     "InterfaceSettings",
+    "MaterialSettings",
     "MeshFile",
     "OutputSettings",
     "Placement",

@@ -17,7 +17,7 @@ from fecontact.core.tables import convert_fields, located, plain, shown
 from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.material import Material
+from fecontact.fem.material import AnyMaterial, Material
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
@@ -28,7 +28,9 @@ from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
+from fecontact.study.materials_section import MaterialSettings
 
+_MATERIAL_KEYS = ("material", "youngs_modulus", "poisson_ratio", "density")
 Place = str | Coordinates | Patch
 Support = Literal["x", "y", "xy", "z", "xz", "yz", "xyz", "hinge", "hinge_x", "hinge_y", "hinge_z"]
 
@@ -45,6 +47,9 @@ class BodySettings:
         given at all, the materials of the mesh file, or steel if it holds none.
     youngs_modulus, poisson_ratio, density : float, optional
         [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
+    materials : list of tables
+        ``[[body.materials]]``: materials of groups of cells, or an anisotropic one of the whole
+        body, in place of the keys above.
     thickness : float
         Out-of-plane thickness of a plane body [m]; required in plane stress, 1 m by default in
         plane strain; not for a solid.
@@ -52,6 +57,8 @@ class BodySettings:
         Plane stress for thin bodies, plane strain for long ones; not for a solid.
     degree : 1 or 2
         Polynomial degree of the finite elements.
+    bricks : 'full' or 'incompatible', optional
+        Of hexahedra with ``degree = 1``; by default as the mesh file gives them.
     fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or 'hinge'
         Supports on boundaries and points of the mesh: the directions that are held, or a hole
         that turns about its centre; 'hinge_x', 'hinge_y', 'hinge_z' name the axis in a solid.
@@ -63,9 +70,11 @@ class BodySettings:
     youngs_modulus: float | None = None
     poisson_ratio: float | None = None
     density: float | None = None
+    materials: tuple[MaterialSettings, ...] = ()
     thickness: Annotated[float | None, Unit("m")] = None
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
+    bricks: Literal["full", "incompatible"] | None = None
     fixed: Mapping[str, Support] = field(default_factory=dict)
     rotation: Rotation | None = None
 
@@ -75,6 +84,21 @@ class BodySettings:
             require_positive("BodySettings", thickness=self.thickness)
         with located("BodySettings:", "Material"):
             _ = self.elastic_material
+        self._check_materials()
+
+    def _check_materials(self) -> None:
+        """Refuse materials beside a single one, and several without or with the same cells."""
+        given = [key for key in _MATERIAL_KEYS if getattr(self, key) is not None]
+        if self.materials and given:
+            raise InputError(f"BodySettings: {choices(given)} and materials both describe the "
+                             f"material; give one of them.")
+        cells = [one.cells for one in self.materials]
+        if len(cells) > 1 and None in cells:
+            raise InputError(f"BodySettings: materials has {len(cells)} materials, one of them "
+                             f"without cells; name the group of cells of each.")
+        if twice := {name for name in cells if cells.count(name) > 1}:
+            raise InputError(f"BodySettings: materials names the cells {choices(map(str, twice))} "
+                             f"twice; give each group one material.")
 
     @property
     def depth(self) -> float:
@@ -82,8 +106,11 @@ class BodySettings:
         return 1.0 if self.thickness is None else self.thickness
 
     @property
-    def elastic_material(self) -> Material:
-        """Material described by the four material keys."""
+    def elastic_material(self) -> AnyMaterial | dict[str, AnyMaterial]:
+        """Material described by the four material keys, or those of groups of cells."""
+        if self.materials:
+            made = {one.cells: one.made for one in self.materials}
+            return made[None] if None in made else {f"{name}": one for name, one in made.items()}
         values = {"youngs_modulus": self.youngs_modulus, "poisson_ratio": self.poisson_ratio,
                   "density": self.density}
         given: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
@@ -110,10 +137,11 @@ class BodySettings:
             raise InputError("ElasticBody: the key 'thickness' is missing, the thickness of a "
                              "plane body in m; give it, or plane = \"strain\" for a slice of a "
                              "long part, 1 m thick.")
-        keys = (self.material, self.youngs_modulus, self.poisson_ratio, self.density)
-        of_mesh = mesh.materials and all(value is None for value in keys)
+        of_mesh = mesh.materials and not self.materials and all(
+            getattr(self, key) is None for key in _MATERIAL_KEYS)
         return ElasticBody(mesh, None if of_mesh else self.elastic_material, thickness=self.depth,
-                           plane=self.plane, degree=self.degree, fixed=self.fixed)
+                           plane=self.plane, degree=self.degree, fixed=self.fixed,
+                           bricks=self.bricks)
 
 
 @dataclass(frozen=True)
@@ -139,9 +167,9 @@ class BasisSettings:
         patch ``{at = name or place, radius = r}``.
     points : mapping of name to place
         Further points to observe.
-    damping : float, list, Rayleigh or LossFactor
+    damping : float, list, Rayleigh, LossFactor or 'materials'
         One damping ratio, one per mode, ``{mass_factor, stiffness_factor}`` or
-        ``{loss_factor}``.
+        ``{loss_factor}``; 'materials': that of the loss factors of the body's materials.
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Static shapes added to the vibration modes.
     tolerance : float
@@ -166,7 +194,7 @@ class BasisSettings:
     B: Place | None = None
     C: Place | None = None
     points: Mapping[str, Place] = field(default_factory=dict)
-    damping: float | tuple[float, ...] | Rayleigh | LossFactor = 0.0
+    damping: float | tuple[float, ...] | Rayleigh | LossFactor | Literal["materials"] = 0.0
     reduction: Literal["vibration", "residual", "craig-bampton"] = "vibration"
     tolerance: float = 0.1
     loads: tuple[Place, ...] = ()

@@ -123,8 +123,8 @@ def _too_far(system: ContactSystem, times: Array, states: Array) -> str | None:
     if basis.mode_shapes is not None:
         places = np.vstack([places, basis.mode_shapes.nodes])
     size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
-    # Masses without positions have no size to compare with.
-    if size == 0.0:
+    # Masses without positions have no size to compare with; a body may have no point that moves.
+    if size == 0.0 or not used.any():
         return None
     d = basis.dimension
     rows = basis.T[used, :d].reshape(-1, basis.modes).T
@@ -190,23 +190,29 @@ def _turned(system: ContactSystem, times: Array, states: Array) -> str | None:
 
 def _bodies(planned: PlannedBodies) -> Iterator[str]:
     """Size, material and thickness of the bodies."""
-    low, high = SIZES
     for name, body in planned.bodies.items():
         who = f"body '{name}'" if name else "the body"
+        yield from implausible_body(who, body)
         size = float(np.ptp(body.mesh.nodes, axis=0).max())
-        if not low <= size <= high:
-            yield (f"{who} has an extent of {size:.3g} m, not from {low:g} to {high:g} m; check "
-                   f"the unit of lengths, and give a mesh in mm the scale 1e-3.")
-        for key, value, (least, most), unit in (
-                check for material in body.materials for check in (
-                    ("youngs_modulus", material.youngs_modulus, MODULI, "Pa"),
-                    ("density", material.density, DENSITIES, "kg/m3"))):
-            if not least <= value <= most:
-                yield (f"{key} = {value:.3g} {unit} of {who} is not from {least:g} to {most:g} "
-                       f"{unit}; check its unit.")
         if body.dimension == 2 and body.plane == "stress" and body.thickness > size:
             yield (f"thickness = {body.thickness:.3g} m of {who} is more than its extent of "
                    f"{size:.3g} m; check its unit, or take plane = \"strain\".")
+
+
+def implausible_body(who: str, body: ElasticBody) -> Iterator[str]:
+    """Messages about the size and the materials of a body, which they call ``who``."""
+    low, high = SIZES
+    size = float(np.ptp(body.mesh.nodes, axis=0).max())
+    if not low <= size <= high:
+        yield (f"{who} has an extent of {size:.3g} m, not from {low:g} to {high:g} m; check "
+               f"the unit of lengths, and give a mesh in mm the scale 1e-3.")
+    for key, value, (least, most), unit in (
+            check for material in body.materials for check in (
+                *(("youngs_modulus", one, MODULI, "Pa") for one in material.youngs_moduli),
+                ("density", material.density, DENSITIES, "kg/m3"))):
+        if not least <= value <= most:
+            yield (f"{key} = {value:.3g} {unit} of {who} is not from {least:g} to {most:g} "
+                   f"{unit}; check its unit.")
 
 
 def _chords(planned: PlannedBodies) -> Iterator[str]:

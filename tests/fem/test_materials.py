@@ -17,7 +17,9 @@ from fecontact import (
     ModelWarning,
     Study,
     modal_basis,
+    read_mesh,
     static_solution,
+    write_mesh,
 )
 from fecontact.reduction import eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import strain_energies
@@ -168,6 +170,28 @@ def test_studies_take_the_materials_of_the_file_unless_they_give_one(tmp_path):
                                     2700.0 * np.prod(SIZE)])
 
 
+def test_written_meshes_keep_their_groups_of_cells(tmp_path):
+    """Overlapping groups, cells of no group, and a group of the name of all cells."""
+    for mesh in MESHES.values():
+        x = mesh.nodes[mesh.cells].mean(axis=1)[:, 0]
+        groups = {"near": x < 0.06, "far": x > 0.03, "body": x < 0.02, "first": x == x.min()}
+        made = Mesh(mesh.nodes, mesh.cells, mesh.boundaries, cell_groups={
+            name: np.flatnonzero(held) for name, held in groups.items()})
+        write_mesh(made, tmp_path / "a.msh")
+        again = read_mesh(tmp_path / "a.msh")
+        assert again.cell_groups.keys() == groups.keys()
+        for name, held in groups.items():
+            rows = (np.sort(one.cells[one.cell_groups[name]], axis=1) for one in (made, again))
+            assert len({tuple(map(tuple, np.unique(each, axis=0))) for each in rows}) == 1
+            assert len(again.cell_groups[name]) == held.sum()
+
+
+def test_written_meshes_lose_incompatible_modes_with_a_warning(tmp_path):
+    mesh = MESHES["hexahedra"]
+    with pytest.warns(ModelWarning, match=r"cannot store the incompatible modes of its bricks; gi"):
+        write_mesh(Mesh(mesh.nodes, mesh.cells, bricks="incompatible"), tmp_path / "a.msh")
+
+
 # Bad input --------------------------------------------------------------------------------------
 
 
@@ -188,11 +212,12 @@ def test_bad_sections_are_refused(tmp_path, sections, message):
 @pytest.mark.parametrize("change", [
     ("*DENSITY\n7850.\n", ""),
     ("*ELASTIC\n2.1e11, 0.3\n", "*ELASTIC, TYPE=ORTHO\n1,1,1,1,1,1,1,1\n"),
+    ("*ELASTIC\n2.1e11, 0.3\n", ""),
     ("2.1e11, 0.3\n", "2.1e11, 0.3, 20\n2.0e11, 0.3, 200\n")])
 def test_materials_that_are_not_read_are_warned_of(tmp_path, change):
     text = deck_of(MESHES["tetrahedra"], MATERIALS.replace(*change) + SECTIONS)
-    with pytest.warns(ModelWarning, match=r"a\.inp: the material 'steel' has not one line of isotro"
-                                          r".*; give material to the body\.$"):
+    with pytest.warns(ModelWarning, match=r"a\.inp: the material 'steel' has not one set of "
+                                          r"constants .*; give material to the body\.$"):
         assert read(tmp_path, text).materials == {}
 
 
@@ -202,7 +227,7 @@ def test_materials_that_are_not_read_are_warned_of(tmp_path, change):
     ({"near": STEEL, "for": STEEL}, r"material names 'for', which is no group of cells of the mesh "
                                     r"\(did you mean 'far'\?\); its groups of cells are: "),
     ({"near": STEEL, "far": STEEL, "all": STEEL}, r"material gives cells of 'all' a second one"),
-    ({"near": "steel", "far": STEEL}, r"near must be a Material, not str"),
+    ({"near": "steel", "far": STEEL}, r"near must be a Material or .*, not str"),
 ])
 def test_bad_materials_are_refused(material, message):
     mesh = MESHES["tetrahedra"]

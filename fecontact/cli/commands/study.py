@@ -1,4 +1,4 @@
-"""Commands that work on a study: ``init``, ``mesh``, ``modes``, ``run``, ``wear``."""
+"""Commands that work on a study: ``init``, ``import``, ``mesh``, ``modes``, ``run``, ``wear``."""
 
 import os
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, show
+from fecontact.cli.console import INTERRUPTED, echo, echo_written, fail, note, show
 from fecontact.cli.options import All, Changes, Folder, StudyFile
 from fecontact.core.errors import InputError
 
@@ -26,9 +26,21 @@ def init(
     = False,
 ) -> None:
     """Write a commented study file to start from."""
-    from fecontact.cli.run_files import require_short
     from fecontact.cli.templates import template
-    from fecontact.core.files.atomic_write import require_possible, write_text
+    from fecontact.core.files.atomic_write import write_text
+
+    _require_new(file, force)
+    write_text(file, template(shape))
+    following = {"mesh": "put your mesh beside it as part.msh, or change its name there; then: "
+                         "fecontact mesh", "sweep": "next: fecontact sweep",
+                 "response": "next: fecontact response"}
+    echo(f"{file} is written; {following.get(shape, 'next: fecontact run')} {file}")
+
+
+def _require_new(file: Path, force: bool) -> None:
+    """Refuse a name that no study can have, and an existing file unless ``force``."""
+    from fecontact.cli.run_files import require_short
+    from fecontact.core.files.atomic_write import require_possible
 
     require_possible(file)
     if file.suffix.lower() != ".toml":
@@ -37,11 +49,42 @@ def init(
     # Resolve the path: none/../study.toml exists as soon as the folder of the new file is made.
     if (os.path.lexists(file) or file.resolve().exists()) and not force:
         raise InputError(f"{file} exists; choose another name, or replace it with --force.")
-    write_text(file, template(shape))
-    following = {"mesh": "put your mesh beside it as part.msh, or change its name there; then: "
-                         "fecontact mesh", "sweep": "next: fecontact sweep",
-                 "response": "next: fecontact response"}
-    echo(f"{file} is written; {following.get(shape, 'next: fecontact run')} {file}")
+
+
+def import_(
+    file: Annotated[Path, Parameter(help="Mesh file: an Abaqus or CalculiX deck (.inp), Gmsh, "
+                                         "Nastran, MED, VTK.")],
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help=(
+        "Study file to write; none by default."))] = None,
+    scale: Annotated[float, Parameter(help="Metres per unit of the file: 0.001 for mm.")] = 1.0,
+    force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing study file.")]
+    = False,
+) -> None:
+    """Show what a mesh file holds, and write a study with the interfaces that it suggests.
+
+    Bodies, materials, surfaces, ties, couplings and equations are read; loads, supports, contact
+    and other keywords of a deck are listed. Surfaces of different bodies that face each other
+    become interfaces with laws to be replaced.
+    """
+    from fecontact.cli.console import waiting
+    from fecontact.cli.tables import table
+    from fecontact.core.files.atomic_write import write_text
+    from fecontact.study.imported import imported
+
+    if output is not None:
+        _require_new(output, force)
+    with waiting("Reading the mesh"):
+        found = imported(file, scale)
+    show(table("", "", rows=found.summary()))
+    for sentence in found.notes:
+        note(f"note: {sentence}")
+    if output is None:
+        echo(f"next: fecontact import {file} -o study.toml")
+        return
+    write_text(output, found.toml(output.parent))
+    echo(f"{output} is written; next: fecontact mesh {output}")
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:

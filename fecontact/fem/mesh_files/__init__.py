@@ -75,31 +75,64 @@ def read_mesh(
         faces or node.
     """
     path = as_path(path, "a mesh")
+    with _located(path, scale):
+        return _mesh(_raw(path).part(part), scale, boundaries or {}, points or {})
+
+
+def read_bodies(path: str | Path, *, scale: float = 1.0) -> dict[str, Mesh]:
+    """Meshes of all parts of a file that are bodies of their own, or of the one body, named "".
+
+    Parameters
+    ----------
+    path, scale
+        As of :func:`read_mesh`.
+
+    Raises
+    ------
+    InputError, MeshError
+        As :func:`read_mesh`.
+    """
+    path = as_path(path, "a mesh")
+    with _located(path, scale):
+        raw = _raw(path)
+        names = list(raw.parts) if raw.separate else [""]
+        return {name: _mesh(raw.part(name or None), scale, {}, {}) for name in names}
+
+
+@contextlib.contextmanager
+def _located(path: Path, scale: float) -> Iterator[None]:
+    """Begin messages with the file; InputError for a scale that is none."""
     if not (isinstance(scale, Real) and 0.0 < scale < np.inf):
         raise InputError(f"{path}: scale = {scale!r} (metres per unit of the file) must be a "
                          f"finite number above zero.")
-    reader, format_name = _reader(path)
+    _reader(path)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     require_regular_file(path, "a mesh")
     try:
-        mesh, groups = body_mesh(_read(reader, path, format_name).part(part), scale)
-        return Mesh(mesh.nodes, mesh.cells,
-                    named_boundaries(mesh, groups, boundaries or {}),
-                    named_points(mesh, groups, points or {}),
-                    mesh.curved_edges, mesh.curved_middles,
-                    named_constraints(groups, boundaries or {}, points or {}),
-                    mesh.cell_groups, groups.materials)
+        yield
     except (MeshError, InputError) as error:
         raise type(error)(f"{path}: {error}") from None
 
 
-def write_mesh(mesh: Mesh, path: str | Path) -> None:
-    """Write a mesh as Gmsh 4.1 text, boundaries and points as physical groups.
+def _mesh(
+    raw: RawMesh, scale: float, boundaries: Mapping[str, str | Box],
+    points: Mapping[str, str | Coordinates],
+) -> Mesh:
+    """Mesh of the contents of a file, with the names of its groups and those given."""
+    mesh, groups = body_mesh(raw, scale)
+    return Mesh(mesh.nodes, mesh.cells, named_boundaries(mesh, groups, boundaries),
+                named_points(mesh, groups, points), mesh.curved_edges, mesh.curved_middles,
+                named_constraints(groups, boundaries, points), mesh.cell_groups, groups.materials,
+                mesh.bricks)
 
-    Coordinates are written with all digits, so that :func:`read_mesh` restores the same mesh, but
-    for groups of cells, and for constraints and materials, of which a warning tells. The file is
-    written whole or not at all.
+
+def write_mesh(mesh: Mesh, path: str | Path) -> None:
+    """Write a mesh as Gmsh 4.1 text, its groups as physical groups.
+
+    Coordinates are written with all digits, so that :func:`read_mesh` restores the same mesh, with
+    the cells of each group together, but for constraints, materials and incompatible modes of
+    bricks, of which a warning tells. The file is written whole or not at all.
 
     Raises
     ------
@@ -112,11 +145,12 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
     if path.suffix.lower() != ".msh":
         raise InputError(f"{path}: meshes are written as Gmsh files; choose a name that ends in "
                          f".msh.")
-    for name in (*mesh.boundaries, *mesh.points):
+    for name in (*mesh.boundaries, *mesh.points, *mesh.cell_groups):
         if not name.strip() or '"' in name or "\n" in name:
             raise InputError(f"{path}: Gmsh cannot store a group named {name!r}; rename it.")
     lost = [counted(mesh.constraints)] * bool(mesh.constraints)
     lost += [f"the materials of {choices(mesh.materials)}"] * bool(mesh.materials)
+    lost += ["the incompatible modes of its bricks"] * (mesh.bricks == "incompatible")
     if lost:
         warnings.warn(f"{path}: Gmsh cannot store {' and '.join(lost)}; give them to the body "
                       f"anew.", ModelWarning, stacklevel=2)
@@ -192,10 +226,12 @@ def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
     return readers[path.suffix.lower()]
 
 
-def _read(reader: Callable[[Path], RawMesh], path: Path, format_name: str) -> RawMesh:
+def _raw(path: Path) -> RawMesh:
+    """Contents of a mesh file."""
+    reader, format_name = _reader(path)
     try:
         return reader(path)
-    except MeshError:
+    except (MeshError, InputError):
         raise
     except MemoryError:
         raise MeshError(f"The file declares more data than fits into memory, of which "

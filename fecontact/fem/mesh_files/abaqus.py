@@ -6,6 +6,7 @@ sets named on *ELEMENT, surfaces, local coordinate systems, displaced instances 
 
 import re
 import warnings
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,8 +19,10 @@ from fecontact.core.checks import whole_number
 from fecontact.core.errors import MeshError, ModelWarning, choices, nearest, shown
 from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint, LinearEquation
+from fecontact.fem.material import AnisotropicMaterial, AnyMaterial
 from fecontact.fem.mesh_files.abaqus_constraints import READ, Block, Names, constraints_of
 from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
+from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
 _PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
@@ -117,7 +120,9 @@ def read_inp(path: Path) -> RawMesh:
                       f"has none of their stiffness or mass, so give supports, links and welds "
                       f"beside it.", ModelWarning, stacklevel=4)
     joined.constraints = constraints
-    joined.materials, unread = assembly.section_materials()
+    if any(re.match("C3D8[IR]", name) for body in bodies for name in body.part.element_types):
+        joined.bricks = "incompatible"
+    joined.materials, unread = assembly.section_materials(bodies)
     for one in unread:
         warnings.warn(f"{path}: {one}, so that no material of the file is taken; give material to "
                       f"the body.", ModelWarning, stacklevel=4)
@@ -318,7 +323,7 @@ def _cartesian(places: Array, system: str) -> Array:
     return np.column_stack([r * np.cos(theta), r * np.sin(theta), z])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Placement:
     """A translation, and then a rotation about an axis through two points [degrees]."""
 
@@ -342,6 +347,12 @@ class _Placement:
         moves = any(values) or degrees % 360.0
         return cls(_place(values), first, axis / (length or 1.0), degrees) if moves else None
 
+    @property
+    def matrix(self) -> tuple[Array, Array]:
+        """Rotation (3, 3) and shift (3,): places are ``matrix @ place + shift``."""
+        shift = self.moved(np.zeros((1, 3)))[0]
+        return (self.moved(np.eye(3)) - shift).T, shift
+
     def moved(self, places: Array) -> Array:
         arms = places + self.shift - self.first
         angle = np.radians(self.degrees)
@@ -362,7 +373,8 @@ class _Assembly:
         self.constraints: list[Block] = []
         self.unsorted: set[str] = set()
         self.sections: list[tuple[_Part | None, Options]] = []
-        self.materials: dict[str, dict[str, list[str]]] = {}
+        self.materials: dict[str, dict[str, Given]] = {}
+        self.orientations: dict[str, Given] = {}
 
     def add(self, keyword: str, options: Options, lines: list[str]) -> None:
         part = self.current
@@ -393,9 +405,10 @@ class _Assembly:
                 self.sections.append((part, options))
             case "MATERIAL":
                 self.materials[options["NAME"].upper()] = {}
-            case "ELASTIC" | "DENSITY" if self.materials:
-                name = f"{keyword} {options.get('TYPE', '').upper()}".strip()
-                self.materials[next(reversed(self.materials))][name] = lines
+            case "ORIENTATION":
+                self.orientations[options["NAME"].upper()] = options, lines
+            case "ELASTIC" | "DENSITY" | "DAMPING" if self.materials:
+                self.materials[next(reversed(self.materials))][keyword] = options, lines
             case _ if keyword in READ:
                 self.constraints.append((keyword, options, lines))
             case _ if keyword in _GENERATING:
@@ -422,15 +435,18 @@ class _Assembly:
                 one.title = self.parts[key].name
         return [one for one in found if one.part.node_blocks and one.part.element_blocks]
 
-    def section_materials(self) -> tuple[dict[str, tuple[float, float, float]], list[str]]:
-        """E, nu and density of the element sets of sections, in units of the file, and what lacks.
+    def section_materials(
+        self, bodies: "list[_Instance]"
+    ) -> tuple[dict[str, AnyMaterial], list[str]]:
+        """Materials of the element sets of sections, in units of the file, and what lacks.
 
         Raises
         ------
-        MeshError
-            For a section without a set or a material, or with one that the file does not hold.
+        InputError, MeshError
+            For a section without a set or a material, or with one that the file does not hold, and
+            constants that are not admissible.
         """
-        found: dict[str, tuple[float, float, float]] = {}
+        found: dict[str, AnyMaterial] = {}
         for part, options in self.sections:
             name, wanted = options.get("ELSET", ""), options.get("MATERIAL", "")
             if not name or not wanted:
@@ -440,16 +456,32 @@ class _Assembly:
                 raise MeshError(f"The section of '{name}' names the material '{wanted}', which the "
                                 f"file does not hold{nearest(wanted.upper(), self.materials)}; its "
                                 f"materials are: {choices(self.materials)}.")
-            given = self.materials[wanted.upper()]
-            kinds = ("ELASTIC", "ELASTIC ISOTROPIC", "ELASTIC ISO")
-            elastic = next((given[kind] for kind in kinds if kind in given), None)
-            density = given.get("DENSITY")
-            if elastic is None or density is None or len(elastic) != 1 or len(density) != 1:
-                return {}, [f"the material '{wanted}' has not one line of isotropic *ELASTIC data "
-                            f"and one of *DENSITY"]
-            E, nu, *_ = *_values(elastic[0]), 0.0, 0.0
-            found[self._set_name(part, name)] = E, nu, _values(density[0])[0]
+            made = material(wanted, self.materials[wanted.upper()])
+            if isinstance(made, AnisotropicMaterial):
+                made = self._oriented(made, part, options.get("ORIENTATION", ""), name, bodies)
+            if isinstance(made, str):
+                return {}, [made]
+            found[self._set_name(part, name)] = made
         return found, []
+
+    def _oriented(
+        self, made: AnisotropicMaterial, part: "_Part | None", wanted: str, name: str,
+        bodies: "list[_Instance]",
+    ) -> AnisotropicMaterial | str:
+        """Material of a section in its orientation, placed as its part; or what is not read."""
+        if wanted:
+            axes = orientation(wanted, self.orientations)
+            if isinstance(axes, str):
+                return axes
+            made = replace(made, axes=axes)
+        own = [one for one in bodies if part is not None and (
+            one.part is part or self.parts.get(one.source) is part)]
+        placements = {one.placement for one in own}
+        if len(placements) > 1:
+            return (f"the section of '{name}' has a material with axes, and its part has instances "
+                    f"in different places")
+        placement = next(iter(placements), None)
+        return made if placement is None else made.moved(*placement.matrix)
 
     def _set_name(self, part: "_Part | None", name: str) -> str:
         """Spelling of the name of an element set where it is made."""
@@ -481,7 +513,8 @@ class _Assembly:
         self.current = replace(
             part, system=None, node_blocks=[*part.node_blocks],
             element_blocks=[*part.element_blocks], other_elements=[*part.other_elements],
-            other_nodes=[*part.other_nodes], sets=part.sets.copy())
+            other_nodes=[*part.other_nodes], sets=part.sets.copy(),
+            element_types=part.element_types.copy())
         self.instances.append(_Instance(name, self.current, _Placement.read(lines, name),
                                         source if held else ""))
 
@@ -537,6 +570,7 @@ class _Part:
     other_nodes: list[int] = field(default_factory=list)
     sets: _Sets = field(default_factory=_Sets)
     system: tuple[Array, Array] | None = None
+    element_types: Counter[str] = field(default_factory=Counter)
 
     @property
     def unused_nodes(self) -> int:
@@ -580,6 +614,7 @@ class _Part:
             raise MeshError(f"The file has elements {options['TYPE']} of another number of nodes "
                             f"than {count - 1}.")
         rows = numbers.reshape(-1, count)
+        self.element_types[options["TYPE"].upper()] += len(rows)
         if lines:
             self.element_blocks.append((kind, rows[:, 0], rows[:, 1:]))
         if "ELSET" in options:

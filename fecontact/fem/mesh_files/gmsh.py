@@ -224,9 +224,10 @@ _EDGES = {
 
 
 def write_msh(mesh: Mesh, stream: TextIO) -> None:
-    """Write a mesh as Gmsh 4.1 text: groups are physical groups, the cells the group ``body``.
+    """Write a mesh as Gmsh 4.1 text: groups are physical groups, all cells the group ``body``.
 
-    Meshes with curved edges are written with elements of second order.
+    Cells of the same groups stand together, in their order. Meshes with curved edges are written
+    with elements of second order.
     """
     group_names = sorted({*mesh.points, *mesh.boundaries})
     number = {name: k for k, name in enumerate(group_names, start=1)}
@@ -245,25 +246,34 @@ def write_msh(mesh: Mesh, stream: TextIO) -> None:
     for key, owners in sides.items():
         groups.setdefault(tuple(owners), []).append(first[key])
 
+    # All cells are one more group, unless a group has its name.
+    bodies = {"body": np.arange(len(mesh.cells)), **mesh.cell_groups}
+    member = np.zeros((len(mesh.cells), len(bodies)), bool)
+    for column, held in enumerate(bodies.values()):
+        member[held, column] = True
+    owners_of, block = np.unique(member, axis=0, return_inverse=True)
+    block = block.ravel()
+    tags = [[int(column) + 1 for column in np.flatnonzero(row)] for row in owners_of]
+
     def lines(rows: list[Any]) -> None:
         stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows)
 
     d = mesh.dimension
     names = [(0, number[name], name) for name in mesh.points]
     names += [(d - 1, number[name], name) for name in mesh.boundaries]
-    names += [(d, 1, "body")]
+    names += [(d, tag, name) for tag, name in enumerate(bodies, start=1)]
     stream.write(f"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n{len(names)}\n")
     stream.writelines(f'{dimension} {tag} "{name}"\n' for dimension, tag, name in sorted(names))
     stream.write("$EndPhysicalNames\n$Entities\n")
     flat = [0.0] * (3 - d)
     box = [*mesh.nodes.min(axis=0).tolist(), *flat, *mesh.nodes.max(axis=0).tolist(), *flat]
     counts = [len(vertices), 0, 0, 0]
-    counts[d - 1], counts[d] = len(groups), 1
+    counts[d - 1], counts[d] = len(groups), len(tags)
     lines([counts])
     lines([(tag, *mesh.nodes[node].tolist(), *flat, len(owners), *owners)
            for tag, (node, owners) in enumerate(vertices.items(), start=1)])
     lines([(tag, *box, len(owners), *owners, 0) for tag, owners in enumerate(groups, start=1)])
-    lines([(1, *box, 1, 1, 0)])
+    lines([(entity, *box, len(owned), *owned, 0) for entity, owned in enumerate(tags, start=1)])
     places = _with_middles(mesh)
     count = len(places)
     stream.write(f"$EndEntities\n$Nodes\n1 {count} 1 {count}\n{d} 1 0 {count}\n")
@@ -274,7 +284,8 @@ def write_msh(mesh: Mesh, stream: TextIO) -> None:
         (0, tag, 15, [(node,)]) for tag, node in enumerate(vertices, start=1)]
     blocks += [(d - 1, tag, *_elements(mesh, np.array(rows), d - 1))
                for tag, rows in enumerate(groups.values(), start=1)]
-    blocks += [(d, 1, *_elements(mesh, mesh.cells, d))]
+    blocks += [(d, entity + 1, *_elements(mesh, mesh.cells[block == entity], d))
+               for entity in range(len(tags))]
     total = sum(len(rows) for *_, rows in blocks)
     stream.write(f"$EndNodes\n$Elements\n{len(blocks)} {total} 1 {total}\n")
     tag = 0

@@ -9,8 +9,8 @@ from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
-from fecontact.fem.material import Material
-from fecontact.fem.mesh import Mesh
+from fecontact.fem.material import AnyMaterial
+from fecontact.fem.mesh import Bricks, Mesh
 from fecontact.fem.mesh_files.cut_cells import (
     PYRAMID,
     SHAPES,
@@ -69,8 +69,10 @@ class RawMesh:
         Name of the part that was chosen, if any.
     cell_sets : mapping as ``parts``
         Further groups of elements, of which none is a body.
-    materials : mapping of name to (E, nu, rho)
+    materials : mapping of name to Material or AnisotropicMaterial
         Materials of groups of elements in the unit of the file, with forces in N.
+    bricks : 'full' or 'incompatible'
+        Kind of the eight-node bricks.
     """
 
     points: Array
@@ -85,7 +87,8 @@ class RawMesh:
     apart: bool = False
     chosen: str = ""
     cell_sets: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
-    materials: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    materials: dict[str, AnyMaterial] = field(default_factory=dict)
+    bricks: Bricks = "full"
 
     def part(self, name: str | None) -> "RawMesh":
         """The elements of one part, with the groups of the file; all elements for None.
@@ -149,7 +152,7 @@ class Groups:
     empty: tuple[str, ...]
     cells: tuple[str, ...] = ()
     constraints: tuple[Constraint, ...] = ()
-    materials: dict[str, Material] = field(default_factory=dict)
+    materials: dict[str, AnyMaterial] = field(default_factory=dict)
 
 
 def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
@@ -215,10 +218,10 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     kept = np.sort(distinct)
     regions = _cell_groups(raw, points, number, cells[kept])
     mesh = Mesh(points[used], cells[kept], {}, {}, ends[once], middles[once],
-                cell_groups=regions)
+                cell_groups=regions, bricks=raw.bricks)
     groups = replace(_groups(raw, mesh, number), materials={
-        name: Material(E / scale**2, nu, rho / scale**4) for name in regions
-        for of, (E, nu, rho) in raw.materials.items() if name == of or name.endswith(f".{of}")})
+        name: one.scaled(scale) for name in regions for of, one in raw.materials.items()
+        if name == of or name.endswith(f".{of}")})
     if not raw.constraints:
         return mesh, groups
     middles_of: dict[int, tuple[int, int]] = {}

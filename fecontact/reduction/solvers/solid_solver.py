@@ -22,11 +22,11 @@ from fecontact.reduction.solvers.multigrid import Multigrid, multigrid
 
 Eigensolver = Literal["auto", "direct", "iterative"]
 
-# Unknowns below which factors are cheap, the aspect ratio of cells and Poisson's ratio above which
-# multigrid converges slowly.
+# Unknowns below which factors are cheap, the aspect ratio of cells and the ratio of eigenvalues of
+# the material's stiffness (that of Poisson's ratio 0.45) above which multigrid converges slowly.
 _FEW = 20_000
 _STRETCHED = 5.0
-_INCOMPRESSIBLE = 0.45
+_INCOMPRESSIBLE = 14.5 * (1.0 + 1e-12)
 
 # Largest energy norm of the residuals of modes.
 _MODES = 1e-6
@@ -41,11 +41,12 @@ _SINGLE = 1e-3
 def suited(body: ElasticBody) -> bool:
     """Whether the iterative solver is the better one for a body.
 
-    It is not for small and plane bodies, hinges, constraints, nearly incompressible material, and
-    where a tenth of the cells are longer than five times their width, as in thin plates.
+    It is not for small and plane bodies, hinges, constraints, nearly incompressible or strongly
+    anisotropic material, and where a tenth of the cells are longer than five times their width, as
+    in thin plates.
     """
     return (possible(body) and 3 * len(body.nodes) >= _FEW
-            and max(one.poisson_ratio for one in body.materials) <= _INCOMPRESSIBLE
+            and max(one.stiffness_ratio for one in body.materials) <= _INCOMPRESSIBLE
             and float(np.quantile(aspect_ratios(body), 0.9)) <= _STRETCHED)
 
 
@@ -101,12 +102,12 @@ class SolidSolver:
         triangle = np.linalg.cholesky(motions.T @ moved)
         gauge = np.linalg.solve(triangle, np.asarray(K @ motions).T).T
         # A part of the mass makes K positive definite, too small to matter beside elastic modes.
-        speeds = body.elasticity[:, 2] / body.densities
+        speeds = body.shear_moduli / body.densities
         waves = float(speeds.min()) * (np.pi / body.mesh.extent) ** 2
         shift = 0.02 * waves if rigid else 0.0
         moving = moving_components(body)
         held = held_matrix(K, moving)
-        coarse = replace(body, degree=1) if body.degree == 2 else body
+        coarse = replace(body, degree=1, bricks="full") if body.degree == 2 else body
         coarse_moving = moving_components(coarse)
         coarse_matrix = shifted(held_matrix(coarse.stiffness_blocks, coarse_moving),
                                 coarse.component_mass, shift)

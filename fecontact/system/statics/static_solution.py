@@ -9,7 +9,7 @@ from fecontact.core.errors import AnalysisError, InputError, choices, require_fi
 from fecontact.core.types import Array, Coordinates
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.fields import BodyFields, body_elements, stress_of
+from fecontact.fem.fields import BodyFields, StressAxes, body_elements, stress_of
 from fecontact.fem.points import Place, place_rows
 from fecontact.laws.excitation import BOUNDARY_STRESSES, Load
 from fecontact.laws.signals.base import Signal
@@ -25,6 +25,7 @@ def static_solution(
     *,
     points: Mapping[str, Place] | None = None,
     time: float = 0.0,
+    stress_axes: StressAxes = "global",
 ) -> BodyFields:
     """Displacement and stress of a body at rest under loads, ``K u = f`` with its supports.
 
@@ -43,6 +44,8 @@ def static_solution(
         Further names of points, as for :func:`~fecontact.modal_basis`, 'C' among them.
     time : float
         [s]
+    stress_axes : 'global' or 'material'
+        Axes of the stresses in anisotropic materials: x, y, z or those of the material.
 
     Raises
     ------
@@ -60,7 +63,7 @@ def static_solution(
     _require_balance(body, system, force)
     u = np.asarray(body.expansion @ system.deflection(force))
     return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension),
-                      stress_of(body, u[:, None])[:, :, 0])
+                      stress_of(body, u[:, None], stress_axes)[:, :, 0])
 
 
 def nodal_forces(

@@ -1,0 +1,89 @@
+"""Materials and orientations of Abaqus and CalculiX input files."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fecontact.core.errors import InputError, MeshError, choices, nearest, shown
+from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
+from fecontact.fem.material_axes import CylindricalAxes, MaterialAxes
+from fecontact.fem.mesh_files.abaqus_keywords import Options
+
+Given = tuple[Options, list[str]]
+
+# Constants of each kind of *ELASTIC, and the data lines they take.
+_KINDS = {"ISO": (2, 1), "ENGINEERINGCONSTANTS": (9, 2), "ORTHO": (9, 2), "ANISO": (21, 3)}
+# Rows and columns of the constants of ANISO in the order 11, 22, 33, 12, 13, 23 of Abaqus.
+_UPPER = [(row, column) for column in range(6) for row in range(column + 1)]
+_ORDER = [0, 1, 2, 3, 5, 4]  # of 11, 22, 33, 12, 23, 13 among those of Abaqus
+
+
+def material(name: str, given: Mapping[str, Given]) -> AnyMaterial | str:
+    """Material of the keywords below a line *MATERIAL, in units of the file; or what it lacks.
+
+    Raises
+    ------
+    InputError
+        For constants that are not admissible.
+    """
+    options, lines = given.get("ELASTIC", ({}, []))
+    wanted = options.get("TYPE", "ISO").upper().replace(" ", "")
+    kind = next((one for one in _KINDS if wanted.startswith(one)), None)
+    density = given.get("DENSITY", ({}, []))[1]
+    if kind is None:
+        return (f"the material '{name}' has the elasticity TYPE={options['TYPE']}, which is not "
+                f"read")
+    constants, most = _KINDS[kind]
+    values = [float(word or 0) for line in lines for word in line.rstrip(", ").split(",")]
+    # Poisson's ratio may be left out, a temperature may follow.
+    least = 1 if kind == "ISO" else constants
+    if not (least <= len(values) <= constants + 1 and len(lines) <= most and len(density) == 1):
+        return (f"the material '{name}' has not one set of constants of *ELASTIC and one line of "
+                f"*DENSITY")
+    values = [*values, 0.0][:constants]
+    rho = float(density[0].split(",")[0] or 0)
+    loss = float(given.get("DAMPING", ({}, []))[0].get("STRUCTURAL") or 0)
+    if kind == "ISO":
+        return Material(values[0], values[1], rho, loss)
+    if kind == "ENGINEERINGCONSTANTS":
+        E, nu, G = zip(*[iter(values)] * 3, strict=True)
+        return AnisotropicMaterial.orthotropic(E, nu, G, rho, loss_factor=loss)
+    stiffness = np.zeros((6, 6))
+    places = _UPPER if kind == "ANISO" else [*_UPPER[:6], (3, 3), (4, 4), (5, 5)]
+    for (row, column), value in zip(places, values, strict=True):
+        stiffness[row, column] = stiffness[column, row] = value
+    return AnisotropicMaterial(stiffness[np.ix_(_ORDER, _ORDER)].tolist(), rho, loss_factor=loss)
+
+
+def orientation(name: str, given: Mapping[str, Given]) -> MaterialAxes | CylindricalAxes | str:
+    """Axes that a line *ORIENTATION names; or why they are not read.
+
+    Raises
+    ------
+    MeshError
+        If the file holds no orientation of this name, or its points span no axes.
+    """
+    if name.upper() not in given:
+        raise MeshError(f"A section names the orientation '{name}', which the file does not hold"
+                        f"{nearest(name.upper(), given)}; its orientations are: {choices(given)}.")
+    options, lines = given[name.upper()]
+    system = options.get("SYSTEM", "RECTANGULAR").upper()
+    by = options.get("DEFINITION", "COORDINATES").upper()
+    if system not in ("RECTANGULAR", "CYLINDRICAL") or by != "COORDINATES":
+        other = f"SYSTEM={system}" if by == "COORDINATES" else f"DEFINITION={by}"
+        return f"the orientation '{name}' is given by {other}, which is not read"
+    try:
+        values, turn = ([float(word or 0) for word in line.rstrip(", ").split(",")]
+                        for line in [*lines, "1, 0"][:2])
+        (ax, ay, az, bx, by_, bz), rest = values[:6], values[6:]
+        about, angle = int(turn[0]), (*turn[1:], 0.0)[0]
+    except (ValueError, IndexError):
+        return (f"the orientation '{name}' has the data {shown('; '.join(lines))}, which are not "
+                f"two points (a field of directions is not read)")
+    a, b, c = np.array((ax, ay, az)), np.array((bx, by_, bz)), np.array((*rest, 0.0, 0.0, 0.0)[:3])
+    try:
+        if system == "CYLINDRICAL":
+            return CylindricalAxes(tuple(a), tuple(b - a), about, angle)  # type: ignore[arg-type]
+        return MaterialAxes(tuple(a - c), tuple(b - c), about, angle)  # type: ignore[arg-type]
+    except InputError as error:
+        raise MeshError(f"The points of the orientation '{name}' give no axes: {error}") from None

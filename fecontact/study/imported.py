@@ -1,0 +1,293 @@
+"""Studies from mesh files: bodies, interfaces where surfaces face each other, and what is left."""
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.core.checks import as_path
+from fecontact.core.errors import FecontactError, ModelWarning
+from fecontact.core.types import Array, Integers
+from fecontact.core.units import count, listed, quantity
+from fecontact.fem.constraints import Coupling, LinearEquation, Tie
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh_files import read_bodies
+from fecontact.fem.mesh_files.deck_contents import DeckContents, deck_contents
+from fecontact.fem.pairing import pair_faces
+from fecontact.system.model_limits import implausible_body
+
+# Faces look at each other if their normals are opposite within 45 degrees, and they lie closer
+# than the longest edge of a facet; two surfaces do if a quarter of the smaller one's area does.
+_OPPOSITE, _PART = -0.7, 0.25
+_STIFFNESS = 1e13  # of a proposed contact [Pa/m]: a deflection of 0.1 um under 1 MPa
+_CONSTRAINTS: Mapping[str, type] = {
+    "ties": Tie, "couplings": Coupling, "equations": LinearEquation}
+_REMEDIES = {
+    "PRE-TENSION SECTION": "cut the bolt there, and give its force in [load] as opposite pressures "
+                           "on both faces of the cut",
+    "SPRING": "give it in [links] with kind = \"spring\" between points of two bodies",
+    "MASS": "give its mass as a body of its own, or by the density of the cells around it"}
+_MOST_NODES = 16  # of a proposed interface
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A mesh file as a study.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    scale : float
+        Metres per unit of the file.
+    meshes : mapping of name to Mesh
+        Bodies of the file; one without parts has the name "body".
+    contents : DeckContents
+        Keywords of an Abaqus or CalculiX deck; empty for other formats.
+    interfaces : tuple of (str, str)
+        Pairs "BODY.BOUNDARY" of surfaces that face each other.
+    notes : tuple of str
+        What is not read or not proposed, and what is implausible, as sentences.
+    has_parts : bool
+        Whether the names of the bodies are those of parts of the file.
+    """
+
+    path: Path
+    scale: float
+    meshes: Mapping[str, Mesh]
+    contents: DeckContents = field(default_factory=DeckContents)
+    interfaces: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
+    has_parts: bool = False
+
+    def summary(self) -> Iterator[tuple[str, str]]:
+        """Rows of name and value: bodies, materials, surfaces, constraints, loads."""
+        for name, mesh in self.meshes.items():
+            size = " × ".join(quantity(float(side), "m") for side in np.ptp(mesh.nodes, axis=0))
+            yield (f"body {name}" if self.has_parts else name,
+                   f"{len(mesh.cells)} {mesh.kind.name}, {len(mesh.nodes)} nodes, {size}")
+            for group, one in mesh.materials.items():
+                yield f"  material of {group}", one.description
+            for boundary, facets in mesh.boundaries.items():
+                yield (f"  boundary {boundary}",
+                       count(len(facets), "face" if mesh.dimension == 3 else "edge"))
+            for plural, cls in _CONSTRAINTS.items():
+                if held := [one.name for one in mesh.constraints if isinstance(one, cls)]:
+                    yield f"  {plural}", f"{len(held)}: {listed(held)}"
+        for kind, number in self.contents.elements.items():
+            yield f"elements {kind}", f"{number}"
+        for what, names in (("loads and supports", self.contents.loads),
+                            ("contact", self.contents.contact),
+                            ("skipped", self.contents.skipped)):
+            if names:
+                yield what, ", ".join(f"{number} *{name}" for name, number in names.items())
+        for face, other in self.interfaces:
+            yield "interface", f"{face} on {other}"
+
+    def toml(self, folder: Path) -> str:
+        """Text of a study file in a folder: all bodies that touch, or the largest one."""
+        import tomli_w
+
+        file = _relative(self.path, folder)
+        touching = {face.partition(".")[0] for pair in self.interfaces for face in pair}
+        bodies = [name for name in self.meshes if name in touching]
+        if not bodies:
+            name = max(self.meshes, key=lambda one: len(self.meshes[one].cells))
+            tables = {"geometry": self._geometry(file, name),
+                      "body": self._body(name),
+                      "basis": {"modes": 20, "contact": []}}
+        else:
+            tables = {"bodies": {_name(name): {
+                "geometry": self._geometry(file, name),
+                "body": self._body(name), "basis": {"modes": 10, "damping": 0.01}}
+                for name in bodies},
+                "interfaces": {f"contact-{number}": self._interface(face, other)
+                               for number, (face, other) in enumerate(self.interfaces, start=1)}}
+        left = [name for name in self.meshes if bodies and name not in bodies]
+        tables["simulation"] = {"t_end": 1e-3, "outputs": 101}
+        comments = [f"Written by fecontact import {self.path.name}. Units are SI: m, kg, s, N.",
+                    *([f"Bodies without an interface are left out: {listed(left, len(left))}."]
+                      if left else []),
+                    *self.notes,
+                    *([f"Loads and supports of the deck: {', '.join(self.contents.loads)}; give "
+                       f"supports as fixed in [body], loads in [load]."]
+                      if self.contents.loads else []),
+                    *(["The laws of contact are a stiff normal contact and a coefficient of 0.3; "
+                       "put in your own."] if bodies else
+                      ["No contact: name a boundary in [basis] as contact, and give the laws."])]
+        head = "".join(f"# {line}\n" for text in comments for line in text.splitlines())
+        return f"{head}\n{tomli_w.dumps(tables)}"
+
+    def _geometry(self, file: str, name: str) -> dict[str, object]:
+        return {"file": file, "scale": self.scale, **({"part": name} if self.has_parts else {})}
+
+    def _body(self, body: str) -> dict[str, object]:
+        """Material and supports; those on faces of interfaces are left out."""
+        mesh = self.meshes[body]
+        touching = {row for pair in self.interfaces for face in pair
+                    if face.startswith(f"{body}.")
+                    for row in _rows(mesh.boundaries[face[len(body) + 1:]])}
+        known = {name.upper(): name for name in (*mesh.boundaries, *mesh.points)
+                 if not touching & _rows(mesh.boundaries.get(name, np.empty((0, 2), np.int64)))}
+        fixed = {known[name.upper()]: ways for name, ways in self.contents.supports
+                 if name.upper() in known}
+        if mesh.dimension == 2:
+            fixed = {name: held for name, ways in fixed.items() if (held := ways.strip("z"))}
+        return {**({} if mesh.materials else {"material": "steel"}),
+                **({"plane": "strain"} if mesh.dimension == 2 else {}),
+                **({"fixed": fixed} if fixed else {})}
+
+    def _interface(self, face: str, other: str) -> dict[str, object]:
+        body, _, boundary = face.partition(".")
+        mesh = self.meshes[body]
+        area = float(np.linalg.norm(_vectors(mesh, mesh.boundaries[boundary]), axis=1).sum())
+        faces = [f"{_name(name)}.{of}" for name, _, of in (
+            one.partition(".") for one in (face, other))]
+        return {"face": faces[0], "other": faces[1],
+                "nodes": _contact_nodes(self.meshes, face, other),
+                "normal": {"law": "linear", "stiffness": float(f"{_STIFFNESS * area:.3g}")},
+                "friction": {"law": "constant", "friction_coefficient": 0.3,
+                             "smoothing_slope": 1e4}}
+
+
+def imported(path: str | Path, scale: float = 1.0) -> Imported:
+    """Read a mesh file, and propose interfaces where its named surfaces face each other.
+
+    Surfaces that ``*CONTACT PAIR`` of a deck names come first, then those whose facets look at
+    facets of another body, or of another piece of the same, closer than their edges are long.
+    Surfaces that are tied are left out. Only those that can be paired are
+    proposed; the notes name the others.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, of a format of :func:`fecontact.read_mesh`.
+    scale : float
+        Metres per unit of the file.
+
+    Raises
+    ------
+    InputError, MeshError
+        As :func:`fecontact.read_mesh`.
+    """
+    path = as_path(path, "a mesh")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ModelWarning)
+        meshes = read_bodies(path, scale=scale)
+        contents = deck_contents(path) if path.suffix.lower() == ".inp" else DeckContents()
+        notes = [f"{one.message}" for one in caught if issubclass(one.category, ModelWarning)]
+        if has_parts := "" not in meshes:
+            who = {name: f"body '{name}'" for name in meshes}
+        else:
+            meshes, who = {"body": meshes[""]}, {"body": "the body"}
+        bodies = {name: ElasticBody(mesh, degree=1) for name, mesh in meshes.items()}
+        for name, body in bodies.items():
+            notes += [f"{sentence[:1].upper()}{sentence[1:]}"
+                      for sentence in implausible_body(who[name], body)]
+    if reduced := [kind for kind in contents.elements if kind.startswith("C3D8R")]:
+        notes.append(f"{contents.elements[reduced[0]]} bricks {reduced[0]} with one point become "
+                     f"second-order hexahedra, or bricks with incompatible modes with degree = 1, "
+                     f"which are stiffer than hourglass control on coarse meshes, by 2 % in "
+                     f"frequency for the Brake-Reuss beam.")
+    notes += [f"*{keyword} is not read; {remedy}." for keyword, remedy in _REMEDIES.items()
+              if contents.keywords[keyword]]
+    interfaces: list[tuple[str, str]] = []
+    for face, other in _facing(meshes, contents):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ModelWarning)
+                pair_faces(bodies, face, other, nodes=_contact_nodes(meshes, face, other))
+        except FecontactError as error:
+            notes.append(f"{face} and {other} are no interface: {error}")
+            continue
+        interfaces.append((face, other))
+    return Imported(path, scale, meshes, contents, tuple(interfaces), tuple(dict.fromkeys(notes)),
+                    has_parts)
+
+
+def _contact_nodes(meshes: Mapping[str, Mesh], *faces: str) -> int:
+    """Number of contact nodes of a proposed interface, at most that of facets of both faces."""
+    return min(_MOST_NODES, *(len(meshes[body].boundaries[name])
+                              for body, _, name in (face.partition(".") for face in faces)))
+
+
+def _facing(meshes: Mapping[str, Mesh], contents: DeckContents) -> Iterator[tuple[str, str]]:
+    """Pairs of surfaces that face each other; none has a facet of a pair before it."""
+    named = {f"{body}.{name}": (mesh, facets) for body, mesh in meshes.items()
+             for name, facets in mesh.boundaries.items()}
+    pieces = {key: {(key.partition(".")[0], int(one)) for one in np.unique(
+        mesh.pieces[1][facets])} for key, (mesh, facets) in named.items()}
+    used: dict[str, set[tuple[int, ...]]] = {}
+    for body, mesh in meshes.items():
+        tied = {name for one in mesh.constraints if isinstance(one, Tie) for name in one.groups}
+        used[body] = {row for name in tied & mesh.boundaries.keys()
+                      for row in _rows(mesh.boundaries[name])}
+    by_end = {key.partition(".")[2].upper(): key for key in named}
+    given = [(a, b) for first, second in contents.pairs
+             for a, b in [[by_end.get(word.rpartition(".")[2].upper()) for word in (first, second)]]
+             if a and b]
+    found = []
+    for (a, one), (b, two) in combinations(named.items(), 2):
+        if pieces[a] & pieces[b]:
+            continue
+        if (part := _facing_part(one, two)) >= _PART:
+            # Of equal areas that of the fewest facets.
+            found.append((-round(part, 3), len(one[1]) + len(two[1]), a, b))
+    for a, b in (*given, *((a, b) for *_, a, b in sorted(found))):
+        facets = {key: _rows(named[key][1]) for key in (a, b)}
+        taken = [used[key.partition(".")[0]] for key in (a, b)]
+        if not any(own & before for own, before in zip(facets.values(), taken, strict=True)):
+            for own, before in zip(facets.values(), taken, strict=True):
+                before |= own
+            yield a, b
+
+
+def _rows(facets: Integers) -> set[tuple[int, ...]]:
+    """Nodes of each facet, without its orientation."""
+    return {tuple(sorted(row)) for row in facets.tolist()}
+
+
+def _facing_part(one: tuple[Mesh, Integers], other: tuple[Mesh, Integers]) -> float:
+    """Part of the area of the smaller surface whose facets look at the other one from nearby."""
+    from scipy.spatial import KDTree
+
+    vectors = [_vectors(*one), _vectors(*other)]
+    areas = [float(np.linalg.norm(each, axis=1).sum()) for each in vectors]
+    (own, away), (mine, its) = (one, other), vectors
+    if areas[1] < areas[0]:
+        (own, away), (mine, its) = (other, one), vectors[::-1]
+    places, partners = (mesh.nodes[facets] for mesh, facets in (own, away))
+    reach = max(float(np.linalg.norm(np.ptp(some, axis=1), axis=1).max())
+                for some in (places, partners))
+    distance, nearest = KDTree(partners.mean(axis=1)).query(places.mean(axis=1))
+    size, its_size = np.linalg.norm(mine, axis=1), np.linalg.norm(its, axis=1)
+    cosine = np.einsum("ij,ij->i", mine, its[nearest]) / (size * its_size[nearest])
+    return float(size[(cosine < _OPPOSITE) & (distance < reach)].sum() / size.sum())
+
+
+def _vectors(mesh: Mesh, facets: Integers) -> Array:
+    """Outward normals of faces (k, 3) times their area, of edges (k, 2) times their length."""
+    places = mesh.nodes[facets]
+    if mesh.dimension == 2:
+        along = places[:, 1] - places[:, 0]
+        return np.column_stack([along[:, 1], -along[:, 0]])
+    return np.asarray(0.5 * np.cross(places[:, 2] - places[:, 0], places[:, -1] - places[:, 1])
+                      if facets.shape[1] == 4 else 0.5 * np.cross(
+                          places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]))
+
+
+def _name(body: str) -> str:
+    """Name of a body in a study, where dots part the names of keys."""
+    return "the-ground" if body == "ground" else body.replace(".", "-")
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """Path as seen from a folder where it lies in it, or else in full."""
+    try:
+        return path.resolve().relative_to(folder.resolve()).as_posix()
+    except ValueError:
+        return path.resolve().as_posix()

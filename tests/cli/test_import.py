@@ -1,0 +1,165 @@
+"""``fecontact import``: what a mesh file holds, and the study that it suggests."""
+
+import numpy as np
+import pytest
+from meshes_for_tests import rectangle
+from solid_blocks import block_mesh
+
+from fecontact import Material, Mesh, Study, write_mesh
+from fecontact.study.imported import imported
+
+MATERIAL = "*MATERIAL, NAME=M\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"
+
+
+def part(name, mesh, kind="C3D8", prefix=""):
+    """A part of bricks with its faces as surfaces."""
+    nodes = "".join(f"{k}, {x!r}, {y!r}, {z!r}\n"
+                    for k, (x, y, z) in enumerate(mesh.nodes.tolist(), start=1))
+    cells = "".join(f"{k}, {', '.join(map(str, row))}\n"
+                    for k, row in enumerate((mesh.cells + 1).tolist(), start=1))
+    text = f"*PART, NAME={name}\n*NODE\n{nodes}*ELEMENT, TYPE={kind}, ELSET={name}-ALL\n{cells}"
+    sides = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6), (2, 3, 6, 7), (0, 3, 4, 7))
+    for boundary, facets in mesh.boundaries.items():
+        wanted = {frozenset(facet) for facet in facets.tolist()}
+        text += f"*SURFACE, NAME={prefix}{boundary}\n" + "".join(
+            f"{k}, S{number}\n" for k, row in enumerate(mesh.cells.tolist(), start=1)
+            for number, side in enumerate(sides, start=1)
+            if frozenset(row[at] for at in side) in wanted)
+    return f"{text}*SOLID SECTION, ELSET={name}-ALL, MATERIAL=M\n*END PART\n"
+
+
+def deck(*places, more="", kind="C3D8", prefixes=("", "", "")):
+    """Equal parts A, B, ... in these places, of which the first is held at its left side."""
+    parts = [part("ABCD"[k], block_mesh(counts, (0.1, 0.04, 0.02)).placed(place), kind,
+                  prefixes[k])
+             for k, (counts, place) in enumerate(places)]
+    return ("".join(parts) + "*ASSEMBLY, NAME=X\n" + "".join(
+        f"*INSTANCE, NAME={'ABCD'[k]}-1, PART={'ABCD'[k]}\n*END INSTANCE\n"
+        for k in range(len(places))) + f"*END ASSEMBLY\n{MATERIAL}{more}")
+
+
+STACK = (((3, 2, 1), (0.0, 0.0, 0.0)), ((4, 3, 1), (0.0, 0.0, 0.02)))
+STEP = "*STEP\n*STATIC\n*CLOAD\nTIP, 3, 1.0\n*OUTPUT, FIELD\n*END STEP\n"
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_two_parts_on_each_other(cli, place):
+    """The deck is shown, and the study that is written of it runs."""
+    (place / "stack.inp").write_text(deck(*STACK, more=STEP, kind="C3D8R"))
+    code, out, err = cli("import", "stack.inp", "-o", "study.toml")
+    assert code == 0
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    for wanted in ("body A 6 hexahedra, 24 nodes, 100 mm × 40 mm × 20 mm",
+                   "material of A-ALL 210 GPa, Poisson ratio 0.3, 7850 kg/m³",
+                   "boundary top 6 faces", "elements C3D8R 18", "loads and supports 1 *CLOAD",
+                   "interface A.top on B.contact",
+                   "study.toml is written; next: fecontact mesh study.toml"):
+        assert wanted in lines, wanted
+    assert any(line.startswith("skipped") and "1 *OUTPUT" in line for line in lines)
+    assert "18 bricks C3D8R with one point become second-order hexahedra" in " ".join(err.split())
+    study = Study.read("study.toml")
+    assert set(study.bodies) == {"A", "B"}
+    assert (study.interfaces["contact-1"].face, study.interfaces["contact-1"].other) == (
+        "A.top", "B.contact")
+    code, _, err = cli("run", "study.toml", "--set", "simulation.t_end=1e-5",
+                       "--set", "bodies.A.body.degree=1", "--set", "bodies.B.body.degree=1")
+    assert (code, err.count("error")) == (0, 0)
+
+
+def test_supports_of_the_deck(place):
+    """Supports at zero up to the end of the first step, but for those on faces in contact."""
+    text = deck(*STACK, more="*BOUNDARY\nleft, 1, 2\nRIGHT, ENCASTRE\nfront, 3, 3, 0.1\ntop, 1, 3\n"
+                             "*STEP\n*STATIC\n*END STEP\n*STEP\n*BOUNDARY\nback, 1\n")
+    (place / "stack.inp").write_text(text)
+    study = Study.from_toml(imported("stack.inp").toml(place), place / "study.toml")
+    assert study.bodies["A"].body.fixed == {"left": "xy", "right": "xyz"}
+
+
+def test_an_existing_study_is_kept(cli, place):
+    (place / "stack.inp").write_text(deck(*STACK))
+    (place / "study.toml").write_text("mine")
+    code, _, err = cli("import", "stack.inp", "-o", "study.toml")
+    assert (code, (place / "study.toml").read_text()) == (1, "mine")
+    assert "study.toml exists; choose another name, or replace it with --force." in err
+    assert cli("import", "stack.inp", "-o", "study.toml", "--force")[0] == 0
+    assert Study.read("study.toml").interfaces
+    code, out, _ = cli("import", "stack.inp")
+    assert code == 0
+    assert "next: fecontact import stack.inp -o study.toml" in out
+
+
+def test_a_part_apart_is_left_out_and_contact_pairs_come_first(place):
+    """Surfaces of *CONTACT PAIR are paired although a gap of several cells parts them."""
+    far = ((2, 2, 1), (0.0, 0.0, 0.5))
+    (place / "a.inp").write_text(deck(*STACK, far))
+    found = imported("a.inp")
+    assert found.interfaces == (("A.top", "B.contact"),)
+    assert "# Bodies without an interface are left out: C." in found.toml(place)
+    one = block_mesh((2, 2, 1), (0.1, 0.04, 0.02))
+    named = [Mesh(mesh.nodes, mesh.cells, {name: mesh.boundaries[old]}) for mesh, name, old in (
+        (one, "UNDER", "top"), (one.placed((0.0, 0.0, 0.1)), "OVER", "contact"))]
+    text = part("A", named[0]) + part("B", named[1]) + MATERIAL
+    (place / "b.inp").write_text(text)
+    assert imported("b.inp").interfaces == ()
+    (place / "b.inp").write_text(text + "*CONTACT PAIR, INTERACTION=I\nover, under\n")
+    assert imported("b.inp").interfaces == (("B.OVER", "A.UNDER"),)
+    assert imported("b.inp").contents.contact == {"CONTACT PAIR": 1}
+
+
+def test_pieces_of_one_body(place):
+    """A ring of four parts that three ties join: the two faces that are free touch each other."""
+    ring = [((2, 2, 1), at) for at in ((0.0, 0.0, 0.0), (0.0, 0.0, 0.02), (0.1, 0.0, 0.0),
+                                       (0.1, 0.0, 0.02))]
+    ties = "".join(f"*TIE, NAME=T{k}\n{one}, {other}\n" for k, (one, other) in enumerate((
+        ("A-right", "C-left"), ("C-top", "D-contact"), ("D-left", "B-right"))))
+    text = deck(*ring, prefixes=("A-", "B-", "C-", "D-"))
+    (place / "a.inp").write_text(text.replace("*END ASSEMBLY", f"{ties}*END ASSEMBLY"))
+    found = imported("a.inp")
+    assert not found.has_parts
+    assert found.interfaces == (("body.A-top", "body.B-contact"),)
+
+
+def test_remedies_for_what_is_not_read(place):
+    (place / "a.inp").write_text(deck(*STACK, more="*PRE-TENSION SECTION, SURFACE=S, NODE=1\n"))
+    notes = imported("a.inp").notes
+    assert any(note.startswith("*PRE-TENSION SECTION is not read; cut the bolt there, and give its "
+                               "force in [load]") for note in notes)
+
+
+def test_a_single_body_and_units(cli, place):
+    """A file in mm: the sizes look wrong; its study has no contact and runs."""
+    mesh = rectangle(100.0, 40.0, 4, 2)
+    write_mesh(mesh, "part.msh")
+    code, _, err = cli("import", "part.msh")
+    assert code == 0
+    assert "has an extent of 100 m" in err
+    assert "give a mesh in mm the scale 1e-3" in " ".join(err.split())
+    assert cli("import", "part.msh", "--scale", "1e-3", "-o", "study.toml")[0] == 0
+    study = Study.read("study.toml")
+    assert study.mesh().extent == pytest.approx(np.hypot(0.1, 0.04))
+    assert cli("run", "study.toml", "--set", "simulation.t_end=1e-5")[0] == 0
+
+
+@pytest.mark.parametrize(("name", "message"), [
+    ("none.inp", "none.inp: there is no such file."),
+    ("part.step", "part.step: files of this kind are not read"),
+    ("cut.inp", "cut.inp: The file holds no *NODE or no *ELEMENT data."),
+])
+def test_files_that_cannot_be_read(cli, place, name, message):
+    (place / "cut.inp").write_text("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D8\n")
+    code, out, err = cli("import", name, "-o", "study.toml")
+    assert (code, out) == (1, "")
+    assert message in " ".join(err.split())
+    assert not (place / "study.toml").exists()
+
+
+def test_materials_of_the_deck_reach_the_bodies(place):
+    (place / "stack.inp").write_text(deck(*STACK))
+    study = Study.from_toml(imported("stack.inp").toml(place), place / "study.toml")
+    assert all(body.materials == (Material.named("steel"),)
+               for body in study.elastic_bodies().values())
