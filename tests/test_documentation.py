@@ -323,10 +323,15 @@ def check_faces_in_space(names, printed, folder):
 def check_frequency_responses(names, printed, folder):
     assert (folder / "response.png").stat().st_size > 10000
     peaks = [[float(word) for word in line.split()[:3]] for line in printed.splitlines()]
-    assert len(peaks) == 6
+    assert len(peaks) == 8
+    held = [peaks.pop(2) for _ in range(2)]
     assert [force for force, *_ in peaks[:2]] == [1.0, 1.2]
     # Above the frequency at which the element slides all the time, below that of a stuck one.
     assert all(1.0 < w < 1.2247 for _, w, _ in peaks[:2])
+    assert [amplitude for amplitude, *_ in held] == [2.0, 6.0]
+    assert all(1.0 < w < 1.2247 for _, w, _ in held)
+    # A force of 1 N moves it by 6.23 m at most.
+    assert held[0][2] < held[1][2] < 1.0
     stuck, slides, ratio = peaks[2]
     assert 2.0 * np.pi * stuck == pytest.approx(np.sqrt(1.5), rel=1e-5)
     assert 2.0 * np.pi * slides == pytest.approx(1.0, abs=0.01)
