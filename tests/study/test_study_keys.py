@@ -61,7 +61,7 @@ def test_defaults_and_units_of_a_section():
     assert "| `amplitude`, `wavelength`" not in section
     needed = study_keys("load.forces")
     assert '| `component` | "x", "y", "z", "phi", "phi_x", "phi_y" or "phi_z" | `"y"` |' in needed
-    assert "| `signal` | a table of a law and its parameters |  | Its history" in needed
+    assert "| `signal` | a number or a table of a law and its parameters |  | Its history" in needed
     laws = study_keys("interfaces.NAME")
     assert "total values refer to the face of the interface" in laws
 
