@@ -79,6 +79,9 @@ class ResponseSettings:
         default, or the middle of the contact where nothing is named B.
     component : 'x', 'y', 'z', 'phi', 'phi_x', 'phi_y' or 'phi_z', optional
         Its component; by default that of the drive.
+    also : list of str
+        Further displacements whose amplitude and phase the CSV file holds, such as
+        ``["C x", "B y"]``: a point or number of a contact node, and a component.
     """
 
     parameter: str = "drive.angular_frequency"
@@ -103,6 +106,7 @@ class ResponseSettings:
     points: int = 2000
     point: str | int | None = None
     component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None = None
+    also: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         convert_fields(self)
@@ -120,6 +124,7 @@ class ResponseSettings:
                              f"bounds by the key 'bounds'.")
         self._check_levels()
         self._check_amplitudes()
+        _ = self.also_observed
         self._check_bounds()
         _ = self.harmonic_balance(), self.orbit_method()
 
@@ -196,6 +201,18 @@ class ResponseSettings:
     def first(self) -> float:
         """Where responses start, in the unit of the parameter."""
         return self.checked_bounds[0] if self.start is None else self.start * self._factor
+
+    @property
+    def also_observed(self) -> tuple[tuple[str | int, str], ...]:
+        """Points and components of the further displacements."""
+        found: list[tuple[str | int, str]] = []
+        for text in self.also:
+            point, _, component = text.strip().rpartition(" ")
+            if not point:
+                raise InputError(f"ResponseSettings: also = {list(self.also)} must name a point "
+                                 f"and a component each, like 'C x'.")
+            found.append((int(point) if point.isdigit() else point.strip(), component))
+        return tuple(found)
 
     @property
     def level_name(self) -> str | None:

@@ -41,12 +41,13 @@ class Responses:
 def observed_point(
     system: "ContactSystem", wanted: "ResponseSettings"
 ) -> tuple[str | int, str]:
-    """Point and component that are observed; InputError if they do not exist."""
+    """Point and component that are observed; InputError if these or further ones do not exist."""
     basis, point = system.basis, wanted.point
     if point is None:
         point = usual_point(basis)
     component = wanted.component or usual_component(system)
-    _ = basis.point_row(point, component)
+    for seen in ((point, component), *wanted.also_observed):
+        _ = basis.point_row(*seen)
     return point, component
 
 

@@ -49,23 +49,31 @@ def write_response_results(
     files = [keep_response(study, response, folder),
              *(folder / f"{name}.{ending}" for ending in ("csv", "png", "html"))]
     usable = study.usable_hz
-    write_text(files[1], response_csv(response, usable))
+    also = [response.of(study.system(), seen) for seen in study.response.also_observed]
+    write_text(files[1], response_csv(response, usable, also))
     plot_response(response, usable_hz=usable, path=files[2])
     report_response(response, study.system(), files[3], observe=observe, title=study.name,
                     study=with_given_keys(study.to_toml()), usable_hz=usable)
     return files
 
 
-def response_csv(response: FrequencyResponse, usable_hz: float = math.inf) -> str:
+def response_csv(
+    response: FrequencyResponse, usable_hz: float = math.inf,
+    also: Sequence[FrequencyResponse] = (),
+) -> str:
     """All points of a response as CSV, special points with their kind; SI units, phases in rad.
 
     ``beyond_basis`` is 1 for frequencies above ``usable_hz``; ``force`` is the level of the force
-    where the amplitude is held, else empty.
+    where the amplitude is held, else empty. ``also`` are the same responses with further
+    displacements, of which amplitude and phase are added.
     """
-    rows: list[Sequence[Any]] = [_COLUMNS]
+    rows: list[Sequence[Any]] = [(*_COLUMNS, *(f"{name} {one.observed}" for one in also
+                                               for name in ("amplitude", "phase")))]
     for level, branch in enumerate(response.branches):
         first, phase = np.abs(response.harmonic(1, level)), response.phase(level)
         third, held = _third(response, level), response.force_name is not None
+        more = np.array([(one.amplitude(level), one.phase(level)) for one in also])
+        further = more.reshape(2 * len(also), len(branch)).T.tolist()
         force = [repr(one) for one in response.force(level).tolist()] if held else []
         for place, point in enumerate(branch.points):
             values = point.values
@@ -78,7 +86,8 @@ def response_csv(response: FrequencyResponse, usable_hz: float = math.inf) -> st
                 repr(float(first[place])), repr(float(phase[place])), third[place],
                 (repr(float(values["truncation_error"])) if "truncation_error" in values else ""),
                 "" if math.isnan(point.parameter_error) else repr(point.parameter_error),
-                int(1.0 / float(values["period"]) > usable_hz), force[place] if held else ""])
+                int(1.0 / float(values["period"]) > usable_hz), force[place] if held else "",
+                *map(repr, further[place])])
     return csv_text(rows)
 
 

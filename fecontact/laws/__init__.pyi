@@ -19,7 +19,13 @@ from .ground.motion import GroundMotion, HarmonicSpeed, SpeedRamp
 from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .ground.sliding import SlidingRotation, SlidingTranslation
-from .normal.bilateral import BilateralCubic, BilateralLaw, BilateralPiecewise, BilateralPlay
+from .normal.bilateral import (
+    BilateralCubic,
+    BilateralLaw,
+    BilateralPiecewise,
+    BilateralPlay,
+    BilateralPolynomial,
+)
 from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .normal.measured_surface import MeasuredSurface
 from .normal.power import BackBurdekinContact, PowerContact, RestitutionContact
@@ -46,6 +52,7 @@ __all__ = [
     "BilateralLaw",
     "BilateralPiecewise",
     "BilateralPlay",
+    "BilateralPolynomial",
     "BoucWenFriction",
     "Bound",
     "CompiledLaw",

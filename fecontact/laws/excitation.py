@@ -1,6 +1,7 @@
 """Excitation at B and loads."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Integral, Real
@@ -8,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, as_place, require_kind
+from fecontact.core.checks import as_direction, as_floats, as_place, require_kind
 from fecontact.core.errors import (
     InputError,
     choices,
@@ -17,7 +18,7 @@ from fecontact.core.errors import (
     require_finite,
     require_not_negative,
 )
-from fecontact.core.types import Coordinates
+from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Signal
 
@@ -153,8 +154,9 @@ class PointLoad:
     point : str, int, (x, y) or (x, y, z)
         'B', 'C' or a further named point; a contact node by its number from 0; or a place in the
         body [m].
-    component : 'x', 'y' or 'phi'
-        A force along +x, along +y (away from the ground), or a moment counter-clockwise. On solids
+    component : 'x', 'y', 'phi', or a direction (x, y) or (x, y, z)
+        A force along +x, along +y (away from the ground), or along a direction, whose length does
+        not change it; or a moment counter-clockwise. On solids
         'x', 'y', 'z' (away from the ground), or moments 'phi_x', 'phi_y', 'phi_z'; at contact nodes
         along their first and second tangent and their normal.
     signal : float or Signal
@@ -163,11 +165,11 @@ class PointLoad:
     Raises
     ------
     InputError
-        For an unknown component, or an invalid point or signal.
+        For an unknown component, a direction of length zero, or an invalid point or signal.
     """
 
     point: Annotated[str | int | Coordinates, Unit("m")] = "C"
-    component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] = "y"
+    component: Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | Coordinates = "y"
     signal: float | Signal = field(kw_only=True)
 
     def __post_init__(self) -> None:
@@ -178,13 +180,40 @@ class PointLoad:
         elif not isinstance(self.point, str):
             raise InputError(f"PointLoad: point = {self.point!r} must be the name of a point, the "
                              f"number of a contact node, or a place (x, y), in space (x, y, z).")
-        if self.component not in _COMPONENTS:
+        if isinstance(self.component, tuple | list | np.ndarray):
+            object.__setattr__(self, "component",
+                               as_direction(self.component, "PointLoad: component"))
+        elif self.component not in _COMPONENTS:
             raise InputError(f"PointLoad: component = {self.component!r} must be one of "
                              f"{choices(_COMPONENTS)}"
                              f"{nearest(str(self.component), _COMPONENTS)}.")
         if isinstance(self.signal, Real) and not isinstance(self.signal, bool):
             object.__setattr__(self, "signal", Constant(float(self.signal)))
         _require_signal("PointLoad", "signal", self.signal, ", or a number")
+
+    @property
+    def moment(self) -> bool:
+        """Whether it is a moment."""
+        return isinstance(self.component, str) and self.component.startswith("phi")
+
+    @property
+    def along(self) -> str:
+        """The component or direction, in words."""
+        if isinstance(self.component, str):
+            return self.component
+        return f"({', '.join(f'{part:.4g}' for part in self.component)})"
+
+    def suits(self, components: Sequence[str]) -> bool:
+        """Whether points with these components of displacement can be loaded so."""
+        if isinstance(self.component, str):
+            return self.component in components
+        return len(self.component) == sum(len(name) == 1 for name in components)
+
+    def row(self, rows: Array, components: Sequence[str]) -> Array:
+        """Row (m,) of the displacement along the force, from rows (k, m) of the components."""
+        if isinstance(self.component, str):
+            return np.asarray(rows[components.index(self.component)])
+        return np.asarray(np.array(self.component) @ rows[: len(self.component)])
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "two-sided-stop": linear.TwoSidedStop,
             "prescribed-force": linear.PrescribedForce,
             "bilateral-cubic": bilateral.BilateralCubic,
+            "bilateral-polynomial": bilateral.BilateralPolynomial,
             "bilateral-play": bilateral.BilateralPlay,
             "bilateral-piecewise": bilateral.BilateralPiecewise,
         },

@@ -3,7 +3,12 @@ from .assembly.bodies_convergence import BodiesConvergence, bodies_convergence
 from .assembly.face_weld import FaceWeld
 from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, NonlinearSpring, Spring, Weld, linked
-from .assembly.nonlinear_springs import CubicSpring, PiecewiseSpring, PlaySpring
+from .assembly.nonlinear_springs import (
+    CubicSpring,
+    PiecewiseSpring,
+    PlaySpring,
+    PolynomialSpring,
+)
 from .assembly.point_pairing import PointPairing
 from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
@@ -32,6 +37,7 @@ __all__ = [
     "PiecewiseSpring",
     "PlaySpring",
     "PointPairing",
+    "PolynomialSpring",
     "ReductionQuality",
     "Spring",
     "Weld",

@@ -69,8 +69,10 @@ def _misfits(study: Acting, basis: ModalBasis) -> Iterator[tuple[str, str, Any, 
         yield "load", "gravity", load.gravity, f"give the accelerations along {axes}"
     for number, force in enumerate(load.forces):
         where = f"load.forces.{number}"
-        if force.component not in basis.components:
-            yield where, "component", force.component, f"choose from {choices(basis.components)}"
+        if not force.suits(basis.components):
+            yield where, "component", force.component, (
+                f"choose from {choices(basis.components)}" if isinstance(force.component, str)
+                else f"give a direction along {axes}")
         if isinstance(force.point, tuple) and len(force.point) != d:
             yield where, "point", force.point, f"give its coordinates {axes}"
     for number, one in enumerate(load.boundaries):

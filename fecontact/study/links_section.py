@@ -22,6 +22,7 @@ from fecontact.reduction.assembly.nonlinear_springs import (
     CubicSpring,
     PiecewiseSpring,
     PlaySpring,
+    PolynomialSpring,
 )
 
 
@@ -53,7 +54,8 @@ LinkSettings = Spring | Bushing | Hinge | NonlinearSpring | FaceWeldSettings
 
 LINKS: Mapping[str, type] = {
     "spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld,
-    "face-weld": FaceWeldSettings, "cubic-spring": CubicSpring, "play-spring": PlaySpring,
+    "face-weld": FaceWeldSettings, "cubic-spring": CubicSpring,
+    "polynomial-spring": PolynomialSpring, "play-spring": PlaySpring,
     "piecewise-spring": PiecewiseSpring}
 
 

@@ -67,13 +67,13 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
             yield ActingLoad(what, _inertia(basis, what)[axis], g,
                              f"the body moves along {AXES[axis]}")
     for force in load.forces:
-        if force.component not in components:
+        if not force.suits(components):
             raise InputError(f"Load: a force at {force.point!r} has the component "
                              f"{force.component!r}, but points of this body have "
                              f"{choices(components)}.")
-        turn = "turns" if force.component.startswith("phi") else f"moves along {force.component}"
+        turn = "turns" if force.moment else f"moves along {force.along}"
         yield ActingLoad(f"a force at {force.point!r} with component {force.component!r}",
-                         _point_rows(basis, force.point)[components.index(force.component)],
+                         force.row(_point_rows(basis, force.point), components),
                          force.signal, f"{force.point!r} {turn}")
     for axis, signal in enumerate(load.base_accelerations):
         if signal is not None:

@@ -48,9 +48,8 @@ def _force_label(number: int, key: str, system: Loaded | None) -> str:
     what, unit = f"force {number}", ""
     if system is not None and number < len(system.load.forces):
         force = system.load.forces[number]
-        moment = force.component.startswith("phi")
-        what = f"{'moment' if moment else 'force'} at {_place(force.point)} {force.component}"
-        unit = "N m" if moment else "N"
+        what = f"{'moment' if force.moment else 'force'} at {_place(force.point)} {force.along}"
+        unit = "N m" if force.moment else "N"
     elif key in _SIZES:
         what = f"{key} of force {number}"
     if key not in _SIZES:

@@ -16,6 +16,7 @@ from fecontact.laws import (
     BilateralCubic,
     BilateralPiecewise,
     BilateralPlay,
+    BilateralPolynomial,
     Constant,
     ConstantFriction,
     CosineSurface,
@@ -79,6 +80,7 @@ NORMAL = [
     ExponentialContact(varied(10.0), varied(1e-5), 0.4),
     BilateralCubic(varied(1e6), 1e16, varied(30.0), 2.0),
     BilateralPlay(varied(1e6), 1e-6, varied(30.0), 2.0),
+    BilateralPolynomial(varied(1e6), 1e11, varied(1e16), 1e26, varied(3.0), 2.0, varied(0.1)),
     # Those with branches.
     CosineSurface(varied(1e6), varied(1e-5), varied(30.0)),
     GaussianSurface(varied(1e6), varied(1e-5), varied(30.0)),

@@ -13,6 +13,7 @@ import fecontact as fc
 from fecontact import plot
 from fecontact.analysis import complex_modes, prestressed_modes
 from fecontact.bifurcation import contact_field, equilibrium_branch
+from fecontact.core.errors import InputError
 from fecontact.integrate import PointStart, SetValued
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import ConstantFriction, LinearContact
@@ -21,6 +22,7 @@ from fecontact.reduction import (
     PiecewiseSpring,
     PlaySpring,
     PointPairing,
+    PolynomialSpring,
     Spring,
     point_masses,
     reduce_bodies,
@@ -349,3 +351,50 @@ def test_a_softening_spring_rests_beside_zero_elongation(preload):
     rest = abs(height(system, fc.equilibrium(system).modal_coordinates))
     assert 50.0 * rest - 3e4 * rest**3 == pytest.approx(preload, abs=1e-9)
     assert 3.0 * 3e4 * rest**2 < 50.0
+
+
+def test_period_of_a_polynomial_spring():
+    """x'' + x + .3 x^2 + .2 x^3 + .5 x^5 = 0 against the integral of dx / v over the energy."""
+    A, steps = 0.8, np.linspace(0.0, np.pi, 20001)
+    spring = PolynomialSpring("a.p", None, 1.0, 0.3, 0.2, 0.5, direction=UP)
+    run = fc.simulate(oscillator(spring, 1.0), 40.0, initial=released(oscillator(spring, 1.0), A),
+                      rtol=1e-10, outputs=4001)
+
+    def potential(x):
+        return x**2 / 2.0 + 0.1 * x**3 + 0.05 * x**4 + 0.5 * x**6 / 6.0
+
+    low = brentq(lambda x: potential(x) - potential(A), -2.0, -1e-6, xtol=1e-15)
+    middle, half = (A + low) / 2.0, (A - low) / 2.0
+    x = middle + half * np.cos(steps[1:-1])
+    inner = half * np.sin(steps[1:-1]) / np.sqrt(2.0 * (potential(A) - potential(x)))
+    ends = [np.sqrt(half / abs(z + 0.3 * z**2 + 0.2 * z**3 + 0.5 * z**5)) for z in (A, low)]
+    values = np.concatenate([ends[:1], inner, ends[1:]])
+    period = 2.0 * np.trapezoid(values, steps)
+    y = run.displacement("a.p")[:, 1]
+    count = int(40.0 / period)
+    assert np.interp(count * period, run.time, y) == pytest.approx(A, abs=1e-4)
+    assert y.min() == pytest.approx(low, abs=1e-4)
+    # Energy is kept.
+    assert abs(run.energies.imbalance) < 1e-6
+
+
+@pytest.mark.parametrize(("parts", "exact"), [
+    ({"quadratic_damping": 0.5}, lambda v, t: v / (1.0 + 0.25 * v * t)),
+    ({"cubic_damping": 0.5}, lambda v, t: v / np.sqrt(1.0 + 0.5 * v**2 * t)),
+])
+@pytest.mark.parametrize("v", [3.0, -3.0])
+def test_polynomial_dashpots_slow_a_mass(parts, exact, v):
+    """2 v' = -.5 |v| v and 2 v' = -.5 v^3, in closed form."""
+    system = oscillator(PolynomialSpring("a.p", None, direction=UP, **parts))
+    run = fc.simulate(system, 4.0, initial=released(system, 0.0, v), rtol=1e-9, outputs=5)
+    speed = run.velocity("a.p")[:, 1]
+    assert speed == pytest.approx(np.sign(v) * exact(abs(v), run.time), rel=1e-6)
+
+
+def test_polynomial_springs_are_checked():
+    with pytest.raises(InputError, match="PolynomialSpring: all stiffnesses and dampings are zero"):
+        PolynomialSpring("a.p", direction=UP)
+    with pytest.raises(InputError, match="PolynomialSpring: cubic_damping = -1"):
+        PolynomialSpring("a.p", direction=UP, cubic_damping=-1.0)
+    with pytest.raises(InputError, match="direction"):
+        PolynomialSpring("a.p", stiffness=1.0)

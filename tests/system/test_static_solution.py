@@ -10,6 +10,7 @@ from fecontact import BoundaryLoad, Load, PointLoad
 from fecontact.io import export_fields
 from fecontact.laws import Constant, Harmonic
 from fecontact.plot import plot_stress
+from fecontact.system.parameter_labels import parameter_label
 
 E, RHO, LENGTH, HEIGHT, THICKNESS = 2e9, 1000.0, 2.0, 0.1, 0.02
 UNITS = {"Pa]": 1.0, "kPa]": 1e3, "MPa]": 1e6, "GPa]": 1e9}
@@ -77,6 +78,26 @@ def test_the_load_of_the_contact_and_named_places():
     turned = fc.static_solution(part, Load(forces=[
         PointLoad("right", "phi", signal=Constant(1.0))])).at(end["C"])[0][1]
     assert turned == pytest.approx(LENGTH**2 / (2.0 * E * inertia), rel=1e-6)
+
+
+def test_forces_with_a_direction():
+    """A force of 13 along (5, 12) is that of 5 along x and 12 along y; also of modes, in labels."""
+    part, end = bar({"left": "xy"}), {"C": (LENGTH, 0.5 * HEIGHT)}
+    slanted = Load(forces=[PointLoad("right", [10.0, 24.0], signal=Constant(13.0))])
+    both = Load(forces=[PointLoad("right", "x", signal=Constant(5.0)),
+                        PointLoad("right", "y", signal=Constant(12.0))])
+    one, other = (fc.static_solution(part, load, points=end) for load in (slanted, both))
+    np.testing.assert_allclose(one.displacement, other.displacement, rtol=1e-12)
+    basis = fc.modal_basis(part, 3, contact_nodes=2, points=end)
+    one, other = (fc.static_equilibrium(fc.ContactSystem(
+        basis, normal=fc.laws.LinearContact(1e6), gap=1.0, load=Load(forces=[
+            PointLoad("C", force.component, signal=force.signal) for force in load.forces])))
+        for load in (slanted, both))
+    np.testing.assert_allclose(one, other, rtol=1e-10)
+    system = fc.ContactSystem(basis, normal=fc.laws.LinearContact(1e6), load=Load(
+        forces=[PointLoad("C", (5.0, 12.0), signal=Constant(13.0))]))
+    assert parameter_label("load.forces.0.signal.value", system=system).startswith(
+        "force at C (0.3846, 0.9231)")
 
 
 def cook(cells):

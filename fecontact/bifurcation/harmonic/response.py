@@ -25,6 +25,7 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import (
     ContactField,
+    contact_field,
     field_between,
 )
 from fecontact.bifurcation.fields.observed_row import observed_row
@@ -140,6 +141,32 @@ class FrequencyResponse(Summarised):
         """Amplitude (N,), over the level of the force where the amplitude is held."""
         found = self.amplitude(level)
         return found if self.force_name is None else found / np.abs(self.force(level))
+
+    def of(
+        self, system: ContactSystem | VectorField, observe: tuple[str | int, str] | ArrayLike
+    ) -> "FrequencyResponse":
+        """The same orbits with another displacement observed.
+
+        Parameters
+        ----------
+        system : ContactSystem or VectorField
+            That of the response.
+        observe : (point, component) or (d,) sequence
+            As for :func:`frequency_response`.
+
+        Raises
+        ------
+        InputError
+            For a point that does not exist, internal variables, or another system.
+        """
+        require_kind("FrequencyResponse.of", (ContactSystem, VectorField), system=system)
+        names = self.branches[0].attributes["parameter_names"]
+        field = system if isinstance(system, VectorField) else contact_field(system, names)
+        row, observed = observed_row(field, observe)
+        _require_observable(layout_of(field), row)
+        return replace(self, observed=observed, branches=tuple(
+            _with_values(branch, _observed_along(branch, field, row), {"observed": observed})
+            for branch in self.branches))
 
     def peak(self, level: int = 0) -> BranchPoint:
         """The point of largest amplitude of a branch, or of smallest force at a held one."""
@@ -387,8 +414,17 @@ def _by_orbit_method(
         raise AnalysisError(f"{error} Friction elements that never slide keep any deflection, so "
                             f"that their orbits are not isolated: follow them by "
                             f"HarmonicBalance(), or start where they slide.") from error
-    seen = [_observed_of(point.orbit(field, OBSERVED_SAMPLES), row) for point in branch.points]
-    return _with_values(branch, seen, further)
+    return _with_values(branch, _observed_along(branch, field, row), further)
+
+
+def _observed_along(branch: Branch, field: VectorField, row: Array) -> list[dict[str, Any]]:
+    """Values of an observed quantity at all points of a branch of orbits."""
+    if not branch.points[0].by_harmonics:
+        return [_observed_of(point.orbit(field, OBSERVED_SAMPLES), row) for point in branch.points]
+    # The numbers of states and parameters are those of the field.
+    _ = branch.points[0].parameter_values(field)
+    found = _observed_of_series(branch, row)
+    return [{name: values[k] for name, values in found.items()} for k in range(len(branch))]
 
 
 def _observed_of(motion: PeriodicMotion, row: Array) -> dict[str, Any]:
@@ -530,12 +566,16 @@ def _taken(
 
 def observed_amplitudes(branch: Branch, row: Array) -> Array:
     """Half the range (N,) of an observed quantity at the points of a branch of orbits."""
+    _require_observable(layout_from(branch.attributes), row)
+    return np.array(_observed_of_series(branch, row)["observed_amplitude"])
+
+
+def _observed_of_series(branch: Branch, row: Array) -> dict[str, Any]:
+    """Values (N, ...) of an observed quantity of orbits by harmonic balance."""
     layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
-    _require_observable(layout, row)
     b = layout.harmonic
     X = np.array([point.u[: (2 * H + 1) * b] for point in branch.points]).reshape(-1, 2 * H + 1, b)
-    found = observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
-    return np.array(found["observed_amplitude"])
+    return observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
 
 
 def _require_observable(layout: Layout, row: Array) -> None:

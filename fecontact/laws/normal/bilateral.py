@@ -108,6 +108,76 @@ class BilateralCubic(BilateralLaw):
 
 
 @normal_law
+def _polynomial(u, v, p):
+    e, w = p[8] - u, -v
+    tension = (e * (p[0] + e * (p[1] + e * (p[2] + e * e * p[3]))) + p[7]
+               + w * (p[4] + p[5] * abs(w) + p[6] * w * w))
+    slope = p[0] + e * (2.0 * p[1] + e * (3.0 * p[2] + 5.0 * e * e * p[3]))
+    return _felt(tension, slope, p[4] + 2.0 * p[5] * abs(w) + 3.0 * p[6] * w * w)
+
+
+@dataclass(frozen=True)
+class BilateralPolynomial(BilateralLaw):
+    r"""Spring and dashpot whose forces are polynomials, for links.
+
+    .. math::
+
+        N = c\,\epsilon + c_2\,\epsilon^2 + c_3\,\epsilon^3 + c_5\,\epsilon^5 + N_0
+        + b\,\dot e + b_2\,|\dot e|\,\dot e + b_3\,\dot e^3, \qquad F = -N, \quad
+        \epsilon = e + s, \quad e = -u
+
+    N is the tension [N], e the elongation [m]. The force never ends: it pushes and pulls.
+
+    Parameters
+    ----------
+    stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness : float or (n,) sequence
+        c, c_2, c_3, c_5 [N/m, N/m^2, N/m^3, N/m^5], of any sign.
+    damping, quadratic_damping, cubic_damping : float or (n,) sequence
+        b, b_2, b_3, zero or above [N s/m, N s^2/m^2, N s^3/m^3].
+    preload : float or (n,) sequence
+        N_0 [N].
+    shortening : float or (n,) sequence
+        s: prescribed shortening [m].
+    """
+
+    kernel: ClassVar = _polynomial
+    extensive: ClassVar = frozenset({
+        "stiffness", "quadratic_stiffness", "cubic_stiffness", "quintic_stiffness", "damping",
+        "quadratic_damping", "cubic_damping", "preload"})
+
+    stiffness: Annotated[PerNode, Unit("N/m")] = 0.0
+    quadratic_stiffness: Annotated[PerNode, Unit("N/m^2")] = 0.0
+    cubic_stiffness: Annotated[PerNode, Unit("N/m^3")] = 0.0
+    quintic_stiffness: Annotated[PerNode, Unit("N/m^5")] = 0.0
+    damping: Annotated[NotNegative, Unit("N s/m")] = 0.0
+    quadratic_damping: Annotated[NotNegative, Unit("N s^2/m^2")] = 0.0
+    cubic_damping: Annotated[NotNegative, Unit("N s^3/m^3")] = 0.0
+    preload: Annotated[PerNode, Unit("N")] = 0.0
+    shortening: Annotated[PerNode, Unit("m")] = 0.0
+
+    @property
+    def penetration_scale(self) -> float:
+        """Elongation under about 1 N [m], the smallest of all nodes and terms."""
+        terms = ((self.stiffness, 1), (self.quadratic_stiffness, 2), (self.cubic_stiffness, 3),
+                 (self.quintic_stiffness, 5))
+        stiffest = max(float(np.max(np.abs(np.asarray(c)))) ** (1.0 / power) for c, power in terms)
+        return 1.0 / stiffest if stiffest > 0.0 else 1.0
+
+    def onsets(self, nodes: int) -> Array:
+        """None: a place (1, n) that no spring reaches [m]."""
+        return np.full((1, nodes), _NOWHERE)
+
+    def _shortening(self, table: Array) -> Array:
+        return np.asarray(table[:, 8])
+
+    def _potential(self, elongation: Array, table: Array) -> Array:
+        c, quadratic, cubic, quintic = table[:, :4].T
+        e, square = elongation, elongation**2
+        return np.asarray(square * (0.5 * c + e * quadratic / 3.0 + 0.25 * cubic * square
+                                    + quintic * square**2 / 6.0) + table[:, 7] * e)
+
+
+@normal_law
 def _play(u, v, p):
     e = p[4] - u
     side = select(e > 0.0, 1.0, -1.0)

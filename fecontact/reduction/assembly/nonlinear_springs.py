@@ -1,4 +1,4 @@
-"""Springs between two points whose force is not linear: cubic, with play, piecewise linear.
+"""Springs between two points whose force is not linear: polynomial, with play, piecewise linear.
 
 They are no part of the stiffness matrix. Each becomes one node of the system whose only motion is
 the elongation along its direction, with a law that pulls as well as pushes.
@@ -19,6 +19,7 @@ from fecontact.laws.normal.bilateral import (
     BilateralLaw,
     BilateralPiecewise,
     BilateralPlay,
+    BilateralPolynomial,
 )
 from fecontact.reduction.assembly.links import Links, NonlinearSpring, check_ends, spring_direction
 from fecontact.reduction.modal_basis import ModalBasis
@@ -95,6 +96,68 @@ class CubicSpring(_LawSpring):
         super().__post_init__()
         if self.stiffness == 0.0 and self.cubic_stiffness == 0.0:
             raise InputError("CubicSpring: stiffness and cubic_stiffness are both zero; give at "
+                             "least one of them.")
+
+
+@dataclass(frozen=True)
+class PolynomialSpring(_LawSpring):
+    r"""Spring and dashpot with polynomial forces between two points, or a point and the base.
+
+    .. math::
+
+        N = c\,\epsilon + c_2\,\epsilon^2 + c_3\,\epsilon^3 + c_5\,\epsilon^5 + N_0
+        + b\,\dot e + b_2\,|\dot e|\,\dot e + b_3\,\dot e^3, \qquad
+        \epsilon = e + s, \quad e = d \cdot (u_1 - u_2)
+
+    is the tension [N], which pulls both points together. d points from the second to the first
+    place, which stay in line with it: displacements are small.
+
+    Parameters
+    ----------
+    first : str
+        ``body.point``.
+    second : str, optional
+        Another point; by default the base, which does not move.
+    stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness : float
+        c, c_2, c_3, c_5 [N/m, N/m^2, N/m^3, N/m^5], of any sign.
+    damping, quadratic_damping, cubic_damping : float
+        b, b_2, b_3, zero or above [N s/m, N s^2/m^2, N s^3/m^3].
+    direction : (x, y) or (x, y, z), optional
+        d, of any length; by default along the line between the points.
+    preload : float
+        N_0 [N].
+    shortening : float
+        s: prescribed shortening, or how much longer the spring is between the points than when it
+        is free [m].
+
+    Raises
+    ------
+    InputError
+        For values out of range, a spring to the base without direction, or without any stiffness
+        and damping.
+    """
+
+    first: str
+    second: str | None = None
+    stiffness: Annotated[float, Unit("N/m")] = 0.0
+    quadratic_stiffness: Annotated[float, Unit("N/m^2")] = 0.0
+    cubic_stiffness: Annotated[float, Unit("N/m^3")] = 0.0
+    quintic_stiffness: Annotated[float, Unit("N/m^5")] = 0.0
+    damping: Annotated[float, Unit("N s/m")] = 0.0
+    quadratic_damping: Annotated[float, Unit("N s^2/m^2")] = 0.0
+    cubic_damping: Annotated[float, Unit("N s^3/m^3")] = 0.0
+    direction: Coordinates | None = None
+    preload: Annotated[float, Unit("N")] = 0.0
+    shortening: Annotated[float, Unit("m")] = 0.0
+
+    made_of: ClassVar = BilateralPolynomial
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not any((self.stiffness, self.quadratic_stiffness, self.cubic_stiffness,
+                    self.quintic_stiffness, self.damping, self.quadratic_damping,
+                    self.cubic_damping)):
+            raise InputError("PolynomialSpring: all stiffnesses and dampings are zero; give at "
                              "least one of them.")
 
 

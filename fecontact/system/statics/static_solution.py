@@ -88,11 +88,11 @@ def nodal_forces(
         total -= load.normal * at("C")[d - 1]
     components = ("x", "y", "phi") if d == 2 else ("x", "y", "z", "phi_x", "phi_y", "phi_z")
     for force in load.forces:
-        if force.component not in components:
+        if not force.suits(components):
             raise InputError(f"static_solution: a force at {force.point!r} has the component "
                              f"{force.component!r}, but points of this body have "
                              f"{choices(components)}.")
-        total += value(force.signal) * at(force.point)[components.index(force.component)]
+        total += value(force.signal) * force.row(at(force.point), components)
     carried = [0.0 if signal is None else value(signal) for signal in load.base_accelerations]
     gravity = load.gravity or (0.0,) * d
     if len(gravity) != d or any(carried[d:]):

@@ -11,7 +11,7 @@ from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
 from fecontact.core.types import Array
-from fecontact.laws.normal.bilateral import BilateralCubic
+from fecontact.laws.normal.bilateral import BilateralCubic, BilateralPolynomial
 from fecontact.system.contact_system import needs_friction
 from fecontact.system.nodes import SystemArrays
 
@@ -154,13 +154,14 @@ class CompiledBalance:
 
     @cached_property
     def kinked(self) -> bool:
-        """Whether contact forces may have kinks: all but those of cubic springs without friction.
+        """Whether contact forces may have kinks: all but polynomial springs without friction.
 
         Newton's method then need not converge as quickly as its last steps did.
         """
         system = self.contact_field.system()
         return needs_friction(system.basis) or not all(
-            isinstance(law, BilateralCubic) for _, _, law in system.law_groups("normal"))
+            isinstance(law, BilateralCubic | BilateralPolynomial)
+            for _, _, law in system.law_groups("normal"))
 
 
 def _contact_alone(system: SystemArrays) -> SystemArrays:
