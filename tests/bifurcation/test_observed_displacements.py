@@ -13,6 +13,7 @@ from fecontact.bifurcation import (
     ContinuationOptions,
     HarmonicBalance,
     Shooting,
+    contact_field,
     controlled_response,
     frequency_response,
 )
@@ -83,6 +84,22 @@ def test_held_amplitudes_and_vector_fields():
         response.harmonic()), rtol=1e-10)
     with pytest.raises(InputError, match=r"drive\.angular_frequency"):
         held.of(field, [1.0, 0.0])
+
+
+@pytest.mark.parametrize("method", [HarmonicBalance(3), Shooting(segments=1)])
+def test_a_system_in_place_of_its_field(method):
+    """Points between those of a branch, orbits and trajectories, from the system alone."""
+    system = two_masses(0.3)
+    branch = frequency_response(system, (0.4, 0.6), observe=("B", "y"), options=FEW,
+                                method=method).branches[0]
+    field = contact_field(system, ["drive.angular_frequency"])
+    one, other = (branch.at(given, 0.45) for given in (system, field))
+    np.testing.assert_array_equal(one.u, other.u)
+    assert one.parameter == 0.45
+    np.testing.assert_array_equal(one.orbit(system).states, one.orbit(field).states)
+    assert one.trajectory(system).time[-1] == pytest.approx(2.0 * np.pi / 0.45)
+    with pytest.raises(InputError, match="field"):
+        branch.at(None, 0.45)
 
 
 def test_bad_points():

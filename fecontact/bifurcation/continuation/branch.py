@@ -8,7 +8,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint, as_field
 from fecontact.bifurcation.continuation.points import (
     UNRESOLVED,
     UNRESOLVED_MEANING,
@@ -32,7 +32,8 @@ from fecontact.core.errors import AnalysisError, InputError, choices, require_fi
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, span
-from fecontact.system.fields.vector_field import VectorField, require_field
+from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.vector_field import VectorField
 
 
 def _plain(kind: str) -> str:
@@ -187,19 +188,22 @@ class Branch(Summarised):
         return np.array(found)
 
     @overload
-    def at(self, field: VectorField, value: float, which: int = 0) -> BranchPoint: ...
+    def at(
+        self, field: VectorField | ContactSystem, value: float, which: int = 0
+    ) -> BranchPoint: ...
     @overload
     def at(
-        self, field: VectorField, value: Sequence[float] | Array, which: int = 0
+        self, field: VectorField | ContactSystem, value: Sequence[float] | Array, which: int = 0
     ) -> tuple[BranchPoint, ...]: ...
     def at(
-        self, field: VectorField, value: float | Sequence[float] | Array, which: int = 0
+        self, field: VectorField | ContactSystem, value: float | Sequence[float] | Array,
+        which: int = 0,
     ) -> BranchPoint | tuple[BranchPoint, ...]:
         """The solution at a value of the parameter, solved from the point of the branch beside it.
 
         Parameters
         ----------
-        field : VectorField
+        field : VectorField or ContactSystem
             That of the branch.
         value : float or (k,) sequence
             The value; several give a tuple with the solution at each.
@@ -214,7 +218,7 @@ class Branch(Summarised):
         AnalysisError
             If no solution is found there.
         """
-        require_field(field)
+        field = as_field(field, self.attributes)
         if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
             values = as_floats(value, "The values of the parameter").ravel().tolist()
             return tuple(self.at(field, one, which) for one in values)

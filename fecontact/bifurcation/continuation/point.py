@@ -17,6 +17,7 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
+from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
@@ -33,6 +34,22 @@ _NORMAL_FORMS: Mapping[str, tuple[str, ...]] = {
     "fold-flip": ("b", "c", "d", "e"), "fold-Neimark-Sacker": ("b", "c", "d", "e"),
     **dict.fromkeys(("flip-Neimark-Sacker", "double Neimark-Sacker"),
                     ("p11", "p12", "p21", "p22"))}
+
+
+def as_field(given: VectorField | ContactSystem, known: Mapping[str, Any]) -> VectorField:
+    """The field of a branch with the attributes ``known``, from the field or its contact system.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or a system without parameters of these names.
+    """
+    if not isinstance(given, ContactSystem):
+        require_field(given)
+        return given
+    from fecontact.bifurcation.fields.contact_field import contact_field
+
+    return contact_field(given, [str(name) for name in known.get("parameter_names", ())])
 
 
 @read_only_arrays
@@ -180,12 +197,14 @@ class BranchPoint(Summarised):
             values[field.index(str(name))] = value
         return values
 
-    def orbit(self, field: VectorField | None = None, samples: int = 1000) -> "PeriodicMotion":
+    def orbit(
+        self, field: VectorField | ContactSystem | None = None, samples: int = 1000
+    ) -> "PeriodicMotion":
         """The orbit over one period, both ends included; a homoclinic one over its interval.
 
         Parameters
         ----------
-        field : VectorField, optional
+        field : VectorField or ContactSystem, optional
             That of the branch; orbits found by shooting are run again and need it. With it the
             motion knows its parameter values and the names of its states, and can start a branch
             over another parameter.
@@ -202,6 +221,8 @@ class BranchPoint(Summarised):
         from fecontact.bifurcation.orbits.motions import collocated, of_runs
 
         self._require_orbit("orbit: samples", samples)
+        if field is not None:
+            field = as_field(field, self.branch.attributes)
         if self.is_homoclinic:
             found = sampled(self.u, np.asarray(self.values["mesh"], dtype=float),
                             len(self.values["saddle"]), float(self.values["time"]), samples)
@@ -223,7 +244,9 @@ class BranchPoint(Summarised):
         return replace(found, periods=periods, parameter_values=values,
                        state_names=() if field is None else field.state_names)
 
-    def trajectory(self, field: VectorField, outputs: int = 1001) -> "Trajectory":
+    def trajectory(
+        self, field: VectorField | ContactSystem, outputs: int = 1001
+    ) -> "Trajectory":
         """The orbit over one period as a trajectory, which can be plotted, stored and rendered.
 
         Orbits by shooting are run again. Of others the work is integrated over the outputs by the
@@ -231,7 +254,7 @@ class BranchPoint(Summarised):
 
         Parameters
         ----------
-        field : ContactField
+        field : ContactField or ContactSystem
             That of the branch.
         outputs : int
             Number of times; orbits by shooting may have some more.
@@ -244,8 +267,9 @@ class BranchPoint(Summarised):
         from fecontact.bifurcation.fields.contact_field import ContactField
         from fecontact.bifurcation.orbits.motions import joined, sampled_run
 
-        require_kind("trajectory", ContactField, field=field)
+        require_kind("trajectory", (ContactField, ContactSystem), field=field)
         self._require_orbit("trajectory: outputs", outputs)
+        field = as_field(field, self.branch.attributes)
         if self.by_shooting:
             return joined(self._runs(field, outputs))
         system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint, as_field
 from fecontact.bifurcation.continuation.points import (
     UNRESOLVED,
     UNRESOLVED_MEANING,
@@ -25,7 +25,6 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import (
     ContactField,
-    contact_field,
     field_between,
 )
 from fecontact.bifurcation.fields.observed_row import observed_row
@@ -160,8 +159,7 @@ class FrequencyResponse(Summarised):
             For a point that does not exist, internal variables, or another system.
         """
         require_kind("FrequencyResponse.of", (ContactSystem, VectorField), system=system)
-        names = self.branches[0].attributes["parameter_names"]
-        field = system if isinstance(system, VectorField) else contact_field(system, names)
+        field = as_field(system, self.branches[0].attributes)
         row, observed = observed_row(field, observe)
         _require_observable(layout_of(field), row)
         return replace(self, observed=observed, branches=tuple(
