@@ -10,12 +10,20 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of
-from fecontact.bifurcation.orbit_methods import Collocation
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic import starts as harmonic_starts
+from fecontact.bifurcation.harmonic.branches import attributes_of as harmonic_attributes
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.branches import as_motion, attributes_of
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.same_orbit import VANISHING
+from fecontact.bifurcation.orbits.shooting import ShootingProblem
+from fecontact.bifurcation.orbits.shooting_branches import attributes_of as shooting_attributes
+from fecontact.bifurcation.orbits.shooting_branches import start_of as shooting_start
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import FecontactError, InputError, require_finite
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -35,8 +43,7 @@ _PRECISION, _TOLERANCE = 1e-9, 1e-11
 _GROWS, _MAY, _MUST = 1e-6, 1e-9, 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class FamilyProblem(CollocationProblem):
+class _FamilyTests:
     """Orbits of a conservative system: two multipliers are one, the others come in pairs mu, 1/mu.
 
     A pair leaves the unit circle at -1, where orbits of twice the period begin, or at 1, at a
@@ -48,7 +55,8 @@ class FamilyProblem(CollocationProblem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """As of other orbits; unstable are those of which a perturbation grows exponentially."""
-        found = super().point(u, linearisation, tangent)
+        found: dict[str, Any] = dict(super().point(  # type: ignore[misc]
+            u, linearisation, tangent))
         unstable = _beyond(found["multipliers"], _GROWS)
         return found | {"unstable": unstable, "stable": unstable == 0}
 
@@ -63,7 +71,8 @@ class FamilyProblem(CollocationProblem):
         size = 1.0 + np.abs(others)
         return {"period doubling": float(np.prod((others + 1.0) / size).real),
                 "branch point": float(np.prod((others - 1.0) / size).real),
-                VANISHING: super().tests(u, linearisation, tangent)[VANISHING]}
+                **{name: value for name, value in super().tests(  # type: ignore[misc]
+                    u, linearisation, tangent).items() if name == VANISHING}}
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
@@ -74,6 +83,21 @@ class FamilyProblem(CollocationProblem):
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """Turns of the unfolding parameter are rounding."""
         return {"fold"}
+
+
+@dataclass(frozen=True, eq=False)
+class _ByCollocation(_FamilyTests, CollocationProblem):
+    """Families by collocation."""
+
+
+@dataclass(frozen=True, eq=False)
+class _ByHarmonics(_FamilyTests, HarmonicProblem):
+    """Families by harmonic balance."""
+
+
+@dataclass(frozen=True, eq=False)
+class _ByShooting(_FamilyTests, ShootingProblem):
+    """Families by shooting."""
 
 
 def _others(multipliers: ComplexArray) -> ComplexArray:
@@ -91,7 +115,7 @@ def orbit_family(
     start: HopfPoint | PeriodicMotion | Trajectory | FieldRun | tuple[ArrayLike, ArrayLike],
     unfolding: str | None = None,
     *,
-    method: Collocation | None = None,
+    method: Method | None = None,
     options: ContinuationOptions | None = None,
     bounds: tuple[float, float] | None = None,
     scales: ArrayLike | None = None,
@@ -119,7 +143,10 @@ def orbit_family(
         The orbit of this size is the first; at a Hopf point over lambda the smallest one.
     unfolding : str, optional
         Name of lambda; by default the only parameter of the field.
-    method, options, scales
+    method : Collocation, HarmonicBalance or Shooting, optional
+        As for :func:`fecontact.bifurcation.orbit_branch`, with stability; collocation finds the
+        first orbit for all of them.
+    options, scales
         As for :func:`fecontact.bifurcation.orbit_branch`.
     bounds : (float, float), optional
         Of the period [s].
@@ -141,7 +168,14 @@ def orbit_family(
     require_field(field)
     require_kind("orbit_family", (HopfPoint, PeriodicMotion, Trajectory, FieldRun, tuple),
                  start=start)
-    require_kind("orbit_family", (Collocation, type(None)), method=method)
+    require_kind("orbit_family", (Collocation, HarmonicBalance, Shooting, type(None)),
+                 method=method)
+    if isinstance(method, HarmonicBalance) and (method.stability is None or method.refines):
+        raise InputError("orbit_family: harmonic balance needs stability, and takes the harmonics "
+                         "and samples that it is given; leave out stability = None and tolerances.")
+    if isinstance(method, Shooting) and not isinstance(field, ContactField):
+        raise InputError("orbit_family: shooting is for contact systems; take Collocation() or "
+                         "HarmonicBalance().")
     require_finite("orbit_family", direction=direction)
     free = field.index(field.parameter_or_only(unfolding))
     if field.forcing_period(field.values) is not None:
@@ -150,14 +184,14 @@ def orbit_family(
     chosen = options_of(options, bounds)
     chosen = replace(chosen, bounds=(-np.inf, np.inf), second_bounds=chosen.bounds,
                      tolerance=min(chosen.tolerance, _TOLERANCE))
-    how = method or Collocation()
+    how = method if isinstance(method, Collocation) else Collocation()
     if isinstance(start, HopfPoint):
         if both or field.index(start.branch.parameter_name) != free:
             raise InputError(f"{start.place} has a family to one side, over "
                              f"{start.branch.parameter_name!r}; leave out both, and name that "
                              f"parameter.")
         begun = starts.at_hopf(field, start, how.intervals, how.degree, chosen, scales, 1.0)
-        return _stays(field, free, _first(begun, chosen))
+        return _stays(field, free, _first(begun, chosen, method))
     motion = as_motion(start)
     values = field.values if motion.parameter_values is None else motion.parameter_values.copy()
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
@@ -173,32 +207,46 @@ def orbit_family(
     unit[-1] = 1.0
     tangent = problem.linearise(u).solve(starts.size_row(problem, u), unit)
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
-    return _stays(field, free, _followed((problem, u, tangent), chosen, limits, both))
+    return _stays(field, free, _followed((problem, u, tangent), chosen, method, limits,
+                                         both))
 
 
 def _first(
-    begun: Iterator[tuple[starts.Start, Array | None]], options: ContinuationOptions
+    begun: Iterator[tuple[starts.Start, Array | None]], options: ContinuationOptions,
+    method: Method | None,
 ) -> Branch:
     """The branch of the first start that leads anywhere."""
     failed: FecontactError = InputError("There is nothing to start from.")
     for found, limits in begun:
         try:
-            return _followed(found, options, limits)
+            return _followed(found, options, method, limits)
         except FecontactError as error:
             failed = error
     raise failed
 
 
 def _followed(
-    start: starts.Start, options: ContinuationOptions, limits: Array | None, both: bool = False
+    start: starts.Start, options: ContinuationOptions, method: Method | None,
+    limits: Array | None, both: bool = False,
 ) -> Branch:
-    """Follow a family from a start."""
-    problem, u, tangent = start
+    """Follow a family from a start by collocation."""
+    found, u, tangent = start
+    problem: Any = found
+    kind: Any = _ByCollocation
+    if isinstance(method, HarmonicBalance):
+        problem, u, tangent = harmonic_starts.of_orbit(found, u, tangent, method)
+        problem, kind = replace(problem, limits=limits), _ByHarmonics
+        attributes = harmonic_attributes(problem)
+    elif isinstance(method, Shooting):
+        problem, u, tangent = shooting_start(start, method.segments, method.rtol,
+                                             method.derivative_rtol, method.solver, limits)
+        kind, attributes = _ByShooting, shooting_attributes(problem)
+    else:
+        attributes = attributes_of(found, limits)
     kept = {entry.name: getattr(problem, entry.name) for entry in fields(problem)}
-    family = FamilyProblem(**kept | {"limits": limits, "precision": _PRECISION})
+    family = kind(**kept | {"limits": limits, "precision": _PRECISION})
     return continue_branch(family, u, options, name=list(problem.field.parameters)[problem.free],
-                           tangent=tangent, both=both,
-                           attributes=attributes_of(problem, limits) | {"family": True})
+                           tangent=tangent, both=both, attributes=attributes | {"family": True})
 
 
 def _stays(field: VectorField, free: int, family: Branch) -> Branch:

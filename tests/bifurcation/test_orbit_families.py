@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oscillators import duffing_frequency
 from scipy.special import ellipk
 
 import fecontact as fc
@@ -9,9 +10,11 @@ from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
     ContinuationOptions,
+    HarmonicBalance,
     Shooting,
     branch_tree,
     codim2_curve,
+    contact_field,
     equilibrium_branch,
     orbit_branch,
     orbit_family,
@@ -169,3 +172,61 @@ def test_orbits_of_families_are_no_single_orbits(straight, tmp_path):
     larger = orbit_family(STARS, point.orbit(STARS), bounds=(6.29, 12.0),
                           method=Collocation(intervals=80), options=ContinuationOptions(points=2))
     assert larger.points[0].values["period"] == pytest.approx(point.values["period"], rel=1e-6)
+
+
+def mass_on_a_spring():
+    """x'' + x + .1 x^3 = 0 as a contact system, with a dashpot to unfold its orbits."""
+    rows = np.zeros((3, 1))
+    rows[1, 0] = 1.0
+    return contact_field(fc.ContactSystem(
+        fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows}),
+        normal=fc.laws.BilateralCubic(0.0, 0.1), drive=fc.Drive(stiffness_y=1.0)),
+        {"drive.damping_y": 0.0})
+
+
+@pytest.mark.parametrize("method", [Collocation(intervals=40), HarmonicBalance(15),
+                                    Shooting(segments=2)])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_families_by_any_method(method, direction, tmp_path):
+    """Periods of a hardening spring against elliptic integrals, to larger and smaller motions."""
+    field = mass_on_a_spring()
+    t = np.linspace(0.0, 5.5, 201)
+    guess = np.stack([2.0 * np.cos(2.0 * np.pi * t / 5.5), -2.2 * np.sin(2.0 * np.pi * t / 5.5)], 1)
+    bounds = (4.5, 5.55) if direction > 0.0 else (5.3, 6.2)
+    family = orbit_family(field, (t, guess), method=method, direction=direction, bounds=bounds,
+                          options=ContinuationOptions(points=60, largest_step=0.3))
+    sizes, period = family.column("maximum")[:, 0], family.column("period")
+    assert family.status is BranchStatus.BOUND
+    assert np.abs(family.parameter).max() < 1e-8
+    assert (np.diff(sizes) * direction > 0.0).all()
+    w = np.array([duffing_frequency(size) for size in sizes])
+    assert period == pytest.approx(2.0 * np.pi / w, rel=2e-6)
+    assert family.column("stable").all()
+    read = read_branch(write_branch(tmp_path / "f.h5", family))
+    assert read.points[-1].orbit(field).states == pytest.approx(
+        family.points[-1].orbit(field).states, abs=1e-9)
+
+
+def test_families_of_two_stars_by_harmonic_balance():
+    """Periods and stability of the straight family are those by collocation."""
+    run = fc.simulate(STARS, 8.0, initial=[0.0, 0.2, 0.0, 0.0], outputs=801, rtol=1e-9)
+    one, other = (orbit_family(STARS, run, method=method, bounds=(6.0, 7.2),
+                               options=ContinuationOptions(points=40, largest_step=0.2))
+                  for method in (Collocation(intervals=40), HarmonicBalance(25)))
+    assert len(other) > 5
+    size, period = one.column("maximum")[:, 1], one.column("period")
+    inside = other.column("maximum")[:, 1] < size.max()
+    assert np.interp(other.column("maximum")[inside, 1], size, period) == pytest.approx(
+        other.column("period")[inside], rel=1e-3)
+
+
+@pytest.mark.parametrize(("method", "told"), [
+    (HarmonicBalance(5, stability=None), "harmonic balance needs stability"),
+    (HarmonicBalance(5, tolerance=1e-3), "takes the harmonics and samples that it is given"),
+    (Shooting(), "shooting is for contact systems; take Collocation"),
+    (3, "method"),
+])
+def test_methods_of_families_are_checked(method, told):
+    run = fc.simulate(PENDULUM, 14.0, initial=[1.0, 0.0], outputs=1401, rtol=1e-9)
+    with pytest.raises(InputError, match=told):
+        orbit_family(PENDULUM, run, method=method)

@@ -21,6 +21,7 @@ from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.bifurcation.orbits import starts as orbit_starts
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
@@ -91,6 +92,27 @@ def from_samples(
         problem = replace(problem, kept=problem.kept.left_by(sampled))
     u = unknowns(problem, sampled, found.period(nodes))
     return replace(problem, reference=problem.coefficients(u).copy()), u
+
+
+def of_orbit(
+    found: CollocationProblem, nodes: Array, leaving: Array, method: HarmonicBalance
+) -> Start:
+    """Start at an orbit by collocation, in the direction of its size.
+
+    ``leaving`` is the direction by collocation, which says whether the orbit grows or shrinks.
+    """
+    problem = problem_for(found.field, found.values, found.free, method, found.scales)
+    values = found.values.copy()
+    values[found.free] = nodes[-1]
+    problem = replace(problem, values=values)
+    u = unknowns(problem, orbit_starts.at_phase(found, nodes, problem.series.times),
+                 found.period(nodes))
+    size = u.copy()
+    size[: problem.reference.shape[1]], size[problem.size :] = 0.0, 0.0
+    size /= np.sqrt(problem.weights() @ size**2)
+    grows = orbit_starts.size_row(found, nodes) @ leaving
+    return (replace(problem, reference=problem.coefficients(u).copy()), u,
+            np.copysign(1.0, grows) * size)
 
 
 def at_hopf(

@@ -35,8 +35,8 @@ _CLOSE = 0.1
 _INTERVALS, _DEGREE = 200, 4
 
 
-def _attributes(problem: ShootingProblem) -> dict[str, Any]:
-    """Attributes of a branch."""
+def attributes_of(problem: ShootingProblem) -> dict[str, Any]:
+    """Attributes of a branch, so that its points can be restored."""
     names = problem.field
     found = {"state_names": list(names.state_names), "parameter_names": list(names.parameters),
              "parameter_values": problem.values, "scales": problem.scales,
@@ -62,14 +62,22 @@ def born(
 
     ``limits`` (d,) are those of the growth of the scales, here and below.
     """
+    problem, first, tangent = start_of(start, segments, rtol, derivative_rtol, solver, limits)
+    return continue_branch(problem, first, options, name=_name(problem), tangent=tangent,
+                           attributes=attributes_of(problem))
+
+
+def start_of(
+    start: Start, segments: int, rtol: float, derivative_rtol: float | None, solver: Solver,
+    limits: Array | None,
+) -> tuple[ShootingProblem, Array, Array]:
+    """Problem, unknowns and direction by shooting, from those by collocation."""
     found, u, leaving = start
     problem, first = shooting_from(found, u, segments, rtol, derivative_rtol, solver)
     problem = replace(problem, limits=limits)
     shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
     tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
-    return continue_branch(problem, first, options, name=_name(problem),
-                           tangent=tangent / np.sqrt(problem.weights() @ tangent**2),
-                           attributes=_attributes(problem))
+    return problem, first, tangent / np.sqrt(problem.weights() @ tangent**2)
 
 
 def from_motion(
@@ -105,7 +113,7 @@ def from_motion(
     try:
         branch = continue_branch(
             problem, u, options, name=_name(problem), direction=direction, both=both,
-            attributes=_attributes(problem))
+            attributes=attributes_of(problem))
     except (AnalysisError, InputError) as error:
         remedy = stepping or (f"run it longer until it has settled, or take more than {segments} "
                               f"segments.")
@@ -168,7 +176,8 @@ def _from_event_to_event(
                            problem.solver)
     except AnalysisError as error:
         return None, f"The runs of the orbit were differenced: {error}"
-    whole = {**_attributes(replace(problem, limits=None)), "scales": found[0].scales, "segments": 1}
+    whole = {**attributes_of(replace(problem, limits=None)), "scales": found[0].scales,
+             "segments": 1}
     try:
         return followed(*found, options, name=_name(problem), attributes=whole, **how), ""
     except InputError as error:
@@ -214,7 +223,7 @@ def goes_on(
         return branch
     return _noted(why, continue_branch(
         problem, u, options, name=_name(problem), tangent=sign * tangent, both=both,
-        attributes=_attributes(problem)))
+        attributes=attributes_of(problem)))
 
 
 def doubled(
@@ -252,7 +261,7 @@ def doubled(
     twice, start, tangent = twice.adapted(start + options.step * tangent, tangent)
     found = continue_branch(twice, start, replace(options, stop_at=[*stops, HALVING]),
                             name=_name(twice),
-                            tangent=tangent, attributes=_attributes(twice))
+                            tangent=tangent, attributes=attributes_of(twice))
     return _ended(found, problem, options)
 
 
