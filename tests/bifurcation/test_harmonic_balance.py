@@ -325,6 +325,29 @@ def test_branch_is_stored_and_continued(two_masses, tmp_path):
     assert moved.points[0].values["period"] == pytest.approx(one.values["period"], rel=1e-6)
 
 
+@pytest.mark.parametrize("orders", [5, [1, 3, 5]])
+@pytest.mark.parametrize("make", [duffing, unilateral])
+def test_signs_of_determinants(make, orders):
+    """By the factors of a solution, also with another last row, against NumPy."""
+    field = make()
+    problem = problem_for(field, field.values, 0, HarmonicBalance(orders, 32),
+                          np.ones(field.dimension + 2))
+    rng, signs = np.random.default_rng(3), set()
+    for _ in range(6):
+        u = np.append(rng.normal(size=problem.size), field.values[0])
+        u[problem.left_out] = 0.0
+        linearised = problem.linearise(u)
+        for _ in range(3):
+            row = rng.normal(size=len(u))
+            row[problem.left_out] = 0.0
+            sign = np.linalg.slogdet(np.vstack([linearised.condensed, row]))[0]
+            assert linearised.determinant_sign(row) == sign
+            signs.add(sign)
+            found = linearised.solve(row, np.arange(len(u)) * (row != 0.0))
+            assert row @ found == pytest.approx(len(u) - 1.0)
+    assert signs == {-1.0, 1.0}
+
+
 def test_series_are_orthogonal():
     found = series(7, 24)
     assert found.projection @ found.values == pytest.approx(np.eye(15), abs=1e-14)

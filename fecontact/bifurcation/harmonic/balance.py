@@ -458,8 +458,25 @@ class Linearised:
         if first is row or np.array_equal(first, row):
             return np.asarray(found)
         # Another last row: add what solves the homogeneous equations.
-        along = factors.solve(np.append(np.zeros(len(row) - 1), 1.0))
+        along = self._along
         return np.asarray(found + (rhs[-1] - row @ found) / (row @ along) * along)
+
+    @cached_property
+    def _along(self) -> Array:
+        """Solution of the homogeneous equations with one in the last row that was factorised."""
+        assert self._factors is not None
+        factors, first = self._factors
+        return np.asarray(factors.solve(np.append(np.zeros(len(first) - 1), 1.0)))
+
+    def determinant_sign(self, row: Array) -> float:
+        """Sign of det [[G_u], [row]] by the factors of :meth:`solve`; 0 where they are singular."""
+        _ = self.solve(row, np.zeros(len(row)))
+        if self._factors is None or not isinstance(self._factors[0], Factors):
+            return 0.0
+        factors, first = self._factors
+        if first is row or np.array_equal(first, row):
+            return factors.sign
+        return factors.sign * float(np.sign(row @ self._along))
 
 
 def zero_left_out(matrix: Array, left: Integers) -> Array:

@@ -58,6 +58,13 @@ class Factors:
         found = cls.of(np.ascontiguousarray(square[np.ix_(rest, rest)]))
         return None if found is None else replace(found, rest=rest)
 
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant."""
+        factors, pivots = self.factors
+        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
+        return float(np.prod(np.sign(np.diag(factors))) * (-1.0) ** swaps)
+
     def solve(self, rhs: Array) -> Array:
         """Solution (n + 1,)."""
         if self.rest is None:

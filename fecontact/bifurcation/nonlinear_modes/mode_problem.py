@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
 
 from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
@@ -148,13 +147,14 @@ class ModeProblem(HarmonicProblem):
         internal resonance that a step has left out; such steps are refused.
         """
         weights = self.weights()
-        square = np.vstack([linearisation.condensed, weights * tangent]) * weights**-0.5
-        square /= np.abs(square).max(axis=1)[:, None]
-        factors, pivots = lu_factor(square, check_finite=False)
-        swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
-        sign = np.prod(np.sign(np.diag(factors))) * (-1.0) ** swaps
-        size = np.linalg.norm(lu_solve((factors, pivots), np.cos(np.arange(len(square)))))
-        return {"branch point": float(sign / size)}
+        row = weights * tangent
+        # Each equation is divided by its largest coefficient in scaled unknowns.
+        sizes = np.append(np.abs(linearisation.condensed * weights**-0.5).max(axis=1),
+                          np.abs(row * weights**-0.5).max())
+        found = linearisation.solve(row, sizes * np.cos(np.arange(len(row))))
+        size = float(np.sqrt(weights @ found**2))
+        return {"branch point": (linearisation.determinant_sign(row) / size
+                                 if np.isfinite(size) else 0.0)}
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """Turns of xi are no folds of the mode."""
