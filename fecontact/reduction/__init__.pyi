@@ -15,6 +15,7 @@ from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from .point_masses import point_masses
+from .polynomial_stiffness import polynomial_stiffness
 from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
@@ -49,6 +50,7 @@ __all__ = [
     "mode_convergence",
     "normalisation",
     "point_masses",
+    "polynomial_stiffness",
     "reduce_bodies",
     "rows_from_dofs",
 ]
