@@ -244,7 +244,9 @@ def _followed(
     else:
         attributes = attributes_of(found, limits)
     kept = {entry.name: getattr(problem, entry.name) for entry in fields(problem)}
-    family = kind(**kept | {"limits": limits, "precision": _PRECISION})
+    if "precision" in kept:
+        kept["precision"] = _PRECISION
+    family = kind(**kept | {"limits": limits})
     return continue_branch(family, u, options, name=list(problem.field.parameters)[problem.free],
                            tangent=tangent, both=both, attributes=attributes | {"family": True})
 

@@ -1,7 +1,7 @@
 """Polynomial stiffness that couples coordinates, as springs along sums of coordinates."""
 
-from itertools import combinations, combinations_with_replacement, product
-from math import factorial, prod
+from itertools import combinations_with_replacement
+from math import factorial, gcd, prod
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def polynomial_stiffness(
             = \sum_r w_{ri} \left(c_r\,(w_r \cdot q)^2 + d_r\,(w_r \cdot q)^3\right),
 
     so that they are those of springs between the base and sums of coordinates :math:`w_r \cdot q`,
-    whose coefficients are 0, 1 and -1, at most three of them for a and four for b.
+    whose coefficients are small whole numbers.
 
     Parameters
     ----------
@@ -95,19 +95,19 @@ def _checked(given: ArrayLike, power: int, name: str) -> Array:
 
 
 def _directions(d: int, degree: int) -> Array:
-    """Directions (n, d) whose powers span all polynomials of a degree: up to ``degree`` of +-1."""
+    """Directions (n, d) whose powers are a basis of the polynomials of a degree.
+
+    Their coefficients are whole numbers whose sum is the degree, without common factors.
+    """
     found = []
-    for count in range(1, min(d, degree) + 1):
-        for places in combinations(range(d), count):
-            for signs in product((1, -1), repeat=count - 1):
-                direction = np.zeros(d, dtype=int)
-                direction[list(places)] = (1, *signs)
-                found.append(direction)
+    for places in combinations_with_replacement(range(d), degree):
+        counts = [places.count(k) for k in range(d)]
+        found.append([count // gcd(*counts) for count in counts])
     return np.array(found)
 
 
 def _along(tensor: Array, directions: Array) -> Array:
-    """Sizes (n,) with which powers of the directions add up to the tensor, the least ones."""
+    """Sizes (n,) with which powers of the directions add up to the tensor."""
     d, degree = len(tensor), tensor.ndim
     monomials = list(combinations_with_replacement(range(d), degree))
     counts = [[places.count(k) for k in range(d)] for places in monomials]
@@ -117,4 +117,4 @@ def _along(tensor: Array, directions: Array) -> Array:
                        for count, order in zip(counts, orders, strict=True)])
     wanted = np.array([order * tensor[places]
                        for places, order in zip(monomials, orders, strict=True)])
-    return np.asarray(np.linalg.lstsq(powers, wanted, rcond=None)[0])
+    return np.asarray(np.linalg.solve(powers, wanted))

@@ -21,6 +21,7 @@ from fecontact.bifurcation import (
     vector_field,
     with_normal_form,
 )
+from fecontact.bifurcation.nonlinear_modes.linear_start import with_mass_damping
 from fecontact.core.errors import InputError
 from fecontact.integrate.field_runs.stepper import start_field
 from fecontact.io import read_branch, write_branch
@@ -175,13 +176,13 @@ def test_orbits_of_families_are_no_single_orbits(straight, tmp_path):
 
 
 def mass_on_a_spring():
-    """x'' + x + .1 x^3 = 0 as a contact system, with a dashpot to unfold its orbits."""
+    """x'' + x + .1 x^3 = 0 as a contact system, with a damping of the mass to unfold its orbits."""
     rows = np.zeros((3, 1))
     rows[1, 0] = 1.0
     return contact_field(fc.ContactSystem(
         fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows}),
         normal=fc.laws.BilateralCubic(0.0, 0.1), drive=fc.Drive(stiffness_y=1.0)),
-        {"drive.damping_y": 0.0})
+        {"xi": (0.0, with_mass_damping)})
 
 
 @pytest.mark.parametrize("method", [Collocation(intervals=40), HarmonicBalance(15),

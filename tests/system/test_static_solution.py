@@ -88,13 +88,13 @@ def test_forces_with_a_direction():
                         PointLoad("right", "y", signal=Constant(12.0))])
     one, other = (fc.static_solution(part, load, points=end) for load in (slanted, both))
     np.testing.assert_allclose(one.displacement, other.displacement, rtol=1e-12)
-    basis = fc.modal_basis(part, 3, contact_nodes=2, points=end)
+    basis = fc.modal_basis(part, 3, contact="bottom", contact_nodes=2, C=end["C"])
     one, other = (fc.static_equilibrium(fc.ContactSystem(
-        basis, normal=fc.laws.LinearContact(1e6), gap=1.0, load=Load(forces=[
+        basis, fc.laws.LinearContact(1e6), fc.laws.Frictionless(), gap=1.0, load=Load(forces=[
             PointLoad("C", force.component, signal=force.signal) for force in load.forces])))
         for load in (slanted, both))
     np.testing.assert_allclose(one, other, rtol=1e-10)
-    system = fc.ContactSystem(basis, normal=fc.laws.LinearContact(1e6), load=Load(
+    system = fc.ContactSystem(basis, fc.laws.LinearContact(1e6), fc.laws.Frictionless(), load=Load(
         forces=[PointLoad("C", (5.0, 12.0), signal=Constant(13.0))]))
     assert parameter_label("load.forces.0.signal.value", system=system).startswith(
         "force at C (0.3846, 0.9231)")

@@ -69,7 +69,7 @@ class Factors:
         """Solution (n + 1,)."""
         if self.rest is None:
             return np.asarray(dgetrs(*self.factors, rhs, trans=1)[0])
-        found = np.zeros_like(rhs)
+        found = np.zeros(len(rhs))
         found[self.rest] = dgetrs(*self.factors, rhs[self.rest], trans=1)[0]
         return found
 
