@@ -131,9 +131,9 @@ def orbit_family(
 
         \dot x = f(x) + \lambda g(x), \qquad \oint \nabla H \cdot g \, dt \ne 0
 
-    there are periodic orbits for lambda = 0 alone. The branch is one over lambda, which stays to
-    rounding; 'period', 'minimum' and 'maximum' change. Special points are 'period doubling' and
-    'branch point'; an orbit is 'stable' if no perturbation grows exponentially.
+    there are periodic orbits for lambda = 0 alone, where it stays along the branch to rounding.
+    Special points are 'period doubling' and 'branch point'; an orbit is 'stable' if no perturbation
+    grows exponentially.
 
     Parameters
     ----------
@@ -143,17 +143,12 @@ def orbit_family(
         The orbit of this size is the first; at a Hopf point over lambda the smallest one.
     unfolding : str, optional
         Name of lambda; by default the only parameter of the field.
-    method : Collocation, HarmonicBalance or Shooting, optional
-        As for :func:`fecontact.bifurcation.orbit_branch`, with stability; collocation finds the
-        first orbit for all of them.
-    options, scales
-        As for :func:`fecontact.bifurcation.orbit_branch`.
+    method, options, scales
+        As for :func:`fecontact.bifurcation.orbit_branch`; collocation finds the first orbit.
     bounds : (float, float), optional
         Of the period [s].
-    direction : float
-        Above zero towards larger orbits, else towards smaller ones.
-    both : bool
-        Follow the family in both directions, from a motion.
+    direction, both : float, bool
+        Above zero towards larger orbits, else towards smaller ones; or both ways, from a motion.
 
     Raises
     ------

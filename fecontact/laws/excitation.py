@@ -193,7 +193,7 @@ class PointLoad:
 
     @property
     def moment(self) -> bool:
-        """Whether it is a moment."""
+        """True for a moment, False for a force."""
         return isinstance(self.component, str) and self.component.startswith("phi")
 
     @property

@@ -28,8 +28,8 @@ def polynomial_stiffness(
         f_i = \sum_{jk} a_{ijk}\,q_j q_k + \sum_{jkl} b_{ijkl}\,q_j q_k q_l
             = \sum_r w_{ri} \left(c_r\,(w_r \cdot q)^2 + d_r\,(w_r \cdot q)^3\right),
 
-    so that they are those of springs between the base and sums of coordinates :math:`w_r \cdot q`,
-    whose coefficients are small whole numbers.
+    and are the forces of springs between the base and sums of coordinates :math:`w_r \cdot q` whose
+    coefficients are small whole numbers.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def polynomial_stiffness(
     rows = np.zeros((len(kept), 3, d))
     rows[:, 1] = list(kept)
     return rows, BilateralPolynomial(
-        quadratic_stiffness=tuple(found.get(2, 0.0) for found in kept.values()),
+        stiffness=0.0, quadratic_stiffness=tuple(found.get(2, 0.0) for found in kept.values()),
         cubic_stiffness=tuple(found.get(3, 0.0) for found in kept.values()))
 
 

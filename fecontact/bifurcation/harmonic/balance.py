@@ -471,9 +471,9 @@ class Linearised:
     def determinant_sign(self, row: Array) -> float:
         """Sign of det [[G_u], [row]] by the factors of :meth:`solve`; 0 where they are singular."""
         _ = self.solve(row, np.zeros(len(row)))
-        if self._factors is None or not isinstance(self._factors[0], Factors):
+        factors, first = self._factors or (None, row)
+        if not isinstance(factors, Factors):
             return 0.0
-        factors, first = self._factors
         if first is row or np.array_equal(first, row):
             return factors.sign
         return factors.sign * float(np.sign(row @ self._along))

@@ -144,7 +144,7 @@ class FrequencyResponse(Summarised):
     def of(
         self, system: ContactSystem | VectorField, observe: tuple[str | int, str] | ArrayLike
     ) -> "FrequencyResponse":
-        """The same orbits with another displacement observed.
+        """Response of the same orbits with another displacement observed.
 
         Parameters
         ----------

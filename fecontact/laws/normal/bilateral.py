@@ -145,7 +145,7 @@ class BilateralPolynomial(BilateralLaw):
         "stiffness", "quadratic_stiffness", "cubic_stiffness", "quintic_stiffness", "damping",
         "quadratic_damping", "cubic_damping", "preload"})
 
-    stiffness: Annotated[PerNode, Unit("N/m")] = 0.0
+    stiffness: Annotated[PerNode, Unit("N/m")]
     quadratic_stiffness: Annotated[PerNode, Unit("N/m^2")] = 0.0
     cubic_stiffness: Annotated[PerNode, Unit("N/m^3")] = 0.0
     quintic_stiffness: Annotated[PerNode, Unit("N/m^5")] = 0.0
