@@ -131,9 +131,9 @@ class BilateralPolynomial(BilateralLaw):
     Parameters
     ----------
     stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness : float or (n,) sequence
-        c, c_2, c_3, c_5 [N/m, N/m^2, N/m^3, N/m^5], of any sign.
+        c, c_2, c_3, c_5 [N/m], [N/m^2], [N/m^3], [N/m^5], of any sign.
     damping, quadratic_damping, cubic_damping : float or (n,) sequence
-        b, b_2, b_3, zero or above [N s/m, N s^2/m^2, N s^3/m^3].
+        b, b_2, b_3, zero or above [N s/m], [N s^2/m^2], [N s^3/m^3].
     preload : float or (n,) sequence
         N_0 [N].
     shortening : float or (n,) sequence

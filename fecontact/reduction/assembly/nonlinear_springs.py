@@ -119,9 +119,9 @@ class PolynomialSpring(_LawSpring):
     second : str, optional
         Another point; by default the base, which does not move.
     stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness : float
-        c, c_2, c_3, c_5 [N/m, N/m^2, N/m^3, N/m^5], of any sign.
+        c, c_2, c_3, c_5 [N/m], [N/m^2], [N/m^3], [N/m^5], of any sign.
     damping, quadratic_damping, cubic_damping : float
-        b, b_2, b_3, zero or above [N s/m, N s^2/m^2, N s^3/m^3].
+        b, b_2, b_3, zero or above [N s/m], [N s^2/m^2], [N s^3/m^3].
     direction : (x, y) or (x, y, z), optional
         d, of any length; by default along the line between the points.
     preload : float
