@@ -227,7 +227,7 @@ def test_loads_at_points():
     (PointLoad, {"component": (1.0,), "signal": Constant()}, r"component = \(1\.0,\) must be"),
     (PointLoad, {"component": (1.0, np.nan), "signal": Constant()}, "PointLoad: component = "),
     (PointLoad, {"point": 1.5, "signal": Constant()}, r"point = 1\.5 must be the name"),
-    (PointLoad, {"signal": 3.0}, r"PointLoad: signal = 3\.0 must be a Signal"),
+    (PointLoad, {"signal": "3"}, r"PointLoad: signal = '3' must be a Signal, .*, or a number"),
     (Load, {"forces": (Constant(),)}, "Load: forces = .* must be a list of PointLoad"),
 ])
 def test_values_are_checked(kind, values, message):

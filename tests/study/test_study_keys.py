@@ -62,7 +62,8 @@ def test_defaults_and_units_of_a_section():
     needed = study_keys("load.forces")
     assert ('| `component` | "x", "y", "z", "phi", "phi_x", "phi_y", "phi_z", a list of two '
             'numbers or a list of three numbers | `"y"` |') in needed
-    assert "| `signal` | a table of a law and its parameters |  | Its history" in needed
+    assert ("| `signal` | a number or a table of a law and its parameters |  | Its history, or its "
+            "constant value [N], [N m]. |") in needed
     laws = study_keys("interfaces.NAME")
     assert "total values refer to the face of the interface" in laws
 
