@@ -389,10 +389,12 @@ def test_missing_graphics_libraries_are_named(tmp_path, monkeypatch, attempt, re
 
 
 @rendering
-def test_movie_that_the_encoder_cut_short_is_not_kept(tmp_path, monkeypatch):
-    # An encoder that stops after its first bytes, as at a full disk.
+@pytest.mark.parametrize("rest", ["", "cat > /dev/null;"])
+def test_movie_that_the_encoder_cut_short_is_not_kept(tmp_path, monkeypatch, rest):
+    # An encoder that fails, as at a full disk, after its first bytes or at the end.
     program = tmp_path / "ffmpeg"
-    program.write_text('#!/bin/sh\neval "file=\\${$#}"; head -c 100 > "$file"; exit 1\n')
+    program.write_text('#!/bin/sh\neval "file=\\${$#}"; head -c 100 > "$file"; '
+                       f"{rest} exit 1\n")
     program.chmod(0o755)
     monkeypatch.setattr(encoder, "ffmpeg", lambda: str(program))
     with pytest.raises(InputError, match=r"run\.mp4 cannot be written"):
