@@ -474,3 +474,15 @@ def test_bad_orientations_and_constants_of_decks_are_refused(tmp_path, change, m
     with pytest.raises((MeshError, InputError), match=message) as caught:
         read(tmp_path, text.replace(*change))
     assert str(caught.value).startswith(str(tmp_path / "a.inp"))
+
+
+def test_cylindrical_axes_are_radial_circumferential_and_along_the_line():
+    axes = CylindricalAxes(point=(1.0, 0.0, 0.0))
+    found = axes.at(np.array([[3.0, 0.0, 5.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.0]]))
+    assert found[0] == pytest.approx(np.eye(3))
+    assert found[1] == pytest.approx(np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    assert found[2] == pytest.approx(np.diag([-1.0, -1.0, 1.0]))
+    # Turned about the radius, axis 2 climbs along the line as a right-handed screw.
+    climbing = CylindricalAxes(about=1, angle=30.0).at(np.array([[2.0, 0.0, 0.0]]))[0]
+    assert climbing[1] == pytest.approx([0.0, np.sqrt(0.75), 0.5])
+    assert climbing[2] == pytest.approx([0.0, -0.5, np.sqrt(0.75)])
