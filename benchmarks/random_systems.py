@@ -51,7 +51,7 @@ FADING = 1e-7
 LOOKS, FALL, SHORTEST, LONGEST = 8, 1e-13, 1e-13, 5e-5
 
 (UNIFORM, PARABOLIC, COSINE, GAUSSIAN, MEASURED, LINEAR, POWER, EXPONENTIAL, GREENWOOD, STOP,
- PRESCRIBED, CUBIC, PLAY, PIECEWISE) = range(14)
+ PRESCRIBED, CUBIC, PLAY, PIECEWISE, POLYNOMIAL) = range(15)
 (EXP, GAUSS, HYPERBOLIC, CONSTANT, GALVANETTO, CUBIC_FALL, PRODUCT, MAXWELL, DAHL, LUGRE,
  BOUC_WEN) = range(11)
 
@@ -123,6 +123,10 @@ def normal_force(kind, u, v, p, knots, curve):
         return p[0]
     if kind == CUBIC:
         return p[0] * u + p[1] * u**3 + p[2] * v
+    if kind == POLYNOMIAL:
+        e, w = -u, -v
+        return -(p[0] * e + p[1] * e**2 + p[2] * e**3 + p[3] * e**5
+                 + p[4] * w + p[5] * abs(w) * w + p[6] * w**3)
     if kind == PLAY:
         side = 1.0 if u > 0.0 else -1.0
         return side * max(0.0, p[0] * (side * u - p[1]) + p[2] * side * v) if (
@@ -502,6 +506,9 @@ def random_normal(name: str, rng: np.random.Generator, n: int, force: float) -> 
         cubic = c / R**2 * 1e-2
         return laws.BilateralCubic(each(c), each(cubic), each(0.1 * d)), CUBIC, [
             c, cubic, 0.1 * d], *empty
+    if name == "bilateral-polynomial":
+        terms = [c, 0.1 * c / R, 0.01 * c / R**2, 1e-5 * c / R**4, 0.1 * d, d, 10.0 * d]
+        return (laws.BilateralPolynomial(*map(each, terms)), POLYNOMIAL, terms, *empty)
     if name == "bilateral-play":
         return laws.BilateralPlay(each(c), R, each(d)), PLAY, [c, R, d], *empty
     assert name == "bilateral-piecewise"
@@ -562,10 +569,21 @@ def random_friction(name: str, rng: np.random.Generator, n: int) -> tuple[Any, i
     return laws.BoucWenFriction(low, slide, beta, exponent), BOUC_WEN, [low, slide, beta, exponent]
 
 
+def normal_name(number: int) -> str:
+    """Name of the normal law of a number: the next, so that tests keep the systems they name.
+
+    The polynomial spring takes every other turn of the cubic one.
+    """
+    known = [name for name in NORMAL if name != "bilateral-polynomial"]
+    turn, place = divmod(number, len(known))
+    name = known[place]
+    return "bilateral-polynomial" if name == "bilateral-cubic" and turn % 2 else name
+
+
 def random_case(number: int) -> Case:
     """The system of a number."""
     rng = np.random.default_rng([7, number])
-    names = NORMAL[number % len(NORMAL)], FRICTION[number % len(FRICTION)]
+    names = normal_name(number), FRICTION[number % len(FRICTION)]
     space = number % 4 == 3
     m, n, d = int(rng.integers(1, 4)), int(rng.integers(1, 3)), 3 if space else 2
     force = rng.uniform(5.0, 30.0)
