@@ -1,4 +1,4 @@
-"""What an Abaqus or CalculiX deck holds: keywords that are read, skipped, and element types."""
+"""Contents of an Abaqus or CalculiX deck: keywords that are read, skipped, and element types."""
 
 from collections import Counter
 from dataclasses import dataclass, field
