@@ -7,6 +7,7 @@ from meshes_for_tests import grid, rectangle
 
 import fecontact as fc
 from fecontact import BoundaryLoad, Load, PointLoad
+from fecontact.fem import Ring
 from fecontact.io import export_fields
 from fecontact.laws import Constant, Harmonic
 from fecontact.plot import plot_stress
@@ -134,6 +135,23 @@ def test_nafems_le1():
     stress = nafems_le1(48).at((2.0, 0.0))[1]
     assert stress[1] == pytest.approx(92.7e6, rel=5e-3)
     assert abs(stress[0]) < 1e-3 * stress[1]
+
+
+@pytest.mark.parametrize(("element", "size", "accuracy"), [("hexahedron", 0.015, 3e-3),
+                                                           ("tetrahedron", 0.03, 2e-2)])
+def test_a_free_ring_under_pressure_is_in_balance(element, size, accuracy):
+    """Lame: u = p a^2 / (E (b^2 - a^2)) ((1 - nu) r + (1 + nu) b^2 / r) without stress in z."""
+    a, b, p, modulus, nu = 0.04, 0.1, 1e7, 2.1e11, 0.3
+    ring = fc.ElasticBody(fc.generate(Ring(b, a, 0.02, size, 1, element)),
+                          fc.Material(modulus, nu, 7800.0))
+    moved = fc.static_solution(ring, Load(boundaries=[BoundaryLoad("inner", p)]))
+    r = np.linalg.norm(moved.nodes[:, :2], axis=1)
+    outward = (moved.nodes[:, :2] * moved.displacement[:, :2]).sum(axis=1) / r
+    wanted = p * a**2 / (modulus * (b**2 - a**2)) * ((1.0 - nu) * r + (1.0 + nu) * b**2 / r)
+    np.testing.assert_allclose(outward, wanted, atol=accuracy * wanted.max())
+    for way, load in (("x", BoundaryLoad("top", 0.0, p)), ("z", BoundaryLoad("top", 1e-5 * p))):
+        with pytest.raises(fc.AnalysisError, match=f"against a translation in {way}"):
+            fc.static_solution(ring, Load(boundaries=[BoundaryLoad("inner", p), load]))
 
 
 def test_what_nothing_holds_is_named():

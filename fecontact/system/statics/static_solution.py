@@ -59,9 +59,9 @@ def static_solution(
     require_kind("static_solution", Mapping, points={} if points is None else points)
     require_finite("static_solution", time=time)
     system = FreeSystem.of(body)
-    force = body.expansion.T @ nodal_forces(body, load, points or {}, time)
-    _require_balance(body, system, force)
-    u = np.asarray(body.expansion @ system.deflection(force))
+    force = nodal_forces(body, load, points or {}, time)
+    _require_balance(body, body.expansion @ system.rigid, force)
+    u = np.asarray(body.expansion @ system.deflection(body.expansion.T @ force))
     return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension),
                       stress_of(body, u[:, None], stress_axes)[:, :, 0])
 
@@ -110,17 +110,19 @@ def nodal_forces(
     return total
 
 
-def _require_balance(body: ElasticBody, system: FreeSystem, force: Array) -> None:
-    """Raise AnalysisError if forces (f,) have a resultant along a rigid mode."""
-    if not system.rigid.shape[1] or not force.any():
+def _require_balance(body: ElasticBody, rigid: Array, force: Array) -> None:
+    """Raise AnalysisError if nodal forces (d N,) have a resultant along a rigid mode (d N, r)."""
+    if not rigid.shape[1] or not force.any():
         return
-    # Work in each rigid mode, against the sum of the magnitudes of its parts.
-    work, size = system.rigid.T @ force, np.abs(system.rigid).T @ np.abs(force)
-    pushed = np.abs(work) > _BALANCED * size
+    # Each node counts with the lengths of its force and motion: directions without load hold
+    # round-off of the others.
+    d = body.dimension
+    forces, motions = force.reshape(-1, d), rigid.reshape(-1, d, rigid.shape[1])
+    size = np.linalg.norm(forces, axis=1) @ np.linalg.norm(motions, axis=1)
+    pushed = np.abs(rigid.T @ force) > _BALANCED * size
     if not pushed.any():
         return
-    mode = np.asarray(body.expansion @ system.rigid[:, int(np.argmax(pushed))])
-    mode = mode.reshape(-1, body.mesh.dimension)
+    mode = motions[:, :, int(np.argmax(pushed))]
     turns = np.ptp(mode, axis=0).max() > 1e-6 * np.abs(mode).max()
     way = "a rotation" if turns else f"a translation in {'xyz'[int(np.argmax(np.abs(mode[0])))]}"
     raise AnalysisError(f"There is no static solution: nothing holds the body against {way}, in "
