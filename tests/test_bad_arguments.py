@@ -231,6 +231,8 @@ ExponentialFriction(static_coefficient=None, kinetic_coefficient=0.55, decay=100
 ConstantFriction("a")
 ConstantFriction(True)
 JenkinsFriction(stiffness=0, friction_coefficient=0.55)
+FrictionContact3D(1e6, -1.0, 0.3)
+FrictionContact3D(1e6, 1e6, 0.3, (1.0, 2.0))
 IwanFriction(None, 0.55)
 LuGreFriction(None, 0.55, 1e-3, 2.0, 1e5)
 BoucWenFriction(0.55, 5e-6, exponent="a")

@@ -12,6 +12,7 @@ from .friction.stribeck import (
     HyperbolicFriction,
     ProductFriction,
 )
+from .friction_contact import FrictionContact3D
 from .ground.fourier_series import FourierSeries
 from .ground.height_map import HeightMap
 from .ground.measured_profile import MeasuredProfile
@@ -67,6 +68,7 @@ __all__ = [
     "Flat",
     "FourParameterIwanFriction",
     "FourierSeries",
+    "FrictionContact3D",
     "FrictionLaw",
     "Frictionless",
     "GalvanettoFriction",

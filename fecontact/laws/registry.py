@@ -25,6 +25,7 @@ from fecontact.laws.synonyms import laws_called
 @cache
 def law_names() -> Mapping[type, Mapping[str, type]]:
     """Classes by name, for each kind of law (the base class)."""
+    from fecontact.laws import friction_contact
     from fecontact.laws.friction import bristle, maxwell_slip, stribeck
     from fecontact.laws.ground import (
         fourier_series,
@@ -58,6 +59,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "greenwood-williamson": statistical.GreenwoodWilliamson,
             "two-sided-stop": linear.TwoSidedStop,
             "prescribed-force": linear.PrescribedForce,
+            "friction-contact-3d": friction_contact.FrictionContact3D,
             "bilateral-cubic": bilateral.BilateralCubic,
             "bilateral-polynomial": bilateral.BilateralPolynomial,
             "bilateral-play": bilateral.BilateralPlay,

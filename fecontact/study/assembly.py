@@ -11,6 +11,7 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.friction_contact import separated
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.reduction.assembly.links import NonlinearSpring
@@ -92,9 +93,11 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         if name not in groups:
             raise InputError(f"{title}: [interfaces.{name}]: the basis has no interface '{name}'"
                              f"{nearest(name, groups)}; its interfaces are: {choices(groups)}.")
-    if study.normal is None and len(_own(study, "normal")) < len(groups):
+    usual = {part: law for part, law in zip(LAWS, separated(
+        study.normal, study.friction, f"{title}: [normal]"), strict=True) if law is not None}
+    if "normal" not in usual and len(_own(study, "normal")) < len(groups):
         raise InputError(NO_NORMAL_LAW.format(f"{title} lacks the section [normal]"))
-    if study.friction is None and _rubs(study, basis):
+    if "friction" not in usual and _rubs(study, basis):
         raise InputError(NO_FRICTION_LAW.format(f"{title} lacks the section [friction]"))
     for section, law, count in _laws(study, groups):
         with located(f"{title}: [{section}]:", type(law).__name__):
@@ -113,11 +116,11 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
             gap = gap_values(study.gap, basis.contact_places)
     parts: dict[str, Any] = {part: getattr(study, part) for part in PART_CLASSES}
+    parts |= {part: usual.get(part) for part in LAWS}
     for part in LAWS:
         own = _own(study, part)
         if own or several:
-            usual = parts[part] or ConstantFriction(0.0)
-            parts[part] = dict.fromkeys(groups, usual) | own | {
+            parts[part] = dict.fromkeys(groups, parts[part] or ConstantFriction(0.0)) | own | {
                 name: one.law if part == "normal" else ConstantFriction(0.0)
                 for name, one in springs.items()}
     parts["sliding"] = {name: one.sliding for name, one in study.interfaces.items()
@@ -156,8 +159,9 @@ def _gaps(study: Described, reduced: Reduced, title: str) -> Any:
 
 def _own(study: Described, part: str) -> dict[str, Any]:
     """Laws given for single interfaces."""
-    return {group: law for group, laws in study.interfaces.items()
-            if (law := getattr(laws, part)) is not None}
+    return {group: law for group, one in study.interfaces.items()
+            if (law := separated(one.normal, one.friction, f"[interfaces.{group}]")[
+                LAWS.index(part)]) is not None}
 
 
 def _laws(study: Described, groups: Mapping[str, int]) -> Iterator[tuple[str, Any, int]]:

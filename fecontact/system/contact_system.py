@@ -18,6 +18,7 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.check import require_sound
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.friction_contact import separated
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.reduction.assembly.links import Links
@@ -87,7 +88,8 @@ class ContactSystem(Summarised):
     basis : ModalBasis
     normal : normal law, or mapping of interface to normal law
         Normal force F (on the body, upwards) from penetration and its rate. Required if there are
-        contact nodes; a system without contact nodes is linear and has no laws.
+        contact nodes; a system without contact nodes is linear and has no laws. A
+        :class:`~fecontact.laws.FrictionContact3D` is stored as both laws.
     friction : friction law, or mapping of interface to friction law
         Friction force R (on the body, against the slip velocity). Required if a contact node can
         move along the ground.
@@ -155,6 +157,9 @@ class ContactSystem(Summarised):
         """Check all parts and bring them into their stored form."""
         if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
             self._without_contact()
+        for name, laws in zip(NO_LAWS, separated(self.normal, self.friction, "ContactSystem"),
+                              strict=True):
+            object.__setattr__(self, name, laws)
         if self.normal is None:
             raise InputError(NO_NORMAL_LAW.format("ContactSystem lacks normal"))
         if self.friction is None:

@@ -22,6 +22,7 @@ from fecontact.core.units import listed, quantity
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.friction_contact import separated
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.sliding import Sliding, SlidingRotation, SlidingTranslation
@@ -49,7 +50,8 @@ class Interface:
     pairing : Pairing, TwoPassPairing or PointPairing
         Contact nodes of one side, their feet on the other, normals and gaps; or those of both.
     normal : normal law
-        Extensive parameters are totals of the interface.
+        Extensive parameters are totals of the interface. A
+        :class:`~fecontact.laws.FrictionContact3D` is stored as both laws.
     friction : friction law, optional
         Required if its contact nodes can move along each other.
     sliding : SlidingTranslation or SlidingRotation, optional
@@ -78,6 +80,9 @@ class Interface:
         require_kind(owner, (FrictionLaw, type(None)), friction=self.friction)
         require_kind(owner, (SlidingTranslation, SlidingRotation, type(None)),
                      sliding=self.sliding)
+        for part, law in zip(("normal", "friction"),
+                             separated(self.normal, self.friction, owner), strict=True):
+            object.__setattr__(self, part, law)
         if self.sliding is not None and isinstance(self.pairing, TwoPassPairing):
             raise InputError(f"{owner}: sliding is that of the other side, but with two passes "
                              f"contact nodes lie on it too; pair the faces in one pass, by "

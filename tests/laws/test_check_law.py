@@ -20,6 +20,7 @@ from fecontact.laws import (
     CosineSurface,
     ExponentialContact,
     ExponentialFriction,
+    FrictionContact3D,
     FrictionLaw,
     GaussianSurface,
     GreenwoodWilliamson,
@@ -52,7 +53,7 @@ NEEDED = {
     BilateralCubic: (1e6, 1e15, 3.0),
     BilateralPolynomial: (1e6, 1e10, 1e15, 1e24, 3.0, 1.0, 1.0), BilateralPlay: (1e6, 1e-5, 3.0),
     BilateralPiecewise: ((-1e-3, 0.0, 1e-3), (-1e3, 0.0, 2e3), 3.0),
-    GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6),
+    GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6), FrictionContact3D: (1e6, 8e5, 0.4),
 }
 
 

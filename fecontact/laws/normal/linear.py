@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from fecontact.core.errors import InputError, shown
 from fecontact.core.lanes.functions import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
@@ -16,9 +17,10 @@ from fecontact.laws.signatures import normal_law
 
 @normal_law
 def _linear(u, v, p):
-    stiffness, damping = p[0], p[1]
-    force = stiffness * u + damping * v
-    away = (u <= 0.0) | (force <= 0.0)
+    stiffness, damping, preload = p[0], p[1], p[2]
+    elastic = stiffness * u + preload
+    force = elastic + damping * v
+    away = (elastic <= 0.0) | (force <= 0.0)
     return select(away, 0.0, force), select(away, 0.0, stiffness), select(away, 0.0, damping)
 
 
@@ -26,13 +28,14 @@ def _linear(u, v, p):
 class LinearContact(NormalLaw):
     r"""Smooth surface on a spring with a parallel dashpot.
 
-    .. math:: F = \max(0,\ c u + d v), \qquad u > 0
+    .. math:: F = \max(0,\ N_0 + c u + d v), \qquad u > -N_0 / c
 
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
-    It is the rough surface in the limit R_Z -> 0. With damping the force jumps at first contact,
-    and derivatives of the motion with it (saltation; see :func:`fecontact.sensitivity`);
-    multipliers of orbits by collocation and harmonic balance miss that. A rough surface has no
-    such jump.
+    It is the rough surface in the limit R_Z -> 0. A preload N_0 is the force at u = 0, from where
+    displacements then count: the contact opens at u = -N_0 / c. With damping the force jumps at
+    first contact, and derivatives of the motion with it (saltation; see
+    :func:`fecontact.sensitivity`); multipliers of orbits by collocation and harmonic balance miss
+    that. A rough surface has no such jump.
 
     Parameters
     ----------
@@ -40,34 +43,51 @@ class LinearContact(NormalLaw):
         c of the whole face, or of each node, positive [N/m].
     damping : float or (n,) sequence
         d of the whole face, or of each node, zero or above [N s/m].
+    preload : float or (n,) sequence
+        N_0 of the whole face, or of each node if the stiffness is, zero or above [N].
     """
 
     kernel: ClassVar = _linear
-    extensive: ClassVar = frozenset({"stiffness", "damping"})
+    extensive: ClassVar = frozenset({"stiffness", "damping", "preload"})
 
     stiffness: Annotated[Positive, Unit("N/m")]
     damping: Annotated[NotNegative, Unit("N s/m")] = 0.0
+    preload: Annotated[NotNegative, Unit("N")] = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if np.ndim(self.stiffness) != np.ndim(self.preload) and np.any(self.preload):
+            raise InputError(f"{self._title('preload')} = {shown(self.preload)} and stiffness = "
+                             f"{shown(self.stiffness)} must be both of the whole face or both of "
+                             f"each node.")
 
     @property
     def penetration_scale(self) -> float:
         """Penetration under 1 N on the whole face, or on each node [m], the smallest of all."""
         return 1.0 / float(np.max(self.stiffness))
 
+    def onsets(self, nodes: int) -> Array:
+        """Penetration -N_0 / c (1, n) at which the contact closes [m]."""
+        return np.zeros((1, nodes)) - np.divide(self.preload, self.stiffness)
+
     def untouched(self, nodes: int) -> Array:
-        """Zero (n,): nodes that are open have no force."""
-        return np.full(nodes, 0.0 if self.kernel is _linear else -np.inf)
+        """Penetration -N_0 / c (n,): nodes that are open have no force."""
+        return self.onsets(nodes)[0] if self.kernel is _linear else np.full(nodes, -np.inf)
 
     def pieces(self, share: Array) -> Array | None:
-        """Nothing, and the force c u + d v."""
+        """Nothing, and the force N_0 + c u + d v."""
         if self.kernel is not _linear:
             return None
-        c, d = self.table(share).T
-        return pieces_of(len(share), [[-np.inf, 0.0], [0.0, np.inf, 0.0, c, 0.0, d, 0.0, 0.0,
-                                                       0.0, c, d]])
+        c, d, preload = self.table(share).T
+        onset = -preload / c
+        return pieces_of(len(share), [[-np.inf, onset], [onset, np.inf, preload, c, 0.0, d, 0.0,
+                                                         0.0, preload, c, d]])
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the contact [J]: the integral of F(u, 0) from 0 to u."""
-        return np.asarray(0.5 * self.table(share)[:, 0] * np.maximum(penetration, 0.0) ** 2)
+        c, _, preload = self.table(share).T
+        u = np.maximum(penetration, -preload / c)
+        return np.asarray((preload + 0.5 * c * u) * u)
 
 
 @normal_law
