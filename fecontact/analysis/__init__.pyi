@@ -1,3 +1,4 @@
+from .buckling import BucklingLoads, buckling_loads
 from .comparison import Comparison, compare_runs
 from .complex_modes import ComplexModes, complex_modes, prestressed_modes
 from .histories import History, history
@@ -24,6 +25,7 @@ from .spectra import (
 )
 
 __all__ = [
+    "BucklingLoads",
     "Comparison",
     "ComplexModes",
     "History",
@@ -38,6 +40,7 @@ __all__ = [
     "Steadiness",
     "Strobe",
     "amplitude_spectrum",
+    "buckling_loads",
     "compare_runs",
     "complex_modes",
     "count_periods",

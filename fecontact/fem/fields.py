@@ -12,6 +12,7 @@ from fecontact.core.errors import InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity, span
+from fecontact.fem.cell_gradients import PAIRS
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_geometry import facets_of, oriented_solids
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, numbered_rows
@@ -26,8 +27,6 @@ StressAxes = Literal["global", "material"]
 # Values of strains that are computed at once, and the entry of a rotation above which an axis is
 # not normal to a plane.
 _AT_ONCE, _TILTED = 1_000_000, 1e-9
-_PAIRS = {2: ((0, 0), (1, 1), (0, 1)),
-          3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
 
 
 @read_only_arrays
@@ -188,7 +187,7 @@ def _stress_by_cells(
         if body.has_incompatible_modes:
             grad += mode_gradients(body, cells, displacements, local.T)
         strains = np.stack([grad[:, :, i, j] if i == j else grad[:, :, i, j] + grad[:, :, j, i]
-                            for i, j in _PAIRS[d]], axis=2)
+                            for i, j in PAIRS[d]], axis=2)
         of_strain = body.cell_stiffness(cells)[:, :components, used]
         if axes == "material":
             of_strain = _to_material_axes(body, cells, components) @ of_strain

@@ -74,23 +74,3 @@ def centrifugal_force(body: ElasticBody, centre: tuple[float, float]) -> Array:
     """``M (X - c)`` (2 N,): the centrifugal force per squared speed, without supports [kg m]."""
     return np.asarray(body.mass @ (body.nodes - np.array(centre)).ravel())
 
-
-def stress_stiffness(body: ElasticBody, displacement: Array) -> Any:
-    """Geometric stiffness, sparse (2 N, 2 N), of the stress under displacements (2 N,) [N/m].
-
-    ``v^T K_sigma u`` is the integral of ``sigma_ij u_k,i v_k,j`` over the body.
-    """
-    import scipy.sparse as sp
-    from skfem import BilinearForm
-
-    stiffness = body.cell_stiffness()[:, [0, 1, 3]][:, :, [0, 1, 3]]
-
-    def form(u: Any, v: Any, w: Any) -> Any:
-        (xx, xy), (yx, yy) = w["x"].grad, w["y"].grad
-        along, across, slide = np.einsum("crs,scq->rcq", stiffness, np.array([xx, yy, xy + yx]))
-        (ux, uy), (vx, vy) = u.grad, v.grad
-        return along * ux * vx + across * uy * vy + slide * (ux * vy + uy * vx)
-
-    x, y = (body.basis.interpolate(displacement[axis::2]) for axis in range(2))
-    one = BilinearForm(form).assemble(body.basis, x=x, y=y)
-    return sp.csc_array(sp.kron(0.5 * body.thickness * (one + one.T), sp.eye_array(2)))

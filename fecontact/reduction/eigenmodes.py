@@ -14,9 +14,11 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.equations import least_squares, selects
 from fecontact.reduction.solid_motions import allowed_motions, solid_strain_energies
-from fecontact.reduction.solvers.factorisation import Factors, factorised
+from fecontact.reduction.solvers.factorisation import SINGULAR, Factors, factorised
 from fecontact.reduction.solvers.solid_solver import Eigensolver, SolidSolver, possible, suited
 
+_BUCKLED = ("The stress takes the stiffness of the body: its load is beyond the buckling load; see "
+            "fecontact.analysis.buckling_loads.")
 # Below this size, and for a large share of all modes, the dense solver is faster.
 _DENSE = 600
 
@@ -37,6 +39,9 @@ class FreeSystem:
         The solid whose free degrees of freedom these are.
     eigensolver : 'auto', 'direct' or 'iterative'
         See :func:`eigenmodes`.
+    stressed : bool
+        Whether the stiffness includes that of a stress; then it must be positive definite but for
+        the rigid modes.
     """
 
     stiffness: Any
@@ -45,10 +50,16 @@ class FreeSystem:
     component_mass: Any = None
     body: ElasticBody | None = None
     eigensolver: Eigensolver = "auto"
+    stressed: bool = False
 
     @classmethod
-    def of(cls, body: ElasticBody, eigensolver: Eigensolver = "auto") -> "FreeSystem":
+    def of(
+        cls, body: ElasticBody, eigensolver: Eigensolver = "auto", stress: Any = None
+    ) -> "FreeSystem":
         """The free degrees of freedom of a body.
+
+        ``stress``, sparse (d N, d N), is a geometric stiffness that is added to that of the body;
+        it must not resist the rigid modes. Then the direct solver is taken.
 
         Raises
         ------
@@ -63,16 +74,18 @@ class FreeSystem:
         if eigensolver == "iterative" and not possible(body):
             raise InputError("eigensolver = 'iterative' is for solids without hinges and "
                              "constraints; leave it out, or take 'direct'.")
-        E = body.expansion
+        E, stiffness = body.expansion, body.stiffness
         rigid = rigid_modes(body)
-        solid = (body if body.dimension == 3 else None, eigensolver)
+        if stress is not None:
+            stiffness, eigensolver = (stiffness + stress).tocsc(), "direct"
+        solid = (body if body.dimension == 3 else None, eigensolver, stress is not None)
         if E.shape[0] == E.shape[1]:
-            return cls(body.stiffness, body.mass, rigid, body.component_mass, *solid)
+            return cls(stiffness, body.mass, rigid, body.component_mass, *solid)
         if selects(E):
             free = E.indices
-            K, M = (a[free][:, free].tocsc() for a in (body.stiffness, body.mass))
+            K, M = (a[free][:, free].tocsc() for a in (stiffness, body.mass))
             return cls(K, M, rigid[free], None, *solid)
-        return cls((E.T @ body.stiffness @ E).tocsc(), (E.T @ body.mass @ E).tocsc(),
+        return cls((E.T @ stiffness @ E).tocsc(), (E.T @ body.mass @ E).tocsc(),
                    least_squares(E, rigid), None, *solid)
 
     @cached_property
@@ -92,10 +105,11 @@ class FreeSystem:
         K = self.stiffness
         if len(self.held) < K.shape[0]:
             K = K[self.held][:, self.held]
+        trouble = _BUCKLED if self.stressed else SINGULAR
         if self.body is None:
-            return factorised(K)
+            return factorised(K, trouble=trouble)
         E = self.body.expansion
-        return factorised(K, E.indices[E.indptr[:-1]][self.held] // 3)
+        return factorised(K, E.indices[E.indptr[:-1]][self.held] // 3, trouble=trouble)
 
     @cached_property
     def iterative(self) -> SolidSolver | None:
@@ -199,7 +213,7 @@ def eigenmodes(
     w, free_shapes = free_modes(FreeSystem.of(body, eigensolver), count)
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
-    w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
+    w[elastic] = frequencies_of(body, shapes[:, elastic])
     return w, shapes
 
 
@@ -235,6 +249,17 @@ def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     squares, shapes = elastic_modes(system, elastic)
     return (np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(squares)]),
             np.hstack([rigid, shapes * fixed_signs(shapes)]))
+
+
+def frequencies_of(body: ElasticBody, shapes: Array, stress: Any = None) -> Array:
+    """Angular frequencies (m,) of mass-normalised modes (d N, m) from their strains [rad/s].
+
+    ``stress``, sparse (d N, d N), is the geometric stiffness of a body under stress.
+    """
+    squares = 2.0 * strain_energies(body, shapes)
+    if stress is not None:
+        squares += (shapes * (stress @ shapes)).sum(axis=0)
+    return np.sqrt(squares)
 
 
 def strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) -> Array:
@@ -315,6 +340,8 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
         found = system.iterative.modes(count, E @ system.rigid)
         if found.converged:
             return found.squares, E.T @ found.shapes
+    if system.stressed:
+        _ = system.factors
     if size <= _DENSE or 3 * count > size:
         from scipy.linalg import eigh
 

@@ -18,13 +18,12 @@ from fecontact.core.errors import (
 from fecontact.core.tables import located
 from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
-from fecontact.fem.constraints import Coupling
 from fecontact.fem.contact_face import ContactNodes, contact_groups
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import numbered_rows
 from fecontact.fem.faces.contact_patches import Count
 from fecontact.fem.faces.surface import linear_facets
-from fecontact.fem.fields import body_elements, linear_cells, stress_of
+from fecontact.fem.fields import BodyFields, body_elements, linear_cells, stress_of
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
@@ -37,9 +36,20 @@ from fecontact.reduction.damping import (
     material_damping_ratios,
     modal_damping,
 )
-from fecontact.reduction.eigenmodes import FreeSystem, backward_error, free_modes, strain_energies
+from fecontact.reduction.eigenmodes import (
+    FreeSystem,
+    backward_error,
+    free_modes,
+    frequencies_of,
+)
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
+from fecontact.reduction.prestress import (
+    coupled,
+    geometric_stiffness,
+    refuse_circles,
+    resists_rotation,
+)
 from fecontact.reduction.rotating import modal_rotation
 from fecontact.reduction.solvers.solid_solver import Eigensolver
 from fecontact.reduction.static_modes.craig_bampton import craig_bampton
@@ -63,6 +73,7 @@ def modal_basis(
     tolerance: float = 0.1,
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
+    prestress: BodyFields | None = None,
     rows: Any = (),
     eigensolver: Eigensolver = "auto",
 ) -> ModalBasis:
@@ -94,6 +105,10 @@ def modal_basis(
         Adds static responses to gravity or loads at places, if not for 'vibration'.
     rotation : Rotation, optional
         Of the plane body: displacements are those in its frame, modes those at rest.
+    prestress : BodyFields, optional
+        Static state whose stress stiffens the body, as of :func:`~fecontact.static_solution` or
+        ``basis.fields(q)``: modes are those about it. A body that can rotate keeps the modes
+        without stress, coupled by ``stiffness``.
     rows : sequence of sparse (k, d N) arrays
         Further motions with forces; see :func:`fecontact.reduction.reduce_bodies`.
     eigensolver : 'auto', 'direct' or 'iterative'
@@ -123,9 +138,8 @@ def modal_basis(
     d = body.dimension
     if rotation is not None and d == 3:
         raise InputError("rotation is that of plane bodies; leave it out for a solid.")
-    if rotation is not None and any(isinstance(one, Coupling) for one in body.equations):
-        raise InputError("rotation is that of bodies without couplings, whose nodes would run on "
-                         "circles; leave it out, or the couplings.")
+    if rotation is not None:
+        refuse_circles(body, "rotation")
     face = contact_groups(body, contact, contact_nodes)
     named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
     further = [place_rows(body, place, name) for name, place in points.items()]
@@ -134,7 +148,9 @@ def modal_basis(
     if loads and reduction == "vibration":
         raise InputError("loads complete the modes only with reduction = 'residual' or "
                          "'craig-bampton'; choose one of these, or leave loads out.")
-    system = FreeSystem.of(body, eigensolver)
+    stress = None if prestress is None else geometric_stiffness(body, prestress)
+    held = stress is not None and not resists_rotation(body, stress)
+    system = FreeSystem.of(body, eigensolver, stress if held else None)
     completing = loading(body, system, loads, points)
     # At B, C and the contact nodes there are forces, but no moments.
     at_points = sp.csr_array(displacement_rows(restriction, d))
@@ -151,7 +167,7 @@ def modal_basis(
                                  completing)
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
-    w[elastic] = np.sqrt(2.0 * strain_energies(body, shapes[:, elastic]))
+    w[elastic] = frequencies_of(body, shapes[:, elastic], stress if held else None)
     if isinstance(damping, str):
         require_choice("modal_basis", "damping", damping, ("materials",))
         damping = np.where(elastic, material_damping_ratios(body, shapes), 0.0)
@@ -190,6 +206,7 @@ def modal_basis(
         boundaries=names,
         boundary_rows=rows[1:],
         rotation=None if turning is None else replace(turning, speed=0.0),
+        stiffness=None if held or stress is None else coupled(w, shapes, stress),
     )
     return basis if turning is None else basis.with_rotation_speed(turning.speed)
 

@@ -11,8 +11,8 @@ from fecontact.fem.rotation import (
     Rotation,
     centrifugal_force,
     coriolis_matrix,
-    stress_stiffness,
 )
+from fecontact.fem.stress_stiffness import stress_stiffness
 from fecontact.reduction.eigenmodes import FreeSystem
 
 

@@ -14,13 +14,11 @@ from fecontact.core.records import (
     Vector,
 )
 from fecontact.core.types import Array
+from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_kinds import shape_functions
 from fecontact.fem.equations import least_squares
 from fecontact.fem.incompatible_modes import in_parts, reductions
 
-# Elements whose strains are in memory at once.
-_AT_ONCE = 2000
 # Motions of supports, relative to that of the body, that count as none.
 _STILL = 1e-9
 
@@ -83,29 +81,15 @@ def allowed_motions(body: ElasticBody, centre: Array) -> Array:
 
 def solid_strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) -> Array:
     """Strain energies (m,) [J] of displacements (3 N, m), from the strains in the ``cells``."""
-    members = body.basis.element_dofs.T[cells]
-    local, weights = np.ascontiguousarray(body.basis.X.T), body.basis.W
-    _, slopes = shape_functions(3, members.shape[1], local)
-    straight = body.mesh.kind.corners
-    geometry = slopes if body.curved else shape_functions(3, straight, local)[1]
-    constants, (tensors, which_tensor) = body.elasticity[cells], body.anisotropic
-    which_tensor = which_tensor[cells]
+    members = body.basis.element_dofs.T.astype(np.int64)
+    constants, (tensors, which_tensor) = body.elasticity, body.anisotropic
     fields = np.ascontiguousarray(shapes, dtype=float).reshape(len(body.nodes), 3, -1)
     energies = np.zeros(shapes.shape[1])
-    for first in range(0, len(members), _AT_ONCE):
-        nodes = members[first : first + _AT_ONCE]
-        places = body.nodes[nodes[:, : geometry.shape[1]]]
-        jacobian = np.einsum("qkj,eki->eqij", geometry, places)
-        # scikit-fem may mirror cells; rules of tetrahedra have negative weights.
-        volume = np.abs(np.linalg.det(jacobian)) * weights
-        gradients = np.einsum("qkj,eqji->eqki", slopes, np.linalg.inv(jacobian))
-        _add_strain_energies(np.ascontiguousarray(gradients), volume,
-                             np.ascontiguousarray(nodes, dtype=np.int64), fields,
-                             constants[first : first + _AT_ONCE], tensors,
-                             which_tensor[first : first + _AT_ONCE], energies)
-    if body.has_incompatible_modes:
-        for part in in_parts(np.arange(len(body.mesh.cells))[cells]):
-            moved = fields[body.basis.element_dofs.T[part]]
+    for part in in_parts(np.arange(len(body.mesh.cells))[cells]):
+        _add_strain_energies(*cell_gradients(body, part), members[part], fields, constants[part],
+                             tensors, which_tensor[part], energies)
+        if body.has_incompatible_modes:
+            moved = fields[members[part]]
             # Subtract a node: rigid displacements may be much larger than differences.
             moved = (moved - moved[:, :1]).reshape(len(part), 24, -1)
             energies -= 0.5 * ((reductions(body, part) @ moved) ** 2).sum(axis=(0, 1))

@@ -72,11 +72,17 @@ class CholmodFactors:
         return L.tocsc(), D.diagonal(), np.argsort(self.factors.P())
 
 
-def factorised(matrix: Any, nodes: Integers | None = None) -> Factors:
+SINGULAR = "The stiffness of the supported body is singular; look for parts connected by one node."
+
+
+def factorised(
+    matrix: Any, nodes: Integers | None = None, *, trouble: str = SINGULAR
+) -> Factors:
     """Factors of a sparse symmetric positive definite matrix (n, n).
 
     ``nodes`` (n,) are the nodes of the rows of a solid, for which nested dissection of the graph of
-    its nodes needs several times less memory than minimum degree does.
+    its nodes needs several times less memory than minimum degree does. ``trouble`` is the message
+    of the error; other than the default one it makes SuperLU refuse indefinite matrices too.
 
     Raises
     ------
@@ -85,8 +91,6 @@ def factorised(matrix: Any, nodes: Integers | None = None) -> Factors:
     """
     import scipy.sparse as sp
 
-    trouble = ("The stiffness of the supported body is singular; look for parts connected by one "
-               "node.")
     try:
         from sksparse.cholmod import CholmodNotPositiveDefiniteError, analyze
     except ImportError:
@@ -96,13 +100,18 @@ def factorised(matrix: Any, nodes: Integers | None = None) -> Factors:
         try:
             if nodes is not None:
                 order = nested_dissection(matrix, nodes)
-                return SuperLUFactors(
+                found = SuperLUFactors(
                     splu(matrix.tocsr()[order][:, order].tocsc(), permc_spec="NATURAL",
                          diag_pivot_thresh=0.0, options={"SymmetricMode": True}), order)
-            return SuperLUFactors(splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A",
-                                       diag_pivot_thresh=0.0, options={"SymmetricMode": True}))
+            else:
+                found = SuperLUFactors(
+                    splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                         options={"SymmetricMode": True}))
         except RuntimeError:
             raise AnalysisError(trouble) from None
+        if trouble != SINGULAR and (found.factors.U.diagonal() <= 0.0).any():
+            raise AnalysisError(trouble) from None
+        return found
     plain = sp.csc_matrix(matrix)
     factors = analyze(plain, mode="supernodal", ordering_method="nesdis")
     try:
