@@ -1,3 +1,4 @@
+from .attachments import PointMass, PointSpring
 from .constraints import Coupling, LinearEquation, Term, Tie
 from .elements.cell_kinds import CellKind
 from .fields import BodyFields, stress_of
@@ -23,6 +24,8 @@ __all__ = [
     "Pairing",
     "PairingReport",
     "Plate",
+    "PointMass",
+    "PointSpring",
     "Ring",
     "Rotation",
     "SolidBlock",

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, as_place, require_kind
+from fecontact.core.checks import as_direction, as_floats, as_place, require_kind
 from fecontact.core.errors import (
     InputError,
     MeshError,
@@ -39,6 +39,27 @@ class Term(NamedTuple):
     rotation: Sequence[float] = ()
 
 
+Terms = Sequence[Term]
+
+
+def check_terms(terms: Terms, what: str) -> tuple[Term, ...]:
+    """Terms as tuples; InputError, with ``what`` in front, for other forms and zeros alone."""
+    require_kind(what, Sequence, terms=terms)
+    if not terms:
+        raise InputError(f"{what}: terms is empty; give at least one.")
+    for term in terms:
+        if not isinstance(term, tuple) or len(term) not in (2, 3) or not isinstance(
+                term[0], str | int | np.integer | tuple):
+            raise InputError(f"{what}: {shown(term)} must be a Term: a point or node, and the "
+                             f"coefficients of its displacement.")
+    found = tuple(Term(*term) for term in terms)
+    values = [np.concatenate([as_floats(term.displacement, f"{what}: displacement"),
+                              as_floats(term.rotation, f"{what}: rotation")]) for term in found]
+    if not all(np.isfinite(one).all() for one in values) or not any(map(np.any, values)):
+        raise InputError(f"{what}: the coefficients must be finite, and one of them not zero.")
+    return found
+
+
 @dataclass(frozen=True)
 class LinearEquation:
     """Linear equation between displacements, ``sum_j (a_j . u_j + b_j . phi_j) = 0``.
@@ -58,25 +79,11 @@ class LinearEquation:
         For no terms, or coefficients that are not finite or all zero.
     """
 
-    terms: Sequence[Term]
+    terms: Terms
     name: str = "an equation"
 
     def __post_init__(self) -> None:
-        require_kind("LinearEquation", Sequence, terms=self.terms)
-        if not self.terms:
-            raise InputError(f"LinearEquation '{self.name}': terms is empty; give at least one.")
-        for term in self.terms:
-            if not isinstance(term, tuple) or len(term) not in (2, 3) or not isinstance(
-                    term[0], str | int | np.integer | tuple):
-                raise InputError(f"LinearEquation '{self.name}': {shown(term)} must be a Term: a "
-                                 f"point or node, and the coefficients of its displacement.")
-        terms = tuple(Term(*term) for term in self.terms)
-        values = [np.concatenate([as_floats(term.displacement, "LinearEquation: displacement"),
-                                  as_floats(term.rotation, "LinearEquation: rotation")])
-                  for term in terms]
-        if not all(np.isfinite(one).all() for one in values) or not any(map(np.any, values)):
-            raise InputError(f"LinearEquation '{self.name}': the coefficients must be finite, and "
-                             f"one of them not zero.")
+        terms = check_terms(self.terms, f"LinearEquation '{self.name}'")
         object.__setattr__(self, "terms", terms)
 
     @property
@@ -117,7 +124,9 @@ class Tie:
 
     with the shape functions N_j of the facet at x and their slopes N_j,a along its surface vectors,
     whose reciprocal ones are a^a. r goes from x to the node, n is the normal. Rigid motions strain
-    nothing, also where r is not zero.
+    nothing, also where r is not zero. With a ``control`` point the faces may approach each other by
+    its displacement s in x, ``u = ... + s d``: the section of a bolt, whose force is that on the
+    control point.
 
     Parameters
     ----------
@@ -131,23 +140,38 @@ class Tie:
         are farther away are left out with a warning.
     name : str
         For messages.
+    control : str, optional
+        Name of a reference point without a place, of which the displacement in x counts alone.
+    direction : d floats, optional
+        d, of any length: from the dependent face into the body beyond the independent one. With a
+        control point only.
     """
 
     dependent: str
     independent: str
     tolerance: float | None = None
     name: str = "a tie"
+    control: str | None = None
+    direction: Coordinates | None = None
 
     def __post_init__(self) -> None:
         require_kind(f"Tie '{self.name}'", str, dependent=self.dependent,
                      independent=self.independent)
         if self.tolerance is not None:
             require_positive(f"Tie '{self.name}'", tolerance=self.tolerance)
+        require_kind(f"Tie '{self.name}'", (str, type(None)), control=self.control)
+        if (self.control is None) != (self.direction is None):
+            raise InputError(f"Tie '{self.name}': control and direction belong together; give both "
+                             f"or none.")
+        if self.direction is not None:
+            object.__setattr__(self, "direction", as_direction(
+                self.direction, f"Tie '{self.name}': direction"))
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Names of the boundaries or points of the mesh."""
-        return self.dependent, self.independent
+        """Names of the boundaries or points of the mesh, and of the control point."""
+        return (self.dependent, self.independent,
+                *(() if self.control is None else (self.control,)))
 
     def refined(self, _: object) -> "Tie":
         """The tie itself."""
@@ -156,11 +180,14 @@ class Tie:
     def renamed(self, new: Mapping[str, str]) -> "Tie":
         """Tie with new names of some groups."""
         return replace(self, dependent=new.get(self.dependent, self.dependent),
-                       independent=new.get(self.independent, self.independent))
+                       independent=new.get(self.independent, self.independent),
+                       control=None if self.control is None else new.get(self.control,
+                                                                         self.control))
 
-    def turned(self, _: Array, __: Array) -> "Tie":
-        """The tie itself."""
-        return self
+    def turned(self, turn: Array, _: Array) -> "Tie":
+        """Tie of the body turned by ``turn`` (d, d)."""
+        return self if self.direction is None else replace(
+            self, direction=tuple((turn @ self.direction).tolist()))
 
     def scaled(self, scale: float) -> "Tie":
         """Tie of a body whose unit of length is ``scale`` of the new one."""
@@ -273,7 +300,7 @@ def check_constraints(
     for one in constraints:
         what = f"{type(one).__name__} '{one.name}'"
         if isinstance(one, LinearEquation):
-            _check_terms(one, what, references, points, dimension, nodes)
+            check_named_terms(one.terms, what, references, points, dimension, nodes)
             continue
         group = one.nodes if isinstance(one, Coupling) else one.dependent
         if group not in known:
@@ -284,6 +311,11 @@ def check_constraints(
                 raise MeshError(f"{what}: the mesh has no boundary '{one.independent}'"
                                 f"{nearest(one.independent, boundaries)}; its boundaries are: "
                                 f"{choices(boundaries)}.")
+            if one.direction is not None and len(one.direction) != dimension:
+                raise InputError(f"{what}: direction must have {dimension} components.")
+            if one.control in known:
+                raise InputError(f"{what}: control = '{one.control}' is a name of the mesh; choose "
+                                 f"another one.")
             continue
         if one.axes is not None and np.shape(one.axes)[1] != dimension:
             raise InputError(f"{what}: axes must have {dimension} components each.")
@@ -293,13 +325,13 @@ def check_constraints(
             reference_place(constraints, one.reference)
 
 
-def _check_terms(
-    one: LinearEquation, what: str, references: set[str], points: Mapping[str, Integers],
+def check_named_terms(
+    terms: Terms, what: str, references: set[str], points: Mapping[str, Integers],
     dimension: int, nodes: int,
 ) -> None:
-    """Raise unless the terms of an equation name points, nodes or reference points."""
+    """Raise unless terms name points, nodes or reference points."""
     turns = 3 if dimension == 3 else 1
-    for at, displacement, rotation in one.terms:
+    for at, displacement, rotation in terms:
         if isinstance(at, str):
             if at not in references and len(points.get(at, ())) != 1:
                 known = {name for name, held in points.items() if len(held) == 1} | references
@@ -316,8 +348,9 @@ def _check_terms(
 def _reference_names(
     constraints: Iterable[Constraint], points: Mapping[str, Integers]
 ) -> set[str]:
-    """Names of reference points: of couplings, or in two equations and no point of the mesh."""
+    """Names of reference points: of couplings and ties, or in two equations and not of the mesh."""
     found = {one.reference for one in constraints if isinstance(one, Coupling)}
+    found |= {one.control for one in constraints if isinstance(one, Tie) and one.control}
     seen: set[str] = set()
     for one in constraints:
         if isinstance(one, LinearEquation):
@@ -343,8 +376,7 @@ def reference_points(
     """Names of all reference points, in the order in which the constraints name them."""
     names = _reference_names(constraints, points)
     return tuple(dict.fromkeys(
-        name for one in constraints if not isinstance(one, Tie) for name in one.groups
-        if name in names))
+        name for one in constraints for name in one.groups if name in names))
 
 
 def counted(constraints: Sequence[Constraint]) -> str:

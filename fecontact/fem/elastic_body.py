@@ -21,17 +21,28 @@ from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, span
 from fecontact.fem.assembly import assembled, subtract
+from fecontact.fem.attachments import (
+    Attachment,
+    PointMass,
+    PointSpring,
+    added_mass,
+    check_attachments,
+    counted_attachments,
+    spring_rows,
+)
 from fecontact.fem.constraints import (
     Constraint,
     LinearEquation,
     check_constraints,
     counted,
+    reference_points,
 )
 from fecontact.fem.elements.cell_kinds import numbered_rows
 from fecontact.fem.equations import expansion
 from fecontact.fem.incompatible_modes import in_parts, reductions
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
 from fecontact.fem.mesh import Bricks, Mesh
+from fecontact.fem.reference_motions import displacement_rows, reference_motions
 from fecontact.fem.supports import HingeSupport, check_supports, fixed_dofs, hinges
 
 _MATERIALS = (Material, AnisotropicMaterial)
@@ -72,6 +83,8 @@ class ElasticBody(Summarised):
         Supports on named boundaries or points of the mesh: displacements fixed at zero, or a
         hinge, whose nodes (such as the boundary of a hole) rotate rigidly about their centre. In
         space 'hinge_x', 'hinge_y', 'hinge_z' name the axis; 'hinge' takes that of a round face.
+        On reference points also 'clamped', or components such as 'x phi_z'; see
+        :func:`fecontact.fem.supports.held_components`.
     constraints : sequence of LinearEquation, Tie or Coupling, optional
         Linear equations between displacements, see :mod:`fecontact.fem.constraints`; by default
         those of the mesh, which a file may hold.
@@ -79,6 +92,9 @@ class ElasticBody(Summarised):
         Of hexahedra with ``degree = 1``: trilinear displacements alone, or with incompatible modes
         of each cell, which bend without locking; by default those of the mesh. See
         :mod:`fecontact.fem.incompatible_modes`.
+    attachments : sequence of PointMass or PointSpring, optional
+        Masses, springs and dashpots at points, see :mod:`fecontact.fem.attachments`; by default
+        those of the mesh, which a file may hold.
 
     Raises
     ------
@@ -96,6 +112,7 @@ class ElasticBody(Summarised):
     fixed: Mapping[str, str] = field(default_factory=dict)
     constraints: Sequence[Constraint] | None = None
     bricks: Bricks | None = None
+    attachments: Sequence[Attachment] | None = None
 
     def __post_init__(self) -> None:
         require_kind("ElasticBody", Mesh, mesh=self.mesh)
@@ -121,12 +138,16 @@ class ElasticBody(Summarised):
         require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
                        kind.unknowns(degree) * _BYTES[kind.dimension, kind.corners],
                        f", by a larger element_size, or {plain} or degree = 1")
-        check_supports(self.mesh, self.fixed)
         _ = self.anisotropic
         if self.constraints is not None:
             require_kind("ElasticBody", Sequence, constraints=self.constraints)
             check_constraints(self.constraints, self.mesh.boundaries, self.mesh.points,
                               self.dimension, len(self.mesh.nodes))
+        if self.attachments is not None:
+            require_kind("ElasticBody", Sequence, attachments=self.attachments)
+        check_attachments(self.added, self.equations, self.mesh.points, self.dimension,
+                          len(self.mesh.nodes))
+        check_supports(self.mesh, self.fixed, self.references)
         pieces = self._joined_pieces()
         if pieces > 1:
             raise MeshError(f"The mesh consists of {pieces} pieces that share no node, and no "
@@ -146,6 +167,7 @@ class ElasticBody(Summarised):
             *((f"material {name}".rstrip(), material.description) for name, material in named),
             ("fixed", listed([f"{name} in {way}" for name, way in self.fixed.items()])),
             *([("constraints", counted(self.equations))] if self.equations else []),
+            *([("attachments", counted_attachments(self.added))] if self.added else []),
         ]
 
     @property
@@ -171,11 +193,12 @@ class ElasticBody(Summarised):
 
     @cached_property
     def total_mass(self) -> float:
-        """Mass of the body with the edges of its mesh [kg]."""
+        """Mass of the body with the edges of its mesh, and of point masses [kg]."""
+        added = sum(one.mass for one in self.added if isinstance(one, PointMass))
         if len(self.materials) == 1:
             size = self.mesh.area * self.thickness if self.dimension == 2 else self.mesh.volume
-            return float(size * self.materials[0].density)
-        return float(self.component_mass.sum())
+            return float(size * self.materials[0].density) + added
+        return float(self.component_mass.sum()) + added
 
     @property
     def materials(self) -> tuple[AnyMaterial, ...]:
@@ -249,7 +272,16 @@ class ElasticBody(Summarised):
 
     @cached_property
     def stiffness(self) -> Any:
-        """Stiffness K, sparse (d N, d N), without supports [N/m]."""
+        """Stiffness K of elements and springs, sparse (d N, d N), without supports [N/m]."""
+        import scipy.sparse as sp
+
+        rows, k, _ = self.springs
+        if not k.any():
+            return self._element_stiffness
+        return sp.csc_array(self._element_stiffness + rows.T @ sp.diags_array(k) @ rows)
+
+    @property
+    def _element_stiffness(self) -> Any:
         import scipy.sparse as sp
         from skfem import BilinearForm
 
@@ -274,7 +306,7 @@ class ElasticBody(Summarised):
 
     @property
     def stiffness_blocks(self) -> Any:
-        """Stiffness of a solid without supports, sparse (3 N, 3 N) of 3 x 3 blocks [N/m]."""
+        """Stiffness of the elements of a solid, sparse (3 N, 3 N) of 3 x 3 blocks [N/m]."""
         return self._assembled[0]
 
     @cached_property
@@ -290,7 +322,7 @@ class ElasticBody(Summarised):
 
     @cached_property
     def component_mass(self) -> Any:
-        """Mass of one displacement component, sparse (N, N) by rows, without supports [kg]."""
+        """Mass of one displacement component in the elements, sparse (N, N) by rows [kg]."""
         import scipy.sparse as sp
         from skfem import BilinearForm
 
@@ -303,10 +335,11 @@ class ElasticBody(Summarised):
 
     @cached_property
     def mass(self) -> Any:
-        """Mass M, sparse (d N, d N), without supports [kg]."""
+        """Mass M of elements and point masses, sparse (d N, d N), without supports [kg]."""
         import scipy.sparse as sp
 
-        return sp.csc_array(sp.kron(self.component_mass, sp.eye_array(self.dimension)))
+        M = sp.kron(self.component_mass, sp.eye_array(self.dimension))
+        return sp.csc_array(M + added_mass(self) if self.added else M)
 
     @cached_property
     def gradients(self) -> tuple[Any, ...]:
@@ -406,6 +439,36 @@ class ElasticBody(Summarised):
         """
         return expansion(self)
 
+    @property
+    def added(self) -> Sequence[Attachment]:
+        """Masses and springs at points."""
+        return self.mesh.attachments if self.attachments is None else self.attachments
+
+    @cached_property
+    def springs(self) -> tuple[Any, Array, Array]:
+        """Rows (k, d N) of elongations of the springs at points, their stiffness and damping."""
+        return spring_rows(self)
+
+    @cached_property
+    def references(self) -> tuple[str, ...]:
+        """Names of the reference points of constraints."""
+        return reference_points(self.equations, self.mesh.points)
+
+    @cached_property
+    def _reference_motions(self) -> dict[str, Any]:
+        return reference_motions(self)
+
+    def motion_rows(self, at: str | int | tuple[int, int]) -> Any:
+        """Rows, sparse (3, 2 N) or (6, 3 N), of displacement and rotation of a point.
+
+        ``at`` is that of a :class:`~fecontact.fem.Term`. Nodes have no rotation: their rows of it
+        are zero. Those of reference points hold for displacements that meet all constraints.
+        """
+        if isinstance(at, str) and at in self.references:
+            return self._reference_motions[at]
+        node = int(self.mesh.points[at][0]) if isinstance(at, str) else at
+        return displacement_rows(self, node)
+
     @cached_property
     def hinges(self) -> list[HingeSupport]:
         """Nodes, centre and axis of each boundary that rotates rigidly."""
@@ -413,7 +476,7 @@ class ElasticBody(Summarised):
 
     @cached_property
     def _supported(self) -> dict[str, Integers]:
-        return {name: self.group_nodes(name) for name in self.fixed}
+        return {name: self.group_nodes(name) for name in self.fixed if name not in self.references}
 
     def group_nodes(self, name: str) -> Integers:
         """Displacement nodes (k,) of a boundary, or else of points of the mesh."""
@@ -450,13 +513,13 @@ class ElasticBody(Summarised):
 
         mesh = self.mesh
         pieces, piece = mesh.pieces
-        if pieces == 1 or not self.equations:
+        if pieces == 1 or not (self.equations or self.added):
             return pieces
         groups: dict[Any, int] = {}
         links = []
-        for number, one in enumerate(self.equations):
+        for number, one in enumerate((*self.equations, *self.added)):
             own = [term.at for term in one.terms] if isinstance(
-                one, LinearEquation) else one.groups
+                one, LinearEquation | PointSpring) else one.groups
             for name in own:
                 held = mesh.boundaries.get(name, mesh.points.get(name)) if isinstance(
                     name, str) else np.array(name)

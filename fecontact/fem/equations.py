@@ -25,7 +25,7 @@ from fecontact.fem.constraints import (
 from fecontact.fem.faces.facets import Facets
 from fecontact.fem.faces.mean_motion import mean_motion
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.supports import HingeSupport
+from fecontact.fem.supports import HingeSupport, held_components
 
 # Largest coefficient, relative to that of an equation, of what earlier equations imply.
 _IMPLIED = 1e-7
@@ -86,13 +86,23 @@ def expansion(body: _Body) -> Any:
     ModelWarning
         For nodes of a tie that are not near its face.
     """
-    unknowns = _Unknowns(body)
-    found = [*_hinge_equations(unknowns), *_constraint_equations(unknowns)]
+    unknowns = Unknowns(body)
+    found = [*_hinge_equations(unknowns), *constraint_equations(unknowns)]
     return _eliminated(unknowns, found)
 
 
-class _Unknowns:
-    """Numbers of unknowns: displacements, angles of hinges, then motions of reference points."""
+class Unknowns:
+    """Numbers of unknowns: displacements, angles of hinges, then motions of reference points.
+
+    Attributes
+    ----------
+    angles : int
+        Number of displacements, after which the angles follow.
+    motions : dict of name to (integer array, integer array)
+        Displacements and rotations of each reference point.
+    held : integer array
+        Unknowns that supports hold at zero.
+    """
 
     def __init__(self, body: _Body) -> None:
         self.body = body
@@ -111,6 +121,12 @@ class _Unknowns:
             self.motions[name] = shift, first + np.arange(self.turns)
             first += self.turns
         self.count = first
+        held = [body.fixed_dofs]
+        for name, kind in body.fixed.items():
+            if name in self.motions:
+                both = np.concatenate(self.motions[name])
+                held.append(both[list(held_components(self.d, name, kind))])
+        self.held = np.unique(np.concatenate(held))
 
     def of_node(self, node: int | tuple[int, int]) -> list[Integers]:
         """Displacements of a node, or of the nodes whose mean is the middle of an edge."""
@@ -122,6 +138,7 @@ class _Unknowns:
         return [self.d * one + np.arange(self.d) for one in nodes]
 
     def place(self, name: str) -> Array:
+        """Place (d,) of a reference point with one."""
         points = self.body.mesh.points
         if len(points.get(name, ())) == 1:
             return np.asarray(self.body.mesh.nodes[points[name][0]])
@@ -148,7 +165,7 @@ class _Unknowns:
         return "the angle of a hinge"
 
 
-def _hinge_equations(unknowns: _Unknowns) -> Iterator[Equations]:
+def _hinge_equations(unknowns: Unknowns) -> Iterator[Equations]:
     """U = angle axis x arm of the nodes of each hinge."""
     d = unknowns.d
     for index, (around, centre, axis) in enumerate(unknowns.body.hinges):
@@ -164,7 +181,8 @@ def _hinge_equations(unknowns: _Unknowns) -> Iterator[Equations]:
 _HINGE = "a hinge"
 
 
-def _constraint_equations(unknowns: _Unknowns) -> Iterator[Equations]:
+def constraint_equations(unknowns: Unknowns) -> Iterator[Equations]:
+    """Rows of all constraints of a body."""
     for one in unknowns.body.equations:
         name = f"{type(one).__name__} '{one.name}'"
         if isinstance(one, Tie):
@@ -177,7 +195,7 @@ def _constraint_equations(unknowns: _Unknowns) -> Iterator[Equations]:
             yield _distributing(unknowns, one, name)
 
 
-def _equation(unknowns: _Unknowns, one: LinearEquation, name: str) -> Equations:
+def _equation(unknowns: Unknowns, one: LinearEquation, name: str) -> Equations:
     columns: list[Integers] = []
     values: list[Array] = []
     for at, displacement, rotation in one.terms:
@@ -196,7 +214,7 @@ def _equation(unknowns: _Unknowns, one: LinearEquation, name: str) -> Equations:
                      False)
 
 
-def _kinematic(unknowns: _Unknowns, one: Coupling, name: str) -> Equations:
+def _kinematic(unknowns: Unknowns, one: Coupling, name: str) -> Equations:
     """Axes . (u_i - u - phi x r_i) = 0."""
     from scipy.linalg import qr
 
@@ -228,7 +246,7 @@ def _kinematic(unknowns: _Unknowns, one: Coupling, name: str) -> Equations:
         (d * nodes[:, None] + own).ravel(), name)
 
 
-def _distributing(unknowns: _Unknowns, one: Coupling, name: str) -> Equations:
+def _distributing(unknowns: Unknowns, one: Coupling, name: str) -> Equations:
     """Mean motion of nodes as that of a reference point."""
     import scipy.sparse as sp
 
@@ -260,7 +278,7 @@ def _weighted_nodes(body: _Body, name: str) -> tuple[Integers, Array]:
     return nodes, weights[nodes]
 
 
-def _tied(unknowns: _Unknowns, one: Tie, name: str) -> Equations:
+def _tied(unknowns: Unknowns, one: Tie, name: str) -> Equations:
     d, body = unknowns.d, unknowns.body
     facets = body.facet_nodes(body.mesh.boundaries[one.independent])
     face = Facets(body.nodes, facets)
@@ -286,20 +304,22 @@ def _tied(unknowns: _Unknowns, one: Tie, name: str) -> Equations:
     own = (d * nodes[:, None] + np.arange(d)).ravel()
     columns = d * facets[facet][:, None, :, None] + np.arange(d)
     columns = np.broadcast_to(columns, (count, d, k, d))
-    rows = np.repeat(np.arange(count * d), k * d)
-    return Equations(
-        unknowns.rows(np.concatenate([np.arange(count * d), rows]),
-                      np.concatenate([own, columns.ravel()]),
-                      np.concatenate([np.ones(count * d),
-                                      -np.swapaxes(weights, 1, 2).ravel()]), count * d), own, name)
+    each = np.arange(count * d)
+    parts = [(each, own, np.ones(count * d)),
+             (np.repeat(each, k * d), columns.ravel(), -np.swapaxes(weights, 1, 2).ravel())]
+    if one.control is not None:
+        nearer = np.full(count * d, unknowns.motions[one.control][0][0])
+        parts.append((each, nearer, -np.tile(np.asarray(one.direction), count)))
+    rows, columns, values = map(np.concatenate, zip(*parts, strict=True))
+    return Equations(unknowns.rows(rows, columns, values, count * d), own, name)
 
 
-def _eliminated(unknowns: _Unknowns, found: Sequence[Equations]) -> Any:
+def _eliminated(unknowns: Unknowns, found: Sequence[Equations]) -> Any:
     """Displacements from independent unknowns, sparse (d N, f)."""
     import scipy.sparse as sp
 
     free = np.ones(unknowns.count, bool)
-    free[unknowns.body.fixed_dofs] = False
+    free[unknowns.held] = False
     if not found:
         return sp.csc_array(sp.eye_array(unknowns.count, format="csc")[:, free])
     ordered = sorted(found, key=lambda one: not one.strict)
@@ -404,12 +424,12 @@ def _without_unseen(G: Any, extra: Integers) -> Any:
 
 
 def _over_constrained(
-    unknowns: _Unknowns, found: Sequence[Equations], owner: Integers, dependent: Integers, row: int
+    unknowns: Unknowns, found: Sequence[Equations], owner: Integers, dependent: Integers, row: int
 ) -> InputError:
     """Error of a displacement that two of supports and constraints determine."""
     unknown, name = int(dependent[row]), found[owner[row]].name
     earlier = owner[np.flatnonzero(dependent == unknown)[0]]
-    others = {name, "a support" if unknown in unknowns.body.fixed_dofs else found[earlier].name}
+    others = {name, "a support" if unknown in unknowns.held else found[earlier].name}
     if others <= {_HINGE, "a support"}:
         return InputError("Two supports share a node, and one of them is a hinge; separate them.")
     both = " and ".join(sorted(others, reverse=True))

@@ -12,6 +12,7 @@ from fecontact.core.errors import InputError, MeshError, choices, nearest, requi
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, count, span
+from fecontact.fem.attachments import Attachment, check_attachments, counted_attachments
 from fecontact.fem.constraints import Constraint, check_constraints, counted
 from fecontact.fem.elements.cell_geometry import (
     curved_volumes,
@@ -67,6 +68,8 @@ class Mesh(Summarised):
         Materials of groups of cells that a file holds, for bodies of this mesh; none by default.
     bricks : 'full' or 'incompatible'
         Kind of the eight-node bricks of a file, for bodies of this mesh with ``degree = 1``.
+    attachments : sequence of PointMass or PointSpring
+        Masses and springs at points that a file holds, for bodies of this mesh; none by default.
 
     Raises
     ------
@@ -86,6 +89,7 @@ class Mesh(Summarised):
     cell_groups: Mapping[str, Integers] = field(default_factory=dict)
     materials: Mapping[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
+    attachments: Sequence[Attachment] = ()
 
     def __post_init__(self) -> None:
         nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
@@ -153,6 +157,9 @@ class Mesh(Summarised):
         require_kind("Mesh", Sequence, constraints=self.constraints)
         check_constraints(self.constraints, boundaries, points, dimension, len(nodes))
         object.__setattr__(self, "constraints", tuple(self.constraints))
+        require_kind("Mesh", Sequence, attachments=self.attachments)
+        check_attachments(self.attachments, self.constraints, points, dimension, len(nodes))
+        object.__setattr__(self, "attachments", tuple(self.attachments))
         require_choice("Mesh", "bricks", self.bricks, get_args(Bricks))
         require_kind("Mesh", Mapping, cell_groups=self.cell_groups, materials=self.materials)
         groups = {name: np.unique(as_integers(which, f"The cells of mesh group '{name}'"))
@@ -291,7 +298,8 @@ class Mesh(Summarised):
                   for name, group in self.cell_groups.items()}
         constraints = [one.refined(self.middle_node) for one in self.constraints]
         return Mesh(nodes, cells, boundaries, self.points, curved, middles, constraints, groups,
-                    self.materials, self.bricks)
+                    self.materials, self.bricks,
+                    [one.refined(self.middle_node) for one in self.attachments])
 
     def middle_node(self, ends: tuple[int, int]) -> int:
         """Node in the middle of an edge in the refined mesh."""
@@ -345,7 +353,7 @@ class Mesh(Summarised):
         return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles,
                     [one.turned(turn * signs, by) for one in self.constraints], self.cell_groups,
                     {name: one.moved(whole, arm) for name, one in self.materials.items()},
-                    self.bricks)
+                    self.bricks, [one.turned(turn * signs, by) for one in self.attachments])
 
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""
@@ -360,6 +368,7 @@ class Mesh(Summarised):
               for name, group in self.boundaries.items()),
             *((f"point {name}", count(len(nodes), "node")) for name, nodes in self.points.items()),
             *([("constraints", counted(self.constraints))] if self.constraints else []),
+            *([("attachments", counted_attachments(self.attachments))] if self.attachments else []),
         ]
 
     @property

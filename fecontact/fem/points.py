@@ -20,6 +20,7 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.faces.mean_motion import TURNS, mean_motion, sampled_rows
 from fecontact.fem.faces.surface import Surface
 from fecontact.fem.interpolation import interpolation
+from fecontact.fem.reference_motions import reference_position
 
 _CURVED = 1e-9  # distance of the middle of an edge from its chord, per length
 _FINE = 24  # parts of a facet along each of its sides
@@ -75,7 +76,9 @@ class Pieces:
 
 
 def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
-    """Rows of a place: a mesh point, a boundary, coordinates or a patch.
+    """Rows of a place: a mesh point, a boundary, a reference point, coordinates or a patch.
+
+    Those of a reference point hold for displacements that meet all constraints of the body.
 
     Raises
     ------
@@ -94,6 +97,8 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
                              f"a larger radius.")
         return found
     if isinstance(place, str):
+        if place in body.references:
+            return Rows(body.motion_rows(place), reference_position(body, place))
         if place in mesh.boundaries and mesh.dimension == 3:
             return face_rows(body, mesh.boundaries[place])
         if place in mesh.boundaries:
@@ -102,7 +107,7 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
             nodes = mesh.points[place]
             return node_rows(body, int(nodes[0])) if len(nodes) == 1 else Rows(*mean_motion(
                 len(body.nodes), nodes, body.nodes[nodes], np.ones(len(nodes))))
-        known = {*mesh.points, *mesh.boundaries}
+        known = {*mesh.points, *mesh.boundaries, *body.references}
         raise MeshError(f"Point {name}: the mesh has no point or boundary '{place}'"
                         f"{nearest(place, known)}; it has: {choices(known)}.")
     centre = _centre(body, place, name)

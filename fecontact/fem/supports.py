@@ -1,6 +1,6 @@
 """Supports: constraints of nodal displacements, and their elimination."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -25,10 +25,41 @@ class HingeSupport(NamedTuple):
     axis: Array
 
 
-def check_supports(mesh: Mesh, fixed: Mapping[str, str]) -> None:
-    """Raise unless all supports name boundaries or points of the mesh, and known kinds."""
-    known = {*mesh.boundaries, *mesh.points}
+def held_components(dimension: int, name: str, kind: str) -> tuple[int, ...]:
+    """Components of the motion of a reference point that a support of this kind holds at zero.
+
+    They count x, y, phi, in space x, y, z, phi_x, phi_y, phi_z, from 0. Kinds are those of other
+    points; 'clamped', all; 'hinge_x', all but phi_x; or components with spaces between them.
+
+    Raises
+    ------
+    InputError
+        For another kind.
+    """
+    names = ("x", "y", "phi") if dimension == 2 else ("x", "y", "z", "phi_x", "phi_y", "phi_z")
+    if kind == "clamped":
+        return tuple(range(len(names)))
+    if kind.startswith("hinge_") and dimension == 3 and kind in KINDS[3]:
+        return tuple(k for k, one in enumerate(names) if one != f"phi_{kind[-1]}")
+    if kind in KINDS[dimension]:
+        return tuple(k for k in range(dimension) if kind == "hinge" or names[k] in kind)
+    words = kind.split()
+    if not words or not set(words) <= set(names):
+        raise InputError(f"ElasticBody: fixed['{name}'] = {kind!r} must be one of "
+                         f"{choices((*KINDS[dimension], 'clamped'))}, or some of "
+                         f"{choices(names)} with spaces between them.")
+    return tuple(k for k, one in enumerate(names) if one in words)
+
+
+def check_supports(
+    mesh: Mesh, fixed: Mapping[str, str], references: Collection[str] = ()
+) -> None:
+    """Raise unless all supports name groups of the mesh or reference points, and known kinds."""
+    known = {*mesh.boundaries, *mesh.points, *references}
     for name, kind in fixed.items():
+        if name in references:
+            held_components(mesh.dimension, name, kind)
+            continue
         if name not in known:
             raise MeshError(f"The mesh has no boundary or point '{name}' to be fixed"
                             f"{nearest(name, known)}; it has: {choices(known)}.")
@@ -45,8 +76,8 @@ def fixed_dofs(
     ``fixed`` maps the name of each support to its kind, ``supported`` to its displacement nodes.
     """
     held: list[Integers] = [np.empty(0, np.int64)]
-    for name, kind in fixed.items():
-        nodes = supported[name]
+    for name, nodes in supported.items():
+        kind = fixed[name]
         hinge = kind.startswith("hinge")
         if hinge and len(nodes) > 1:
             continue
@@ -62,10 +93,10 @@ def hinges(
 
     ``nodes`` (N, d) are the places of the displacement nodes [m].
     """
-    return [HingeSupport(supported[name], _centre(mesh, nodes[supported[name]], name),
-                  _axis(mesh, nodes[supported[name]], name, kind))
-            for name, kind in fixed.items()
-            if kind.startswith("hinge") and len(supported[name]) > 1]
+    return [HingeSupport(held, _centre(mesh, nodes[held], name),
+                         _axis(mesh, nodes[held], name, fixed[name]))
+            for name, held in supported.items()
+            if fixed[name].startswith("hinge") and len(held) > 1]
 
 
 def _centre(mesh: Mesh, places: Array, name: str) -> Array:

@@ -72,7 +72,7 @@ def material_damping_ratios(body: ElasticBody, shapes: Array) -> Array:
     for which in range(len(body.materials)):
         cells = np.flatnonzero(body.cell_materials == which)
         energies[which] = strain_energies(body, shapes, cells)
-    total = energies.sum(axis=0)
+    total = strain_energies(body, shapes) if body.added else energies.sum(axis=0)
     losses = np.array([one.loss_factor for one in body.materials])
     return np.asarray(0.5 * losses @ energies / np.where(total > 0.0, total, 1.0))
 

@@ -64,8 +64,8 @@ class FreeSystem:
         Raises
         ------
         InputError
-            For an unknown eigensolver, or the iterative one for a plane body or one with a hinge
-            or constraints.
+            For an unknown eigensolver, or the iterative one for a plane body or one with a hinge,
+            constraints or attachments.
         """
         if eigensolver not in get_args(Eigensolver):
             raise InputError(f"eigensolver = {eigensolver!r} must be one of "
@@ -80,7 +80,8 @@ class FreeSystem:
             stiffness, eigensolver = (stiffness + stress).tocsc(), "direct"
         solid = (body if body.dimension == 3 else None, eigensolver, stress is not None)
         if E.shape[0] == E.shape[1]:
-            return cls(stiffness, body.mass, rigid, body.component_mass, *solid)
+            return cls(stiffness, body.mass, rigid, None if body.added else body.component_mass,
+                       *solid)
         if selects(E):
             free = E.indices
             K, M = (a[free][:, free].tocsc() for a in (stiffness, body.mass))
@@ -265,11 +266,15 @@ def frequencies_of(body: ElasticBody, shapes: Array, stress: Any = None) -> Arra
 def strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) -> Array:
     """Strain energies (m,) [J] of displacement fields (d N, m), from the strains in the elements.
 
-    ``cells`` are the cells whose energy counts, all by default.
+    ``cells`` are the cells whose energy counts; by default all, and the springs of the body.
 
     The product with K would lose as many digits as the stiffest cells exceed the body as a whole,
     which may be all for a slender body with strongly graded cells.
     """
+    if isinstance(cells, slice) and body.added:
+        rows, stiffness, _ = body.springs
+        return 0.5 * stiffness @ (rows @ shapes) ** 2 + strain_energies(
+            body, shapes, np.arange(len(body.mesh.cells)))
     if body.dimension == 3:
         return solid_strain_energies(body, shapes, cells)
     basis = body.basis

@@ -102,7 +102,7 @@ def modal_basis(
     tolerance : float
         For 'residual': largest part missing of the static compliance there; zero keeps all vectors.
     loads : sequence of 'gravity' or place
-        Adds static responses to gravity or loads at places, if not for 'vibration'.
+        Adds static responses to gravity or loads (also moments at reference points).
     rotation : Rotation, optional
         Of the plane body: displacements are those in its frame, modes those at rest.
     prestress : BodyFields, optional
@@ -140,6 +140,9 @@ def modal_basis(
         raise InputError("rotation is that of plane bodies; leave it out for a solid.")
     if rotation is not None:
         refuse_circles(body, "rotation")
+        if body.added:
+            raise InputError("rotation is that of bodies without masses and springs at points; "
+                             "leave it out, or give attachments = ().")
     face = contact_groups(body, contact, contact_nodes)
     named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
     further = [place_rows(body, place, name) for name, place in points.items()]
@@ -180,9 +183,11 @@ def modal_basis(
     rows = np.asarray(forces.transpose(0, 2, 1) @ shapes)
     elements = body_elements(body)
     turning = None if rotation is None else modal_rotation(body, system, rotation, shapes)
+    springs, _, dashpots = body.springs
+    rates = springs @ shapes
     basis = ModalBasis(
         angular_frequencies=w,
-        damping=modal_damping(damping, w),
+        damping=modal_damping(damping, w) + rates.T @ (dashpots[:, None] * rates),
         T=(restriction @ shapes).reshape(-1, 3 * (d - 1), len(w)),
         positions=np.array([*(row.position for row in named), *face.positions,
                             *(row.position for row in further)]),
@@ -314,7 +319,8 @@ def _nowhere(place: Place) -> bool:
 
 
 def _has(body: ElasticBody, name: str) -> bool:
-    return name in body.mesh.points or name in body.mesh.boundaries
+    return any(name in known for known in (body.mesh.points, body.mesh.boundaries,
+                                           body.references))
 
 
 def _given_rows(body: ElasticBody, given: Any) -> Any:
@@ -411,8 +417,10 @@ def loading(
             found.append(boundary_forces(body, load))
         else:
             place = points.get(load, load) if isinstance(load, str) else load
-            rows = place_rows(body, place, f"of loads ({load})").matrix[: body.dimension]
-            found.append(rows.T.toarray())
+            rows = place_rows(body, place, f"of loads ({load})").matrix
+            if place not in body.references:
+                rows = rows[: body.dimension]  # moments act on reference points alone
+            found.append(rows[rows.indptr[1:] > rows.indptr[:-1]].T.toarray())
     forces = np.asarray(body.expansion.T @ np.hstack(found))
     return forces[:, _deforms(system, forces)] if forces.shape[1] else forces
 

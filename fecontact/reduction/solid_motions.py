@@ -43,7 +43,9 @@ def rigid_motions(places: Array, centre: Array) -> Array:
 
 
 def allowed_motions(body: ElasticBody, centre: Array) -> Array:
-    """Rigid motions (d N, r) of the body and of its pieces that no support or constraint resists.
+    """Rigid motions (d N, r) of the body and of its pieces that nothing resists.
+
+    Supports, constraints and springs at points may resist them.
 
     Motions of the whole body come first: those along the axes and about the centre that are free,
     in their order, then what is free of the other rotations and translations.
@@ -52,7 +54,8 @@ def allowed_motions(body: ElasticBody, centre: Array) -> Array:
     whole = rigid_motions(body.nodes, centre)
     size = np.array([1.0] * d + [1.0 / body.mesh.extent] * (whole.shape[1] - d))
     pieces, piece = body.pieces
-    if G.shape[0] == G.shape[1] and pieces == 1:
+    springs, stiffness, _ = body.springs
+    if G.shape[0] == G.shape[1] and pieces == 1 and not stiffness.any():
         return whole
     whole = whole * size
     count = whole.shape[1]
@@ -62,7 +65,10 @@ def allowed_motions(body: ElasticBody, centre: Array) -> Array:
         motions[rows, count * one : count * (one + 1)] = whole[rows]
     unknowns = least_squares(G, motions)
     resisted = motions - G @ unknowns
-    triangle = np.linalg.qr(np.vstack([resisted, np.zeros((motions.shape[1],) * 2)]), mode="r")
+    felt = np.asarray(springs[stiffness > 0.0] @ motions)
+    felt /= np.maximum(np.linalg.norm(felt, axis=1), _STILL)[:, None]
+    triangle = np.linalg.qr(np.vstack([resisted, felt, np.zeros((motions.shape[1],) * 2)]),
+                            mode="r")
     _, values, directions = np.linalg.svd(triangle)
     free = directions[values <= _STILL * max(float(values[0]), 1.0)].T
     found = np.zeros((motions.shape[1], 0))

@@ -1,7 +1,7 @@
 """Studies from mesh files: bodies, interfaces where surfaces face each other, and what is left."""
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -12,7 +12,8 @@ from fecontact.core.checks import as_path
 from fecontact.core.errors import FecontactError, ModelWarning
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import count, listed, quantity
-from fecontact.fem.constraints import Coupling, LinearEquation, Tie
+from fecontact.fem.attachments import counted_attachments
+from fecontact.fem.constraints import Coupling, LinearEquation, Tie, reference_points
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files import read_bodies
@@ -28,9 +29,7 @@ _CONSTRAINTS: Mapping[str, type] = {
     "ties": Tie, "couplings": Coupling, "equations": LinearEquation}
 _REMEDIES = {
     "PRE-TENSION SECTION": "cut the bolt there, and give its force in [load] as opposite pressures "
-                           "on both faces of the cut",
-    "SPRING": "give it in [links] with kind = \"spring\" between points of two bodies",
-    "MASS": "give its mass as a body of its own, or by the density of the cells around it"}
+                           "on both faces of the cut"}
 _MOST_NODES = 16  # of a proposed interface
 
 
@@ -78,6 +77,8 @@ class Imported:
             for plural, cls in _CONSTRAINTS.items():
                 if held := [one.name for one in mesh.constraints if isinstance(one, cls)]:
                     yield f"  {plural}", f"{len(held)}: {listed(held)}"
+            if mesh.attachments:
+                yield "  attachments", counted_attachments(mesh.attachments)
         for kind, number in self.contents.elements.items():
             yield f"elements {kind}", f"{number}"
         for what, names in (("loads and supports", self.contents.loads),
@@ -97,24 +98,29 @@ class Imported:
         bodies = [name for name in self.meshes if name in touching]
         if not bodies:
             name = max(self.meshes, key=lambda one: len(self.meshes[one].cells))
+            forces, points = self._loads([name])
             tables = {"geometry": self._geometry(file, name),
                       "body": self._body(name),
-                      "basis": {"modes": 20, "contact": []}}
+                      "basis": {"modes": 20, "contact": [], **_loaded(points[name])}}
         else:
+            forces, points = self._loads(bodies)
             tables = {"bodies": {_name(name): {
-                "geometry": self._geometry(file, name),
-                "body": self._body(name), "basis": {"modes": 10, "damping": 0.01}}
+                "geometry": self._geometry(file, name), "body": self._body(name),
+                "basis": {"modes": 10, "damping": 0.01, **_loaded(points[name])}}
                 for name in bodies},
                 "interfaces": {f"contact-{number}": self._interface(face, other)
                                for number, (face, other) in enumerate(self.interfaces, start=1)}}
         left = [name for name in self.meshes if bodies and name not in bodies]
+        if forces:
+            tables["load"] = {"forces": forces}
         tables["simulation"] = {"t_end": 1e-3, "outputs": 101}
         comments = [f"Written by fecontact import {self.path.name}. Units are SI: m, kg, s, N.",
                     *([f"Bodies without an interface are left out: {listed(left, len(left))}."]
                       if left else []),
                     *self.notes,
-                    *([f"Loads and supports of the deck: {', '.join(self.contents.loads)}; give "
-                       f"supports as fixed in [body], loads in [load]."]
+                    *([f"Loads and supports of the deck: {', '.join(self.contents.loads)}. Those "
+                       f"of supports at zero and of forces at single points are taken; give others "
+                       f"as fixed in [body] and in [load]."]
                       if self.contents.loads else []),
                     *(["The laws of contact are a stiff normal contact and a coefficient of 0.3; "
                        "put in your own."] if bodies else
@@ -133,13 +139,40 @@ class Imported:
                     for row in _rows(mesh.boundaries[face[len(body) + 1:]])}
         known = {name.upper(): name for name in (*mesh.boundaries, *mesh.points)
                  if not touching & _rows(mesh.boundaries.get(name, np.empty((0, 2), np.int64)))}
-        fixed = {known[name.upper()]: ways for name, ways in self.contents.supports
-                 if name.upper() in known}
-        if mesh.dimension == 2:
-            fixed = {name: held for name, ways in fixed.items() if (held := ways.strip("z"))}
+        references = _references(mesh)
+        fixed: dict[str, str] = {}
+        for word, components in self.contents.supports:
+            name = references.get(word.upper()) or known.get(word.upper())
+            held = " ".join(_in_plane(one) if mesh.dimension == 2 else one
+                            for one in components.split())
+            if name not in references.values():
+                held = "".join(one for one in held.split() if one in "xyz")
+            if name and held.strip():
+                fixed[name] = " ".join(held.split())
         return {**({} if mesh.materials else {"material": "steel"}),
                 **({"plane": "strain"} if mesh.dimension == 2 else {}),
                 **({"fixed": fixed} if fixed else {})}
+
+    def _loads(self, bodies: Sequence[str]) -> tuple[list[dict[str, object]], dict[str, set[str]]]:
+        """Forces and moments at reference points of bodies, and these points."""
+        forces: list[dict[str, object]] = []
+        points: dict[str, set[str]] = {body: set() for body in bodies}
+        for word, component, value in self.contents.forces:
+            for body in bodies:
+                mesh = self.meshes[body]
+                single = {name.upper(): name for name, nodes in mesh.points.items()
+                          if len(nodes) == 1}
+                name = (single | _references(mesh)).get(word.upper())
+                if mesh.dimension == 2:
+                    component = _in_plane(component)
+                if name and component:
+                    points[body].add(name)
+                    prefix = f"{_name(body)}." if len(bodies) > 1 or self.interfaces else ""
+                    moment = component.startswith("phi")
+                    forces.append({"point": prefix + name, "component": component,
+                                   "signal": value * (self.scale if moment else 1.0)})
+                    break
+        return forces, points
 
     def _interface(self, face: str, other: str) -> dict[str, object]:
         body, _, boundary = face.partition(".")
@@ -278,6 +311,25 @@ def _vectors(mesh: Mesh, facets: Integers) -> Array:
     return np.asarray(0.5 * np.cross(places[:, 2] - places[:, 0], places[:, -1] - places[:, 1])
                       if facets.shape[1] == 4 else 0.5 * np.cross(
                           places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]))
+
+
+def _references(mesh: Mesh) -> dict[str, str]:
+    """Names of reference points by the words of a deck, in capitals."""
+    found = reference_points(mesh.constraints, mesh.points)
+    return {word: name for name in found for word in (name.upper(), name.upper().removeprefix(
+        "NODE "))}
+
+
+def _loaded(points: set[str]) -> dict[str, object]:
+    """Keys of a basis with points at which loads act."""
+    names = sorted(points)
+    return {"points": {name: name for name in names}, "reduction": "residual",
+            "loads": names} if names else {}
+
+
+def _in_plane(component: str) -> str:
+    """Component of a plane body for one of a deck; empty for none."""
+    return {"x": "x", "y": "y", "phi_z": "phi"}.get(component, "")
 
 
 def _name(body: str) -> str:

@@ -32,7 +32,6 @@ from fecontact.study.materials_section import MaterialSettings
 
 _MATERIAL_KEYS = ("material", "youngs_modulus", "poisson_ratio", "density")
 Place = str | Coordinates | Patch
-Support = Literal["x", "y", "xy", "z", "xz", "yz", "xyz", "hinge", "hinge_x", "hinge_y", "hinge_z"]
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,7 @@ class BodySettings:
     fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or 'hinge'
         Supports on boundaries and points of the mesh: the directions that are held, or a hole
         that turns about its centre; 'hinge_x', 'hinge_y', 'hinge_z' name the axis in a solid.
+        At reference points of couplings also 'clamped', or components such as 'x y phi_z'.
     rotation : Rotation, optional
         ``[body.rotation]``: the body rotates at a constant speed about a point of its plane.
     """
@@ -75,7 +75,7 @@ class BodySettings:
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
     bricks: Literal["full", "incompatible"] | None = None
-    fixed: Mapping[str, Support] = field(default_factory=dict)
+    fixed: Mapping[str, str] = field(default_factory=dict)
     rotation: Rotation | None = None
 
     def __post_init__(self) -> None:

@@ -80,6 +80,28 @@ def test_supports_of_the_deck(place):
     assert study.bodies["A"].body.fixed == {"left": "xy", "right": "xyz"}
 
 
+def test_supports_and_loads_at_reference_nodes(cli, place):
+    """A block held at one point and loaded at another by force and moment, in mm; it runs."""
+    text = part("A", block_mesh((3, 2, 1), (100.0, 40.0, 20.0))).replace("2.1e11", "2.1e5")
+    couplings = "".join(
+        f"*COUPLING, CONSTRAINT NAME=c{node}, REF NODE={node}, SURFACE={face}\n*KINEMATIC\n"
+        for node, face in ((901, "right"), ("HELD", "left")))
+    nodes = "*NODE\n901, 110., 20., 10.\n*NODE, NSET=HELD\n902, 0, 0, 0\n"
+    text = text.replace("*PART, NAME=A\n", "").replace("*END PART\n", nodes + couplings)
+    material = MATERIAL.replace("2.1e11", "2.1e5").replace("7850.", "7.85e-9")
+    (place / "a.inp").write_text(
+        f"{text}{material}*BOUNDARY\nheld, 1, 4\nHELD, 6\n*STEP\n*STATIC\n*CLOAD\n901, 2, 30.\n"
+        "901, 6, 500.\nnone, 1, 1.\n*END STEP\n*STEP\n*CLOAD\n901, 1, 9.\n*END STEP\n")
+    assert cli("import", "a.inp", "--scale", "1e-3", "-o", "study.toml")[0] == 0
+    study = Study.read("study.toml")
+    assert study.body.fixed == {"HELD": "x y z phi_x phi_z"}
+    assert [(one.point, one.component, one.signal.value) for one in study.load.forces] == [
+        ("node 901", "y", 30.0), ("node 901", "phi_z", pytest.approx(0.5))]
+    assert study.elastic_body().total_mass == pytest.approx(7850.0 * 8e-5)
+    assert cli("run", "study.toml", "--set", "simulation.t_end=1e-5",
+               "--set", "body.degree=1")[0] == 0
+
+
 def test_an_existing_study_is_kept(cli, place):
     (place / "stack.inp").write_text(deck(*STACK))
     (place / "study.toml").write_text("mine")

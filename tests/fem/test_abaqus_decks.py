@@ -219,13 +219,14 @@ def test_elements_lost_at_the_end_of_an_included_file_are_warned_of(tmp_path):
         read_mesh(path)
 
 
-def test_springs_and_masses_are_named_once_with_their_number(tmp_path):
+def test_springs_and_masses_without_elements_are_named(tmp_path):
     path = deck(tmp_path, f"{SQUARE}*MASS, ELSET=m\n1.\n*Spring, elset=s\n1, 1\n"
                           "*Mass, elset=n\n2.\n*BOUNDARY\n1, 1\n")
     with pytest.warns(ModelWarning) as caught:
         assert read_mesh(path).area == 2.0
     message, = caught
-    assert "a.inp: the file holds 1 *SPRING, 2 *MASS, which are not read" in str(
+    assert ("a.inp: the file holds *MASS with a set 'm' without elements, *SPRING with a set 's' "
+            "without elements, *MASS with a set 'n' without elements, which are not read") in str(
         message.message)
 
 

@@ -129,6 +129,82 @@ def test_frequencies_are_those_of_calculix(tmp_path, text, expected):
     assert found[:3] == pytest.approx(expected[:3], rel=6e-4)
 
 
+RIGID = ("*NODE\n5000, 0.15, 0.03, 0.01\n*RIGID BODY, NSET=A_right_N, REF NODE=5000\n")
+INNER = node_at(FIRST, (0.0667, 0.04, 0.03))
+ATTACHED = {
+    "mass": "*ELEMENT, TYPE=MASS, ELSET=EM\n9001, 5000\n*MASS, ELSET=EM\n2.5\n",
+    "spring to the base": "*ELEMENT, TYPE=SPRING1, ELSET=ES\n9002, 5000\n"
+                          "*SPRING, ELSET=ES\n2\n3.e6\n",
+    "spring of two directions": f"*ELEMENT, TYPE=SPRING2, ELSET=ED\n9003, 5000, {INNER}\n"
+                                "*SPRING, ELSET=ED\n1, 3\n4.e6\n",
+    "spring along its line": f"*ELEMENT, TYPE=SPRINGA, ELSET=EB\n9004, {INNER}, 5000\n"
+                             "*SPRING, ELSET=EB\n\n2.e7\n"}
+ATTACHED["all"] = "".join(ATTACHED.values())
+
+
+@pytest.mark.parametrize(("kind", "frequencies", "motion"), [
+    ("mass", (418.4055, 551.6397, 4493.594),
+     (-5.374075e-7, 2.999071e-6, -8.727931e-6, 1.451436e-5, 7.865356e-5, 2.583722e-5)),
+    ("spring to the base", (2441.644, 3219.606, 7424.927),
+     (-5.139117e-7, 2.735170e-6, -8.729691e-6, 1.428235e-5, 7.864996e-5, 2.348607e-5)),
+    ("spring of two directions", (2461.484, 3102.256, 7445.018),
+     (-5.392984e-7, 3.021954e-6, -8.641891e-6, 1.503803e-5, 7.809014e-5, 2.604426e-5)),
+    ("spring along its line", (2441.681, 3101.217, 7423.578),
+     (-5.378156e-7, 3.001463e-6, -8.725083e-6, 1.451762e-5, 7.861480e-5, 2.587197e-5)),
+    ("all", (420.9953, 578.2057, 4505.025),
+     (-5.160707e-7, 2.758735e-6, -8.639165e-6, 1.481627e-5, 7.803541e-5, 2.371367e-5)),
+])
+def test_masses_springs_and_loads_at_a_reference_node_are_those_of_calculix(
+        tmp_path, kind, frequencies, motion):
+    """Force and moment on the reference node of a rigid body, whose displacement and rotation."""
+    body = body_of(tmp_path, ONE + RIGID + ATTACHED[kind])
+    assert eigenfrequencies_hz(body, 3) == pytest.approx(frequencies, rel=6e-4)
+    assert eigenfrequencies_hz(body, 2) == pytest.approx(frequencies[:2], rel=7e-5)
+    found = static_solution(body, point_loads("node 5000", moments=(4.0, -3.0, 2.0)))
+    moved = body.motion_rows("node 5000") @ found.displacement.ravel()
+    assert moved == pytest.approx(motion, rel=1e-6)
+
+
+def test_attachments_of_parts_instances_and_the_assembly(tmp_path):
+    """A mass in each instance of a part; a spring and a dashpot between them, units of the file."""
+    mass = f"*ELEMENT, TYPE=MASS, ELSET=M\n9001, {CORNER}\n*MASS, ELSET=M\n2.5\n"
+    more = (f"*ELEMENT, TYPE=SPRINGA, ELSET=S\n1, near.{CORNER}, far.{LOW}\n*SPRING, ELSET=S\n\n"
+            f"3.\n*ELEMENT, TYPE=DASHPOT1, ELSET=D\n2, far.{LOW}\n*DASHPOT, ELSET=D\n2\n7.\n")
+    text = INSTANCES.replace("*END PART", f"{mass}*END PART", 1)
+    mesh = read(tmp_path, text + more + TIED, scale=1e-3)
+    masses, others = mesh.attachments[:2], mesh.attachments[2:]
+    assert [one.mass for one in masses] == pytest.approx([2500.0, 2500.0])
+    assert [tuple(mesh.nodes[one.at]) for one in masses] == [
+        pytest.approx((at, 4e-5, 3e-5)) for at in (1e-4, 2e-4)]
+    spring, dashpot = others
+    assert (spring.stiffness, dashpot.damping) == pytest.approx((3000.0, 7000.0))
+    assert np.linalg.norm(spring.terms[0].displacement) == pytest.approx(1.0)
+    assert dashpot.terms[0].displacement == (0.0, 1.0, 0.0)
+    with pytest.warns(ModelWarning, match=r"2 constraints reach beyond the part 'near'"):
+        near = read(tmp_path, text + more.partition("*ELEMENT, TYPE=DASH")[0] + TIED, part="near")
+    assert len(near.attachments) == 1
+    with pytest.warns(ModelWarning, match=r"^1 mass or spring is at nodes that belong to no elem"):
+        read(tmp_path, f"{ONE}*NODE\n5000, 1, 1, 1\n{ATTACHED['mass']}")
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    (ATTACHED["mass"].replace("2.5\n", "heavy\n"), r"\*MASS of the set 'EM' holds 'heavy' in "),
+    (ATTACHED["mass"].replace("2.5\n", ""), r"\*MASS of the set 'EM' has 0 of at least 1 numbers"),
+    (ATTACHED["mass"].replace("*MASS", "*SPRING"),
+     r"holds the element 9001 of type MASS; its types are SPRING1, SPRING2, SPRINGA\.$"),
+    (ATTACHED["mass"].replace("5000\n", "7777\n"), r"'7777', which holds no nodes of the file"),
+    (ATTACHED["spring to the base"].replace("\n2\n", "\n9\n"), r"must give the degree of freedom"),
+    (ATTACHED["spring along its line"].replace("5000", str(INNER)), r"two nodes at one place"),
+    (ATTACHED["mass"].replace("*MASS", "*ROTARY INERTIA").replace("MASS", "ROTARYI").replace(
+        "2.5", "1, 1, 1").replace("5000", str(CORNER)),
+     r"PointMass 'of element 9001' turns with '\d+', which has no rotation of its own; couple"),
+])
+def test_bad_attachments_of_decks(tmp_path, text, message):
+    with pytest.raises(MeshError, match=message) as caught:
+        read(tmp_path, ONE + RIGID + text)
+    assert "\n" not in str(caught.value)
+
+
 def same(folder, text, other, count=6, **options):
     one, two = (eigenfrequencies_hz(body_of(folder, given, **options), count)
                 for given in (text, other))
@@ -340,7 +416,8 @@ def test_bad_constraints_of_decks(tmp_path, text, message):
 
 
 def test_kinds_that_are_not_read_are_warned_of(tmp_path):
-    with pytest.warns(ModelWarning, match=r"holds 1 \*SPRING, \*MPC SLIDER, which are not read"):
+    with pytest.warns(ModelWarning, match=r"holds \*MPC SLIDER, \*SPRING with a set 'none' "
+                                          r"without elements, which are not read"):
         mesh = read(tmp_path, f"{ONE}*SPRING, ELSET=none\n\n1.\n*MPC\nSLIDER, 1, 2, 3\n")
     assert mesh.constraints == ()
 
@@ -348,5 +425,8 @@ def test_kinds_that_are_not_read_are_warned_of(tmp_path):
 def test_writing_a_mesh_warns_of_its_constraints(tmp_path):
     mesh = read(tmp_path, PAIR + TIE)
     with pytest.warns(ModelWarning, match=r"b\.msh: Gmsh cannot store 1 tie; give them to"):
+        write_mesh(mesh, tmp_path / "b.msh")
+    mesh = read(tmp_path, ONE + RIGID + ATTACHED["all"])
+    with pytest.warns(ModelWarning, match=r"1 coupling and 1 point mass, 3 springs; give them to"):
         write_mesh(mesh, tmp_path / "b.msh")
     assert (tmp_path / "b.msh").exists()

@@ -19,6 +19,7 @@ from fecontact.core.errors import InputError, MeshError, ModelWarning, choices
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.resources.memory import available_memory, shown_memory
 from fecontact.core.types import ArrayLike, Coordinates, Integers
+from fecontact.fem.attachments import counted_attachments
 from fecontact.fem.constraints import counted
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.abaqus import read_inp
@@ -47,7 +48,8 @@ def read_mesh(
     (Abaqus, MED), elements by property number (Nastran). Points are physical points, node sets,
     groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
     second-order elements are kept, coincident nodes merged, nodes without a cell left out. Ties,
-    couplings and equations of Abaqus files become ``mesh.constraints``; their nodes are not merged.
+    couplings and equations of Abaqus files become ``mesh.constraints``, whose nodes are not merged;
+    masses, springs and dashpots become ``mesh.attachments``.
     Sections of Abaqus files become ``mesh.materials``, in SI units if the file's forces are in N
     and its mass fits to them, such as tonnes beside mm.
 
@@ -123,16 +125,17 @@ def _mesh(
     mesh, groups = body_mesh(raw, scale)
     return Mesh(mesh.nodes, mesh.cells, named_boundaries(mesh, groups, boundaries),
                 named_points(mesh, groups, points), mesh.curved_edges, mesh.curved_middles,
-                named_constraints(groups, boundaries, points), mesh.cell_groups, groups.materials,
-                mesh.bricks)
+                named_constraints(groups.constraints, boundaries, points), mesh.cell_groups,
+                groups.materials, mesh.bricks,
+                named_constraints(groups.attachments, boundaries, points))
 
 
 def write_mesh(mesh: Mesh, path: str | Path) -> None:
     """Write a mesh as Gmsh 4.1 text, its groups as physical groups.
 
     Coordinates are written with all digits, so that :func:`read_mesh` restores the same mesh, with
-    the cells of each group together, but for constraints, materials and incompatible modes of
-    bricks, of which a warning tells. The file is written whole or not at all.
+    the cells of each group together, but for constraints, attachments, materials and incompatible
+    modes of bricks, of which a warning tells. The file is written whole or not at all.
 
     Raises
     ------
@@ -149,6 +152,7 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
         if not name.strip() or '"' in name or "\n" in name:
             raise InputError(f"{path}: Gmsh cannot store a group named {name!r}; rename it.")
     lost = [counted(mesh.constraints)] * bool(mesh.constraints)
+    lost += [counted_attachments(mesh.attachments)] * bool(mesh.attachments)
     lost += [f"the materials of {choices(mesh.materials)}"] * bool(mesh.materials)
     lost += ["the incompatible modes of its bricks"] * (mesh.bricks == "incompatible")
     if lost:

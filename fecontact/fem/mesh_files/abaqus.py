@@ -20,6 +20,13 @@ from fecontact.core.errors import MeshError, ModelWarning, choices, nearest, sho
 from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint, LinearEquation
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial
+from fecontact.fem.mesh_files.abaqus_attachments import (
+    TYPES,
+    PointElement,
+    attachments_of,
+    is_point_element,
+    refused,
+)
 from fecontact.fem.mesh_files.abaqus_constraints import READ, Block, Names, constraints_of
 from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
 from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
@@ -42,8 +49,7 @@ _FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 
 # Keywords that stiffen or load the mesh by other means than its plane and solid elements.
 _UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT",
-           "PRE-TENSION SECTION", "FASTENER", "CONNECTOR SECTION", "JOINT", "SPRING", "DASHPOT",
-           "MASS", "ROTARY INERTIA")
+           "PRE-TENSION SECTION", "FASTENER", "CONNECTOR SECTION", "JOINT")
 _GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
 _KINDS = {"NSET": "nodes", "ELSET": "elements"}
 _PARALLEL = 1e-9  # sine of the angle between directions that span no plane
@@ -105,7 +111,7 @@ def read_inp(path: Path) -> RawMesh:
     if not bodies:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
     deck.require_end()
-    joined, constraints, unread = _constrained(assembly, bodies)
+    joined, unread = _constrained(assembly, bodies)
     count = sum(len(body.numbered.places) for body in bodies)
     unused = sum(body.part.unused_nodes for body in bodies) if deck.ends_with_elements else 0
     if unused:
@@ -119,7 +125,6 @@ def read_inp(path: Path) -> RawMesh:
         warnings.warn(f"{path}: the file holds {', '.join(unread)}, which are not read; the mesh "
                       f"has none of their stiffness or mass, so give supports, links and welds "
                       f"beside it.", ModelWarning, stacklevel=4)
-    joined.constraints = constraints
     if any(re.match("C3D8[IR]", name) for body in bodies for name in body.part.element_types):
         joined.bricks = "incompatible"
     joined.materials, unread = assembly.section_materials(bodies)
@@ -129,17 +134,15 @@ def read_inp(path: Path) -> RawMesh:
     return joined
 
 
-def _constrained(
-    assembly: "_Assembly", bodies: list["_Instance"]
-) -> tuple[RawMesh, list[Constraint], list[str]]:
-    """Mesh of all bodies, its constraints, and what constrains it by keywords that are not read.
+def _constrained(assembly: "_Assembly", bodies: list["_Instance"]) -> tuple[RawMesh, list[str]]:
+    """Mesh of all bodies with constraints and attachments, and keywords of these not read.
 
     Nodes of reference points, which belong to no body, follow those of the bodies.
     """
     parts = {body.title or body.name: body.raw_mesh() for body in bodies}
     joined = _joined(parts)
-    if not assembly.constraints:
-        return joined, [], []
+    if not assembly.constraints and not assembly.attachments:
+        return joined, []
     owners = [*bodies, *assembly.reference_points()]
     places = [*(raw.points for raw in parts.values()),
               *(one.placed(one.numbered.places) for one in owners[len(bodies):])]
@@ -177,11 +180,19 @@ def _constrained(
             return word
         return None
 
-    constraints, unread = constraints_of(assembly.constraints, Names(
-        joined.points, nodes, group, joined.nodes, not joined.is_solid, assembly.unsorted))
-    joined.apart = bool(constraints)
-    joined.separate &= not _connected(joined, constraints, first[: len(bodies)])
-    return joined, constraints, unread
+    names = Names(joined.points, nodes, group, joined.nodes, not joined.is_solid,
+                  assembly.unsorted)
+    joined.constraints, unread = constraints_of(assembly.constraints, names)
+    for part, (keyword, options, lines) in assembly.attachments:
+        name = options.get("ELSET", "")
+        elements = assembly.point_elements(part, name, owners)
+        if what := refused(keyword, options, elements):
+            unread.append(what)
+        else:
+            joined.attachments += attachments_of(keyword, options, lines, elements, names)
+    joined.apart = bool(joined.constraints)
+    joined.separate &= not _connected(joined, joined.constraints, first[: len(bodies)])
+    return joined, unread
 
 
 def _connected(raw: RawMesh, constraints: list[Constraint], first: Integers) -> bool:
@@ -189,6 +200,8 @@ def _connected(raw: RawMesh, constraints: list[Constraint], first: Integers) -> 
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
+    if not constraints:
+        return len(first) == 1
     size = len(raw.points)
     links = []
     for number, one in enumerate(constraints):
@@ -371,6 +384,7 @@ class _Assembly:
         self.current: _Part | None = self.parts[""]
         self.own = _Instance("", _Part(""))
         self.constraints: list[Block] = []
+        self.attachments: list[tuple[_Part | None, Block]] = []
         self.unsorted: set[str] = set()
         self.sections: list[tuple[_Part | None, Options]] = []
         self.materials: dict[str, dict[str, Given]] = {}
@@ -383,6 +397,8 @@ class _Assembly:
                 (part or self.own.part).add_nodes(options, lines)
             case "ELEMENT" if part is not None:
                 part.add_elements(options, lines)
+            case "ELEMENT" if is_point_element(options["TYPE"].upper()):
+                self.own.part.add_elements(options, lines)
             case "SYSTEM" if part is not None:
                 part.system = _local_system(lines)
             case "NSET" | "ELSET":
@@ -411,6 +427,8 @@ class _Assembly:
                 self.materials[next(reversed(self.materials))][keyword] = options, lines
             case _ if keyword in READ:
                 self.constraints.append((keyword, options, lines))
+            case _ if keyword in TYPES:
+                self.attachments.append((part, (keyword, options, lines)))
             case _ if keyword in _GENERATING:
                 raise MeshError(f"The file makes nodes or elements by *{keyword}, which is not "
                                 f"read; write all nodes and elements as data of *NODE and "
@@ -483,6 +501,22 @@ class _Assembly:
         placement = next(iter(placements), None)
         return made if placement is None else made.moved(*placement.matrix)
 
+    def point_elements(
+        self, part: "_Part | None", name: str, owners: "list[_Instance]"
+    ) -> list[PointElement]:
+        """Elements in a set to which a block of a part, or of the assembly, gives values."""
+        found: list[PointElement] = []
+        for one in (*owners, *([] if self.own in owners else [self.own])):
+            if part is not None and one.part is not part and self.parts.get(one.source) is not part:
+                continue
+            members = one.find("elements", name) if name else None
+            wanted = [member for member in members or () if not isinstance(member, _NodesOf)]
+            prefix = f"{one.name}." if one.name else ""
+            found += [replace(element, nodes=tuple(prefix + word for word in element.nodes))
+                      for element in one.part.point_elements
+                      if any(element.number in member for member in wanted)]
+        return found
+
     def _set_name(self, part: "_Part | None", name: str) -> str:
         """Spelling of the name of an element set where it is made."""
         sets = [one.sets.elements for one in ((part,) if part else self.parts.values())]
@@ -514,6 +548,7 @@ class _Assembly:
             part, system=None, node_blocks=[*part.node_blocks],
             element_blocks=[*part.element_blocks], other_elements=[*part.other_elements],
             other_nodes=[*part.other_nodes], sets=part.sets.copy(),
+            point_elements=[*part.point_elements],
             element_types=part.element_types.copy())
         self.instances.append(_Instance(name, self.current, _Placement.read(lines, name),
                                         source if held else ""))
@@ -570,6 +605,7 @@ class _Part:
     other_nodes: list[int] = field(default_factory=list)
     sets: _Sets = field(default_factory=_Sets)
     system: tuple[Array, Array] | None = None
+    point_elements: list[PointElement] = field(default_factory=list)
     element_types: Counter[str] = field(default_factory=Counter)
 
     @property
@@ -602,6 +638,13 @@ class _Part:
                 self.other_elements.append(int(number))
                 self.other_nodes += [one for node in nodes
                                      if (one := whole_number(node)) is not None]
+        if is_point_element(options["TYPE"].upper()):
+            made = [PointElement(options["TYPE"].upper(), int(number), tuple(filter(None, nodes)))
+                    for number, *nodes in map(_words, lines)]
+            self.point_elements += made
+            if "ELSET" in options:
+                self.sets.elements.setdefault(options["ELSET"], []).append(
+                    np.array([one.number for one in made], np.int64))
         if kind is None:
             return
         if kind == "solid":

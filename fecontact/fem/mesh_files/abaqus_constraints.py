@@ -127,15 +127,17 @@ def constraints_of(blocks: list[Block], names: Names) -> tuple[list[Constraint],
                 for line in lines:
                     more = _mpc(line, names)
                     found += more
-                    unread += [] if more else [f"*MPC {_words(line)[0]}"]
+                    unread += [] if more else [f"*MPC {words_of(line)[0]}"]
     return found, unread
 
 
-def _words(line: str) -> list[str]:
+def words_of(line: str) -> list[str]:
+    """Words of a data line that are not empty."""
     return [word for word in (part.strip() for part in line.split(",")) if word]
 
 
-def _number(word: str, where: str) -> float:
+def number_of(word: str, where: str) -> float:
+    """Number that a word is; MeshError, with ``where`` in front, if it is none."""
     try:
         return float(word)
     except ValueError:
@@ -149,12 +151,12 @@ def _ties(options: Options, lines: list[str], names: Names) -> Iterator[Tie]:
         raise MeshError(f"The tie '{name}' names no surfaces; give the dependent and the "
                         f"independent one below *TIE.")
     for line in lines:
-        words, where = _words(line), f"The tie '{name}'"
+        words, where = words_of(line), f"The tie '{name}'"
         if len(words) < 2:
             raise MeshError(f"{where} has the line {shown(line)}; give the dependent and the "
                             f"independent surface.")
         yield Tie(names.group_of(words[0], where), names.group_of(words[1], where, True),
-                  None if tolerance is None else _number(tolerance, where), name)
+                  None if tolerance is None else number_of(tolerance, where), name)
 
 
 def _coupling(options: Options, following: list[Block], names: Names) -> Coupling:
@@ -182,7 +184,7 @@ def _axes(lines: list[str], where: str, names: Names) -> list[list[float]] | Non
     d = 2 if names.planar else 3
     held: set[int] = set()
     for line in lines:
-        words = [int(_number(word, where)) for word in _words(line)]
+        words = [int(number_of(word, where)) for word in words_of(line)]
         held |= set(range(words[0], words[-1] + 1)) if words else set()
     chosen = [axis for axis in range(d) if axis + 1 in held]
     if held and not chosen:
@@ -199,7 +201,7 @@ def _kinematic_coupling(
         raise MeshError(f"{where} has no ref node; give REF NODE= on its line.")
     reference, place = names.reference(options["REF NODE"], where)
     for line in lines:
-        word, *numbers = _words(line)
+        word, *numbers = words_of(line)
         yield Coupling(_node_group(word, where, names), reference, tuple(place),
                        axes=_axes([",".join(numbers)], where, names), name=word)
 
@@ -226,7 +228,7 @@ def _rigid_body(options: Options, names: Names) -> Iterator[Coupling]:
 
 def _mpc(line: str, names: Names) -> list[Constraint]:
     """Constraints of one line; none for a kind that is not read."""
-    words, where = _words(line), f"The line {shown(line)} below *MPC"
+    words, where = words_of(line), f"The line {shown(line)} below *MPC"
     if words[0].upper() not in _MPC:
         return []
     if len(words) != 3:
@@ -240,7 +242,8 @@ def _mpc(line: str, names: Names) -> list[Constraint]:
             found.append(Coupling(names.name_of(first, single), names.name_of(second, other),
                                   tuple(names.place(second)), name=f"MPC {single}"))
             continue
-        found += [LinearEquation((_term(first, dof, 1.0, names), _term(second, dof, -1.0, names)),
+        found += [LinearEquation(tuple(term_of(node, dof, sign, names)
+                                       for node, sign in ((first, 1.0), (second, -1.0))),
                                  f"MPC {words[1]}") for dof in range(1, 3 if names.planar else 4)]
     return found
 
@@ -261,7 +264,7 @@ def _paired(
 
 
 def _equations(lines: list[str], names: Names) -> Iterator[LinearEquation]:
-    words = [word for line in lines for word in _words(line)]
+    words = [word for line in lines for word in words_of(line)]
     at = 0
     while at < len(words):
         count = whole_number(words[at])
@@ -271,20 +274,20 @@ def _equations(lines: list[str], names: Names) -> Iterator[LinearEquation]:
             raise MeshError(f"{where} must hold its number of terms and, for each, node or set, "
                             f"degree of freedom and coefficient.")
         at += 1 + 3 * count
-        dofs = [int(_number(word, where)) for word in given[1::3]]
-        factors = [_number(word, where) for word in given[2::3]]
+        dofs = [int(number_of(word, where)) for word in given[1::3]]
+        factors = [number_of(word, where) for word in given[2::3]]
         if not set(dofs) <= ({1, 2, 6} if names.planar else set(range(1, 7))):
             raise MeshError(f"{where} names the degree of freedom "
                             f"{max(dofs)}; these are 1 to 3 and, of reference nodes, 4 to 6.")
         for nodes in _paired([names.of(word, where) for word in given[::3]], given[::3], where,
                              names):
             yield LinearEquation(
-                tuple(_term(node, dof, factor, names)
+                tuple(term_of(node, dof, factor, names)
                       for node, dof, factor in zip(nodes, dofs, factors, strict=True)),
                 f"of {', '.join(given[::3])}")
 
 
-def _term(node: int, dof: int, factor: float, names: Names) -> Term:
+def term_of(node: int, dof: int, factor: float, names: Names) -> Term:
     """One term, along local axes where *TRANSFORM gives them."""
     d = 2 if names.planar else 3
     axes = names.axes.get(node, np.eye(3))
@@ -298,7 +301,7 @@ def _transform(options: Options, lines: list[str], names: Names) -> None:
     """Local axes of the nodes of a set."""
     where = "*TRANSFORM"
     kind = options.get("TYPE", "R").upper()
-    values = [_number(word, where) for line in lines for word in _words(line)]
+    values = [number_of(word, where) for line in lines for word in words_of(line)]
     if kind not in ("R", "C") or len(values) != 6 or "NSET" not in options:
         raise MeshError(f"{where} must give NSET=, TYPE=R or C, and six coordinates of two points; "
                         f"others are not read.")

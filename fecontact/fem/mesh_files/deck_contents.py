@@ -1,10 +1,12 @@
 """Contents of an Abaqus or CalculiX deck: keywords that are read, skipped, and element types."""
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from fecontact.core.checks import whole_number
+from fecontact.fem.mesh_files.abaqus_attachments import TYPES
 from fecontact.fem.mesh_files.abaqus_constraints import READ
 from fecontact.fem.mesh_files.abaqus_keywords import Deck
 
@@ -31,14 +33,17 @@ class DeckContents:
     pairs : tuple of (str, str)
         Surfaces of ``*CONTACT PAIR``.
     supports : tuple of (str, str)
-        Sets that ``*BOUNDARY`` holds up to the end of the first step, and the directions x, y, z
-        in which it does.
+        Sets that ``*BOUNDARY`` holds up to the end of the first step, and the components of their
+        motion that it does, with spaces between them: x y z phi_x phi_y phi_z.
+    forces : tuple of (str, str, float)
+        Sets on which ``*CLOAD`` acts in the first step, the component and the value.
     """
 
     keywords: Counter[str] = field(default_factory=Counter)
     elements: Counter[str] = field(default_factory=Counter)
     pairs: tuple[tuple[str, str], ...] = ()
     supports: tuple[tuple[str, str], ...] = ()
+    forces: tuple[tuple[str, str, float], ...] = ()
 
     @property
     def loads(self) -> dict[str, int]:
@@ -53,7 +58,7 @@ class DeckContents:
     @property
     def skipped(self) -> dict[str, int]:
         """Keywords that neither the mesh nor constraints nor the two above use."""
-        known = {*_MESH, *READ, *_LOADS, *_CONTACT}
+        known = {*_MESH, *READ, *TYPES, *_LOADS, *_CONTACT}
         return {name: count for name, count in self.keywords.items() if name not in known}
 
     def _counts(self, names: tuple[str, ...]) -> dict[str, int]:
@@ -71,10 +76,11 @@ def deck_contents(path: Path) -> DeckContents:
     deck = Deck(path)
     elements: Counter[str] = Counter()
     pairs: list[tuple[str, str]] = []
-    supports: dict[str, str] = {}
+    supports: dict[str, set[int]] = {}
+    forces: list[tuple[str, str, float]] = []
     for keyword, options, lines in deck.blocks():
         rows = [[word.strip() for word in line.split(",")] for line in lines] if (
-            keyword in ("CONTACT PAIR", "BOUNDARY")) else []
+            keyword in ("CONTACT PAIR", "BOUNDARY", "CLOAD")) else []
         if keyword == "ELEMENT":
             # Data of an element go on after a comma at the end of a line.
             elements[options.get("TYPE", "").upper()] += sum(
@@ -83,18 +89,30 @@ def deck_contents(path: Path) -> DeckContents:
             pairs += [(row[0], row[1]) for row in rows if len(row) > 1]
         elif keyword == "BOUNDARY" and not deck.keywords["END STEP"]:
             for name, *held in rows:
-                ways = supports.get(name, "") + _directions(held)
-                supports[name] = "".join(way for way in "xyz" if way in ways)
-    return DeckContents(deck.keywords, elements, tuple(pairs),
-                        tuple((name, ways) for name, ways in supports.items() if ways))
+                known = next((one for one in supports if one.upper() == name.upper()), name)
+                supports.setdefault(known, set()).update(_held(held))
+        elif keyword == "CLOAD" and not deck.keywords["END STEP"]:
+            forces += [(name, COMPONENTS[dof - 1], float(value)) for name, word, value, *_ in (
+                (*row, "", "")[: max(len(row), 3)] for row in rows)
+                if (dof := whole_number(word) or 0) in range(1, 7) and float(value or 0.0)]
+    return DeckContents(
+        deck.keywords, elements, tuple(pairs),
+        tuple((name, " ".join(COMPONENTS[dof - 1] for dof in sorted(held)))
+              for name, held in supports.items() if held), tuple(forces))
 
 
-def _directions(held: list[str]) -> str:
-    """Directions that the data of *BOUNDARY hold at zero: degrees of freedom, or a name."""
-    if held and held[0].upper() in ("ENCASTRE", "PINNED"):
-        return "xyz"
-    first = whole_number(held[0]) if held else None
-    last = whole_number(held[1]) if len(held) > 1 and held[1] else first
-    if first is None or last is None or (len(held) > 2 and float(held[2] or 0.0)):
-        return ""
-    return "".join(way for number, way in enumerate("xyz", start=1) if first <= number <= last)
+COMPONENTS = ("x", "y", "z", "phi_x", "phi_y", "phi_z")
+# Degrees of freedom that names hold.
+_NAMED = {"ENCASTRE": range(1, 7), "PINNED": range(1, 4), "XSYMM": (1, 5, 6), "YSYMM": (2, 4, 6),
+          "ZSYMM": (3, 4, 5), "XASYMM": (2, 3, 4), "YASYMM": (1, 3, 5), "ZASYMM": (1, 2, 6)}
+
+
+def _held(words: list[str]) -> Iterable[int]:
+    """Degrees of freedom that the data of *BOUNDARY hold at zero, by numbers or a name."""
+    if words and words[0].upper() in _NAMED:
+        return _NAMED[words[0].upper()]
+    first = whole_number(words[0]) if words else None
+    last = whole_number(words[1]) if len(words) > 1 and words[1] else first
+    if first is None or last is None or (len(words) > 2 and float(words[2] or 0.0)):
+        return ()
+    return range(max(first, 1), min(last, 6) + 1)

@@ -1,12 +1,13 @@
 """Named boundaries and points of a mesh, from groups of its file, boxes and coordinates."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest
 from fecontact.core.types import Array, Coordinates, Integers
+from fecontact.fem.attachments import Attachment
 from fecontact.fem.constraints import Constraint
 from fecontact.fem.interpolation import interpolation
 from fecontact.fem.mesh import Mesh
@@ -14,6 +15,8 @@ from fecontact.fem.mesh_files.raw import Groups, on_outline
 
 # Opposite corners (x0, y0, x1, y1), or (x0, y0, z0, x1, y1, z1).
 Box = tuple[float, float, float, float] | tuple[float, float, float, float, float, float]
+
+_Named = TypeVar("_Named", Constraint, Attachment)
 
 _BOX_TOLERANCE = 1e-6  # of the body's size
 
@@ -80,12 +83,12 @@ def named_points(
 
 
 def named_constraints(
-    groups: Groups, boundaries: Mapping[str, Any], points: Mapping[str, Any]
-) -> tuple[Constraint, ...]:
-    """Constraints of the file with the new names of its groups."""
+    given: Iterable[_Named], boundaries: Mapping[str, Any], points: Mapping[str, Any]
+) -> tuple[_Named, ...]:
+    """Constraints or attachments of the file with the new names of its groups."""
     new = {source: name for name, source in (*points.items(), *boundaries.items())
            if isinstance(source, str)}
-    return tuple(one.renamed(new) for one in groups.constraints)
+    return tuple(one.renamed(new) for one in given)
 
 
 def _no_group(

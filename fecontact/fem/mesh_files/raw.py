@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
+from fecontact.fem.attachments import Attachment
 from fecontact.fem.constraints import Constraint
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
 from fecontact.fem.material import AnyMaterial
@@ -63,6 +64,8 @@ class RawMesh:
         Whether the parts are bodies of their own, which cannot be read as one mesh.
     constraints : list of LinearEquation, Tie or Coupling
         In the unit of the file; equations name nodes by their rows in ``points``.
+    attachments : list of PointMass or PointSpring
+        In units of the file, with forces in N; they name nodes by their rows in ``points``.
     apart : bool
         Whether nodes at one place are different ones.
     chosen : str
@@ -84,6 +87,7 @@ class RawMesh:
     parts: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
     separate: bool = False
     constraints: list[Constraint] = field(default_factory=list)
+    attachments: list[Attachment] = field(default_factory=list)
     apart: bool = False
     chosen: str = ""
     cell_sets: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
@@ -143,8 +147,8 @@ class Groups:
     """Named groups of a mesh.
 
     ``empty`` are the names of groups without nodes, edges or faces of the body, ``cells`` those of
-    groups of cells. ``constraints`` are in metres, with nodes of the mesh, and ``materials`` those
-    of groups of cells.
+    groups of cells. ``constraints`` and ``attachments`` are in SI units, with nodes of the mesh;
+    ``materials`` are those of groups of cells.
     """
 
     boundaries: dict[str, Integers]
@@ -152,6 +156,7 @@ class Groups:
     empty: tuple[str, ...]
     cells: tuple[str, ...] = ()
     constraints: tuple[Constraint, ...] = ()
+    attachments: tuple[Attachment, ...] = ()
     materials: dict[str, AnyMaterial] = field(default_factory=dict)
 
 
@@ -222,15 +227,16 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     groups = replace(_groups(raw, mesh, number), materials={
         name: one.scaled(scale) for name in regions for of, one in raw.materials.items()
         if name == of or name.endswith(f".{of}")})
-    if not raw.constraints:
+    if not raw.constraints and not raw.attachments:
         return mesh, groups
     middles_of: dict[int, tuple[int, int]] = {}
     for (kind, cells), order in zip(second_order, orders, strict=True):
         pairs = number[cells[:, np.array(kind.edges)]].reshape(-1, 2)
         middles_of |= dict(zip(cells[:, order].ravel().tolist(),
                                ((a, b) for a, b in pairs.tolist()), strict=True))
-    return mesh, replace(groups, constraints=constraints_of_mesh(
-        raw, groups.boundaries, groups.points, number, middles_of, points, scale))
+    constraints, attachments = constraints_of_mesh(
+        raw, groups.boundaries, groups.points, number, middles_of, points, scale)
+    return mesh, replace(groups, constraints=constraints, attachments=attachments)
 
 
 def _cell_groups(

@@ -1,4 +1,4 @@
-"""Constraints of a file in the numbering and the unit of its mesh."""
+"""Constraints and attachments of a file in the numbering and the unit of its mesh."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -10,13 +10,22 @@ import numpy as np
 from fecontact.core.errors import MeshError, ModelWarning
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import count
-from fecontact.fem.constraints import Constraint, Coupling, LinearEquation, Term, Tie
+from fecontact.fem.attachments import Attachment, PointMass
+from fecontact.fem.constraints import (
+    Constraint,
+    Coupling,
+    LinearEquation,
+    Term,
+    Tie,
+    reference_points,
+)
 
 
 class _Raw(Protocol):
     """The contents of a file that constraints refer to."""
 
     constraints: list[Constraint]
+    attachments: list[Attachment]
     nodes: dict[str, Integers]
     chosen: str
 
@@ -24,8 +33,8 @@ class _Raw(Protocol):
 def constraints_of_mesh(
     raw: _Raw, boundaries: Mapping[str, Integers], points: Mapping[str, Integers],
     number: Integers, middles: Mapping[int, tuple[int, int]], places: Array, scale: float,
-) -> tuple[Constraint, ...]:
-    """Constraints between the nodes of a mesh.
+) -> tuple[tuple[Constraint, ...], tuple[Attachment, ...]]:
+    """Constraints between the nodes of a mesh, and masses and springs at them.
 
     Parameters
     ----------
@@ -50,7 +59,8 @@ def constraints_of_mesh(
     Warns
     -----
     ModelWarning
-        For constraints that reach beyond the part that was chosen.
+        For constraints and attachments that reach beyond the part that was chosen, and for
+        attachments at nodes that belong to nothing.
     """
     found, dropped = [], []
     free = {int(nodes[0]): name for name, nodes in raw.nodes.items()
@@ -70,12 +80,53 @@ def constraints_of_mesh(
         else:
             raise MeshError(f"{type(one).__name__} '{one.name}' needs {missing}, of which the "
                             f"body has none; correct the set or surface.")
+    kept = _useful(found, points)
+    fixed = _attached(raw, kept, points, number, middles, places, scale)
+    if raw.chosen:
+        dropped += [one.name for one in raw.attachments if one.name not in {
+            each.name for each in fixed}]
     if dropped:
         one_alone = len(dropped) == 1
         warnings.warn(f"{count(len(dropped), 'constraint')} reach{'es' * one_alone} beyond the "
                       f"part '{raw.chosen}' and {'is' if one_alone else 'are'} left out, the first "
                       f"is '{dropped[0]}'.", ModelWarning, stacklevel=4)
-    return tuple(_useful(found, points))
+    return tuple(kept), tuple(fixed)
+
+
+def _attached(
+    raw: _Raw, constraints: Sequence[Constraint], points: Mapping[str, Integers],
+    number: Integers, middles: Mapping[int, tuple[int, int]], places: Array, scale: float,
+) -> list[Attachment]:
+    """Attachments at nodes of the mesh and at reference points of its constraints."""
+    known = {name: name for name in reference_points(constraints, points)}
+    # Nodes of the mesh that have rotations as reference points of couplings.
+    turning = {int(points[name][0]): name for name in known if len(points.get(name, ())) == 1}
+    free = {int(nodes[0]): name for name, nodes in raw.nodes.items() if len(nodes) == 1}
+
+    def at(node: Any) -> Any:
+        place: Any = int(number[node])
+        if place >= 0:
+            return turning.get(place, place)
+        return middles.get(node, known.get(free.get(node, f"node {node}")))
+
+    found: list[Attachment] = []
+    lost = 0
+    for one in raw.attachments:
+        nodes: list[Any] = ([one.at] if isinstance(one, PointMass)
+                            else [term.at for term in one.terms])
+        ends = [at(node) for node in nodes]
+        if None in ends:
+            lost += all(np.isfinite(places[node]).all() for node in nodes)
+            continue
+        own = one.scaled(scale)
+        found.append(replace(own, at=ends[0]) if isinstance(own, PointMass) else replace(
+            own, terms=tuple(term._replace(at=end)
+                             for term, end in zip(own.terms, ends, strict=True))))
+    if lost:
+        warnings.warn(f"{count(lost, 'mass or spring')} {'is' if lost == 1 else 'are'} at nodes "
+                      f"that belong to no element, coupling or rigid body, and left out; model "
+                      f"them as bodies of their own, by point_masses.", ModelWarning, stacklevel=5)
+    return found
 
 
 def _missing(

@@ -51,8 +51,8 @@ def suited(body: ElasticBody) -> bool:
 
 
 def possible(body: ElasticBody) -> bool:
-    """Whether the iterative solver knows such bodies: solids without hinges and constraints."""
-    return body.dimension == 3 and not body.hinges and not body.equations
+    """Whether the iterative solver knows such bodies: solids with plain supports alone."""
+    return body.dimension == 3 and not (body.hinges or body.equations or body.added)
 
 
 def aspect_ratios(body: ElasticBody) -> Array:
