@@ -11,7 +11,7 @@ from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
 from .output.plots.many_runs import plot_basins, plot_poincare_scan, plot_runs
-from .output.plots.modes import plot_convergence, plot_modes
+from .output.plots.modes import plot_buckling, plot_convergence, plot_modes
 from .output.plots.phase_space import plot_phase_space
 from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
@@ -36,6 +36,7 @@ __all__ = [
     "picture",
     "plot_basins",
     "plot_branches",
+    "plot_buckling",
     "plot_contact_map",
     "plot_convergence",
     "plot_eigenvalues",

@@ -83,16 +83,16 @@ def public_things():
 
 
 def test_help_of_a_public_function_fits_a_screen():
-    """At most 45 lines, and 52 where the signature is wrapped to 80 characters."""
+    """At most 45 lines, and 55 where the signature is wrapped to 80 characters."""
     functions = {name: thing for name, thing in public_things().items()
                  if inspect.isroutine(thing)}
     assert len(functions) > 80
     for name, function in functions.items():
         shown = pydoc.plain(pydoc.render_doc(function)).splitlines()
         signature = textwrap.wrap(str(inspect.signature(function)), 80)
-        assert len(signature) <= 13, name
+        assert len(signature) <= 14, name
         assert len(shown) <= 45, name
-        assert len(shown) + len(signature) - 1 <= 52, name
+        assert len(shown) + len(signature) - 1 <= 55, name
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from fecontact.cli.commands import about, branch, compare, response, run, study, sweep
+from fecontact.cli.commands import about, branch, compare, response, run, study, sweep, turning
 from fecontact.core.errors import InputError
 
 
@@ -32,6 +32,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.import_,
     study.mesh,
     study.modes,
+    turning.buckling,
     study.preload,
     study.run,
     study.wear,

@@ -1,4 +1,10 @@
-"""Stress of a static state in the stiffness of a body and of its modes."""
+"""Stress of a static state in the stiffness of a body and of its modes.
+
+``modal_basis(body, prestress=fields)`` takes the fields of :func:`~fecontact.static_solution`, or
+``basis.fields(q)`` of an equilibrium with contact: its modes are those of ``K + K_sigma``. A body
+that can rotate keeps the modes without stress, and ``ModalBasis.stiffness`` couples them.
+Displacements count from the body without loads.
+"""
 
 from typing import Any
 

@@ -106,9 +106,7 @@ def modal_basis(
     rotation : Rotation, optional
         Of the plane body: displacements are those in its frame, modes those at rest.
     prestress : BodyFields, optional
-        Static state whose stress stiffens the body, as of :func:`~fecontact.static_solution` or
-        ``basis.fields(q)``: modes are those about it. A body that can rotate keeps the modes
-        without stress, coupled by ``stiffness``.
+        Static state whose stress stiffens the body; see :mod:`fecontact.reduction.prestress`.
     rows : sequence of sparse (k, d N) arrays
         Further motions with forces; see :func:`fecontact.reduction.reduce_bodies`.
     eigensolver : 'auto', 'direct' or 'iterative'

@@ -66,18 +66,21 @@ def test_euler_column_in_space(body):
     """It buckles about its weak axis first, then about the strong one, 1.44 times as stiff."""
     found = buckling_loads(body(), PRESSED, 2)
     assert found.load_factors * 1e6 == pytest.approx([EULER, 1.44 * EULER], rel=3e-3)
-    tip = np.abs(found.shapes[found.nodes[:, 0] > L - 1e-9]).max(axis=0)
+    tip = np.abs(found.shapes[found.state.nodes[:, 0] > L - 1e-9]).max(axis=0)
     assert tip.argmax(axis=0).tolist() == [2, 1]
     assert np.abs(found.shapes).max() == 1.0
 
 
 def test_tension_makes_nothing_buckle():
-    found = buckling_loads(column(8), Load(boundaries=(BoundaryLoad("right", pressure=-1e6),)), 3)
+    pulled = Load(boundaries=(BoundaryLoad("right", pressure=-1e6),))
+    for body in (column(8), column(200)):
+        found = buckling_loads(body, pulled, 3)
+        assert not len(found.load_factors)
+        assert "none" in str(found)
     free = ElasticBody(rectangle(L, H, 8, 1), SOFT)
-    assert (found.load_factors > 20.0 * EULER / 1e6).all()
     with pytest.raises(InputError, match="supports hold"):
         buckling_loads(free, Load())
-    with pytest.raises(InputError, match="count = 0 must be from 1"):
+    with pytest.raises(InputError, match="count = 0 must be at least 1"):
         buckling_loads(column(2), PRESSED, 0)
 
 

@@ -1,8 +1,8 @@
-"""Plots of the modes of a body: shapes and convergence."""
+"""Plots of the modes of a body and of its buckling: shapes and convergence."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from fecontact.reduction.assembly.bodies_convergence import BodiesConvergence
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
+from fecontact.reduction.mode_shapes import BodyPart
+from fecontact.system.statics.buckling import BucklingLoads
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,26 +55,70 @@ def plot_modes(
                          "body; make it with ElasticBody.modal_basis.")
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise InputError(f"count = {count!r} must be a whole number of at least one mode.")
-    field, shown = basis.mode_shapes, min(count, basis.modes)
+    field, names = basis.mode_shapes, mode_names(basis)
+    chosen = _first_modes(basis, min(count, basis.modes))
+    hertz = basis.frequencies_hz
+    titles = [names[mode] + ("\n" if basis.parts else ": ")
+              + ("rigid" if hertz[mode] == 0.0 else f"{hertz[mode]:.5g} Hz") for mode in chosen]
+    return _shapes_figure(field, field.shapes[..., chosen], titles, path, basis.parts)
+
+
+def plot_buckling(found: BucklingLoads, *, path: str | Path | None = None) -> "Figure":
+    """Plot the shapes in which a body buckles, with their load factors.
+
+    Parameters
+    ----------
+    found : BucklingLoads
+        Of :func:`fecontact.analysis.buckling_loads`.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        Without load factors, for another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_buckling", BucklingLoads, found=found)
+    if not len(found.load_factors):
+        raise InputError("plot_buckling: there are no shapes, since the loads do not make the body "
+                         "buckle.")
+    titles = [f"{factor:.5g} times the load" for factor in found.load_factors]
+    return _shapes_figure(found.state, found.shapes, titles, path)
+
+
+class _Outlined(Protocol):
+    """Nodes, first-order cells and outline of the body whose shapes are drawn."""
+
+    @property
+    def nodes(self) -> Array: ...
+    @property
+    def cells(self) -> Integers: ...
+    @property
+    def outline(self) -> Integers: ...
+
+
+def _shapes_figure(
+    field: _Outlined, shapes: Array, titles: Sequence[str], path: str | Path | None,
+    parts: Sequence[BodyPart] = (),
+) -> "Figure":
+    """Draw shapes (N, d, k) beside each other, each scaled to the same largest displacement."""
+    shown = len(titles)
     reach = _DRAWN_DISPLACEMENT * float(np.linalg.norm(np.ptp(field.nodes, axis=0)))
-    solid = basis.dimension == 3
+    solid = field.nodes.shape[1] == 3
     size = np.subtract(*seen_box(field.nodes)[::-1]) if solid else np.ptp(field.nodes, axis=0)
     aspect = (size[0] + 2.0 * reach) / (size[1] + 2.0 * reach)
     columns = min(shown, 6, int(np.ceil(np.sqrt(1.8 * shown / aspect))))
     rows = -(-shown // columns)
     height = min(_WIDTH / columns / aspect, 3.5)
-    titles = 0.6 if basis.parts else 0.4
-    with new_figure(_WIDTH, rows * (height + titles) + 0.8, path) as figure:
+    above = 0.6 if parts else 0.4
+    with new_figure(_WIDTH, rows * (height + above) + 0.8, path) as figure:
         grid = figure.subplots(rows, columns, squeeze=False)
         for axis in grid.flat:
             axis.set_axis_off()
-        names = mode_names(basis)
-        for mode, axis in zip(_first_modes(basis, shown), grid.flat, strict=False):
-            drawn = (_draw_solid_mode(axis, field, mode, reach) if solid else
-                     _draw_mode(axis, field, mode, reach, basis.parts))
-            hertz = basis.frequencies_hz[mode]
-            axis.set_title(names[mode] + ("\n" if basis.parts else ": ")
-                           + ("rigid" if hertz == 0.0 else f"{hertz:.5g} Hz"))
+        for title, shape, axis in zip(titles, np.moveaxis(shapes, 2, 0), grid.flat, strict=False):
+            drawn = (_draw_solid_mode(axis, field, shape, reach) if solid else
+                     _draw_mode(axis, field, shape, reach, parts))
+            axis.set_title(title)
         figure.colorbar(drawn, ax=grid, location="bottom", aspect=50, shrink=0.5, pad=0.02,
                         label="amplitude, relative to the largest")
     return figure
@@ -175,8 +220,7 @@ def _distance(values: Array) -> Array:
     return np.asarray(np.abs(values[:-1] / values[-1] - 1.0))
 
 
-def _draw_solid_mode(axis: "Axes", field: ModeShapes, mode: int, reach: float) -> Any:
-    shape = field.shapes[:, :, mode]
+def _draw_solid_mode(axis: "Axes", field: _Outlined, shape: Array, reach: float) -> Any:
     amplitude = np.linalg.norm(shape, axis=1)
     largest = float(amplitude.max()) or 1.0
     drawn = draw_surface(axis, field.nodes + reach / largest * shape, field.outline,
@@ -188,12 +232,11 @@ def _draw_solid_mode(axis: "Axes", field: ModeShapes, mode: int, reach: float) -
 
 
 def _draw_mode(
-    axis: "Axes", field: ModeShapes, mode: int, reach: float, parts: Sequence[BodyPart]
+    axis: "Axes", field: _Outlined, shape: Array, reach: float, parts: Sequence[BodyPart]
 ) -> Any:
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
 
-    shape = field.shapes[:, :, mode]
     amplitude = np.linalg.norm(shape, axis=1)
     largest = float(amplitude.max()) or 1.0
     places = field.nodes + reach / largest * shape
@@ -209,7 +252,7 @@ def _draw_mode(
                                amplitude / largest, shading="gouraud", cmap="viridis", vmin=0.0,
                                vmax=1.0, rasterized=True)
     for nodes, colour in ((field.nodes, "#8c8c8c"), (places, "#303030")):
-        axis.add_collection(LineCollection(list(nodes[field.outline]), colors=colour,
+        axis.add_collection(LineCollection(list(nodes[field.outline]), colors=colour, clip_on=False,
                                            linewidths=0.8))
     low, high = field.nodes.min(axis=0) - reach, field.nodes.max(axis=0) + reach
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")

@@ -28,7 +28,8 @@ def prestressed_modes(
 ) -> ComplexModes:
     r"""Modes of small vibrations about a state of contacts that friction holds.
 
-    "Prestressed" means that state alone: no geometric stiffness of the stressed body is included.
+    "Prestressed" means that state alone. The stress of the body stiffens it too if its basis was
+    made with ``modal_basis(..., prestress=)``.
     The tangent of the normal law, with its damping, acts at nodes in contact, and the springs of
     sliders that stick; rigid sticking is a constraint. Open nodes add nothing. A slider that slides
     follows the normal force, ``dR = phi\, dF\, \mathrm{sgn} R``, which makes the stiffness

@@ -1,0 +1,38 @@
+"""``fecontact buckling``: load factors, picture, messages."""
+
+import re
+
+import numpy as np
+
+from fecontact.cli import execute
+
+STRUT = """
+geometry = { shape = "beam", length = 1.0, height = 0.02, element_size = 0.02 }
+basis = { contact = [] }
+[body]
+thickness = 0.05
+fixed = { left = "xy" }
+[[load.boundaries]]
+boundary = "right"
+pressure = 1e6
+"""
+
+
+def test_buckling_of_a_strut(tmp_path, capsys):
+    path = tmp_path / "strut.toml"
+    path.write_text(STRUT)
+    assert execute(["buckling", str(path), "--count", "2", "-o", str(tmp_path)]) == 0
+    factor = float(re.search(r"0 +(\d+\.\d+)", capsys.readouterr().out)[1])
+    assert abs(factor / (np.pi**2 * 2.1e11 * 0.02**2 / 48.0 / 1e6) - 1.0) < 2e-3
+    assert (tmp_path / "strut-buckling.png").stat().st_size > 10_000
+
+
+def test_loads_that_pull_and_bad_studies(tmp_path, capsys):
+    path = tmp_path / "strut.toml"
+    path.write_text(STRUT.replace("1e6", "-1e6"))
+    assert execute(["buckling", str(path), "-o", str(tmp_path)]) == 0
+    assert "do not make the body buckle" in capsys.readouterr().out
+    assert not (tmp_path / "strut-buckling.png").exists()
+    path.write_text(STRUT.replace('fixed = { left = "xy" }', ""))
+    assert execute(["buckling", str(path), "-o", str(tmp_path)]) != 0
+    assert "hold" in capsys.readouterr().err
