@@ -118,8 +118,8 @@ def strobed_states(
     Without a drive and a period, as for self-excited motion, at the maxima of a displacement; see
     :func:`section_states`.
 
-    Between output times the motion is computed again where these are too far apart, and states are
-    interpolated by cubic Hermite polynomials; states at output times are returned unchanged.
+    Where outputs are too far apart, what the run has kept between them is used too. States are
+    interpolated by cubic Hermite polynomials; those at output times are returned unchanged.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def section_states(
 
     A Poincare section of self-excited motion, which has no period of its own to be strobed with.
     The velocity must exceed a twentieth of its range between two maxima, so that creep in stick is
-    none. The motion between outputs is computed again where these are too far apart.
+    none. Where outputs are too far apart, what the run has kept between them is used too.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def between_outputs(trajectory: Trajectory, count: int) -> Trajectory:
     """The run with times between its outputs, where these are too few for ``count`` of its times.
 
     The run itself is returned if it has as many outputs or they resolve its fastest strong motion,
-    and where the motion between them cannot be computed again.
+    and where it has not kept enough between them.
     """
     if len(trajectory.time) >= count or not alias_message(trajectory):
         return trajectory
@@ -110,8 +110,8 @@ def evenly_sampled_history(
     """A quantity of a run at even times that resolve it, from the motion between the outputs.
 
     At least 16 times per period of its mean frequency. Even outputs that are that close are
-    returned unchanged. Where the motion between outputs cannot be computed again, the outputs
-    themselves are taken, with a ModelWarning if they are too far apart.
+    returned unchanged. Where the run has not kept enough between them, the outputs themselves
+    are taken, with a ModelWarning if they are too far apart.
     """
     plain = history(trajectory, quantity_name, point, component)
     time = trajectory.time

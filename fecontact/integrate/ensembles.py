@@ -195,7 +195,7 @@ def ensemble(
         system = members[index]
         assert isinstance(system, ContactSystem)
         found = solver.run(Task(system, state, instants[index], float(rtol), max_step,
-                                watched, look))
+                                watched, progress=look))
         outputs = int(np.searchsorted(instants[index], found.time[-1], side="right"))
         states[index, :outputs] = found.states[:outputs]
         if found.events is not None:

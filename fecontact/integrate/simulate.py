@@ -9,6 +9,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
@@ -46,6 +47,7 @@ def simulate(
     initial: Initial = "rest", outputs: int | ArrayLike = 1001, solver: Solver = AUTO,
     rtol: float = 1e-6, max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
+    keep_steps: bool = True,
     progress: bool | Callable[[float], None] | None = None,
 ) -> Trajectory: ...
 @overload
@@ -54,6 +56,7 @@ def simulate(
     initial: Initial | FieldRun | ArrayLike, outputs: int | ArrayLike = 1001,
     solver: Solver = AUTO, rtol: float = 1e-6, max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
+    keep_steps: bool = True,
     progress: bool | Callable[[float], None] | None = None,
 ) -> FieldRun: ...
 def simulate(
@@ -67,6 +70,7 @@ def simulate(
     rtol: float = 1e-6,
     max_step: float | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
+    keep_steps: bool = True,
     progress: bool | Callable[[float], None] | None = None,
 ) -> Trajectory | FieldRun:
     """Integrate a contact system or a vector field in time.
@@ -91,6 +95,10 @@ def simulate(
         What acts briefly in a field without a period needs a ``max_step``.
     events : ContactEvents, Crossing, Event or sequence of them, optional
         Located within the steps and stored in :attr:`Trajectory.events`.
+    keep_steps : bool
+        Whether a run keeps the motion between the outputs too, in :attr:`Trajectory.kept`: two to
+        eight states a step, as the method needs, and of long runs at most 20,000 or 16 MB, evenly
+        spread. Plots are drawn from these. Runs of fields keep none.
     progress : bool or callable, optional
         True for a progress bar; a function is called with the time reached [s].
 
@@ -119,13 +127,14 @@ def simulate(
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_max_step(max_step)
+    require_kind("simulate", bool, keep_steps=keep_steps)
     require_solver(solver, *(["events"] if events is not None else []))
     watched = as_events(events)
     if isinstance(system, VectorField):
         if isinstance(moving, ContactSystem):
             run = simulate(moving, t_end, t_start=t_start, initial=initial, outputs=times,
                            solver=solver, rtol=rtol, max_step=max_step, events=watched,
-                           progress=progress)
+                           keep_steps=False, progress=progress)
             return FieldRun(system.parameters, system.state_names, run.time, run.states, run.status,
                             run.statistics, run.events)
         require_fields(solver)
@@ -141,7 +150,8 @@ def simulate(
     m = system.basis.modes
     with (shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell,
           one_blas_thread):
-        found = solver.run(Task(system, state, times, float(rtol), max_step, watched, tell))
+        found = solver.run(Task(system, state, times, float(rtol), max_step, watched,
+                                keep_steps, tell))
     _require_finite_events(watched, system, found)
     states = found.states
     trajectory = Trajectory(
@@ -150,7 +160,8 @@ def simulate(
         memory=states[:, 2 * m :] if system.memory else None,
         node_friction_work=found.node_friction_work, node_creep_work=found.node_creep_work,
         held_normal_force=found.normal_force,
-        held_friction_force=found.friction_force, events=found.events if watched else None)
+        held_friction_force=found.friction_force, events=found.events if watched else None,
+        kept=found.kept)
     if found.status in (Status.FINISHED, Status.EVENT):
         trajectory = replace(trajectory, status=_checked(trajectory, solver, rtol))
     _warn_of_active_friction(trajectory, rtol)
@@ -186,7 +197,7 @@ def _checked(run: Trajectory, solver: Solver, rtol: float) -> Status:
     some = np.unique(np.linspace(0, len(run.time) - 1, min(len(run.time), _LOOKS)).astype(int))
     histories = ("time", "modal_coordinates", "modal_velocities", "work", "memory",
                  "held_normal_force", "held_friction_force")
-    part = replace(run, **{name: value[some] for name in histories
+    part = replace(run, kept=None, **{name: value[some] for name in histories
                            if (value := getattr(run, name)) is not None})
     with np.errstate(over="ignore", invalid="ignore"):
         energies = part.energies

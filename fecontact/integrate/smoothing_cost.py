@@ -84,7 +84,8 @@ def smoothing_cost(
     if not isinstance(outputs, int) or outputs < 20:
         raise InputError(f"smoothing_cost: outputs = {outputs!r} must be at least 20.")
     state = initial_state(system, initial, 0.0)
-    smoothed = simulate(system, t_end, t_start=0.0, initial=state, outputs=outputs, rtol=rtol)
+    smoothed = simulate(system, t_end, t_start=0.0, initial=state, outputs=outputs, rtol=rtol,
+                        keep_steps=False)
     exact = solver.run(Task(system, state, smoothed.time, rtol))
     for name, run in (("smoothed", smoothed), ("set-valued", exact)):
         if run.status is not Status.FINISHED:

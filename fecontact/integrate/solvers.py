@@ -89,7 +89,7 @@ class CompiledSolver(Solver):
                              f"{path.parent}.")
         found = integrate(task.system, task.state, task.times, rtol=task.rtol,
                           max_step=task.max_step, progress=task.progress, checkpoint=path,
-                          events=task.events, method=self.method)
+                          events=task.events, method=self.method, keep_steps=task.keep_steps)
         if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
             path.unlink(missing_ok=True)
         return found
@@ -263,7 +263,7 @@ class SetValued(Solver):
             impact_law=self.impact_law, tangential_restitution=self.tangential_restitution,
             static_coefficient=self.static_coefficient, method=self.method,
             longest=longest_step(task.system, task.times, task.max_step), max_step=task.max_step,
-            events=task.events, progress=task.progress)
+            events=task.events, progress=task.progress, keep_steps=task.keep_steps)
         # Options in the statistics make the run reproducible.
         told = {name: getattr(self, name) for name in (
             "restitution", "impact_law", "tangential_restitution", "static_coefficient")}

@@ -11,13 +11,17 @@ from fecontact.core.compiled import helper, kernel
 # How a call of the loop ended.
 RUNNING, FINISHED, MINIMUM_STEP, NOT_FINITE, STOPPED, PARADOX, IMPACT_UNSOLVED = range(7)
 # First entries of ``progress.numbers``: the time reached, and the length of the next step; and of
-# ``progress.counts``.
+# ``progress.counts``, of which the last three are about what is kept between outputs: the rows so
+# far, the places passed since the last row, and how often every second row was dropped.
 TIME, STEP = range(2)
-STARTED, OUTPUTS, STEPS, REJECTIONS, RATES = range(5)
+COUNTS = 8
+STARTED, OUTPUTS, STEPS, REJECTIONS, RATES, KEPT, PASSED, HALVED = range(COUNTS)
 # Outcome of an attempt at a step: taken; repeated as the state at its start has been corrected;
 # repeated with exactly the length that is returned; with about that length; with a shorter one, as
 # its error was too large or not finite, or its impulses were not found.
 TAKEN, ANEW, CUT, SHORTER, FAILED, NOT_A_NUMBER, NOT_SOLVED = range(7)
+# Rows between outputs that a step may keep at most.
+MOST_PLACES = 16
 # The part of a step after which a run ends that goes on.
 BEYOND = 2.0
 
@@ -50,6 +54,55 @@ def _never(part, step, data):
     """Nothing: runs do not end within steps."""
 
 
+@helper
+def is_crowded(counts, times):
+    """Whether the rows kept between outputs, which have room for these times, are to be halved."""
+    return len(times) > 0 and counts[KEPT] + MOST_PLACES > len(times)
+
+
+@helper
+def _keep_none(row, step, reached, data):
+    """Nothing: no rows are kept between outputs."""
+
+
+def _keeping(fill, places):
+    """The functions by which a loop keeps rows at so many places of each step.
+
+    A place is kept unless an output lies between it and the place before. Where the rows have been
+    halved, only every second, fourth ... of the places in a row is.
+    """
+
+    @helper
+    def keep(row, step, reached, data):
+        """Keep rows of a step up to the time reached, whose first output is in ``row``."""
+        kept, counts, times = data.kept, data.progress.counts, data.output.times
+        if len(kept.times) == 0:
+            return
+        for k in range(1, places + 1):
+            time = step.target if k == places else step.t + step.h * k / places
+            if time > reached:
+                break
+            shown = row < counts[OUTPUTS] and times[row] <= time
+            while row < counts[OUTPUTS] and times[row] <= time:
+                row += 1
+            if shown:
+                counts[PASSED] = 0
+            elif time > step.t:
+                counts[PASSED] += 1
+                if counts[PASSED] >= 1 << counts[HALVED]:
+                    kept.times[counts[KEPT]] = time
+                    fill(counts[KEPT], kept, step, data)
+                    counts[KEPT] += 1
+                    counts[PASSED] = 0
+
+    @helper
+    def crowded(data):
+        """Whether a step may have more rows than there is room for."""
+        return is_crowded(data.progress.counts, data.kept.times)
+
+    return keep, crowded
+
+
 class Method(NamedTuple):
     """The compiled functions of a method that the loop calls, with its ``data``, a record.
 
@@ -66,8 +119,8 @@ class Method(NamedTuple):
         The step to try, of about the length h; ``last`` is the outcome of the attempt before.
     attempt(step, last, smallest, data)
         Try it; the outcome, and the length of the next attempt or step.
-    fill(row, step, data)
-        Fill a row of the output, whose time is in the step.
+    fill(row, output, step, data)
+        Fill a row of ``data.output``, or of ``data.kept``, whose time is in the step.
     go_on(step, h, data)
         Make the state at the end of the step the state of the run; how the run stands, and the
         length of the next step, which is h but for what happens there.
@@ -84,6 +137,10 @@ class Method(NamedTuple):
         Note the events of a step; the part of it after which the run ends.
     stop_at(part, step, data)
         Make the state at that part the state of the run.
+    places : int
+        Rows between outputs are kept in ``data.kept``, a record like ``data.output``, at so many
+        places of each step, MOST_PLACES at most; zero if there is no such record. The call returns
+        where there may be no room for those of the next step.
     """
 
     name: str
@@ -98,6 +155,7 @@ class Method(NamedTuple):
     full: Callable[..., Any] = _no_events
     find_end: Callable[..., Any] = _no_end
     stop_at: Callable[..., Any] = _never
+    places: int = 0
 
 
 def step_loop(method: Method, constants: str = "") -> Any:
@@ -105,9 +163,11 @@ def step_loop(method: Method, constants: str = "") -> Any:
 
     It goes on until ``most`` steps have been tried and one was taken, and returns how it ended.
     Rows of the output are filled that belong to the times passed. A run that is continued gives
-    the same numbers as one that was not interrupted. Where events find no room the call returns.
+    the same numbers as one that was not interrupted. Where events find no
+    room the call returns.
     """
-    aim, attempt, fill, go_on, begin, resume, close, full, find_end, stop_at = method[2:]
+    aim, attempt, fill, go_on, begin, resume, close, full, find_end, stop_at = method[2:-1]
+    keep, crowded = _keeping(fill, method.places) if method.places else (_keep_none, _no_events)
 
     def advance(data, most):
         progress, output = data.progress, data.output
@@ -125,7 +185,7 @@ def step_loop(method: Method, constants: str = "") -> Any:
         last, attempts = TAKEN, 0
         while counts[OUTPUTS] < len(times):
             # A step that failed is repeated before the call returns: derivatives are not kept.
-            if last == TAKEN and (attempts >= most or full(data)):
+            if last == TAKEN and (attempts >= most or full(data) or crowded(data)):
                 break
             attempts += 1
             step = aim(t, h, last, smallest, data)
@@ -142,12 +202,13 @@ def step_loop(method: Method, constants: str = "") -> Any:
             part = find_end(step, data)
             ends = part <= 1.0
             reached = step.t + part * step.h if part < 1.0 else step.target
-            row = counts[OUTPUTS]
+            first = row = counts[OUTPUTS]
             close(step, times[row] <= reached, data)
             while row < len(times) and times[row] <= reached:
-                fill(row, step, data)
+                fill(row, output, step, data)
                 row += 1
             counts[OUTPUTS] = row
+            keep(first, step, reached, data)
             counts[STEPS] += 1
             if ends:
                 stop_at(part, step, data)

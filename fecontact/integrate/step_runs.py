@@ -10,6 +10,7 @@ from fecontact.core.types import Array
 from fecontact.integrate import step_loop
 from fecontact.integrate.event_arrays import take_events
 from fecontact.integrate.events import Events
+from fecontact.integrate.kept_steps import halve
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.trajectory import Status
 
@@ -26,7 +27,7 @@ class StepRun:
 
     Attributes
     ----------
-    progress, output : records
+    progress, output, kept : records
         From where it goes on, and what it fills, see :mod:`fecontact.integrate.step_loop`.
     watch : Watch
         What is watched for.
@@ -36,6 +37,7 @@ class StepRun:
 
     progress: Any
     output: Any
+    kept: Any
     watch: Watch
     found: list[tuple[Array, Array]]
 
@@ -52,6 +54,11 @@ class StepRun:
     def states(self) -> Array:
         """States (N, size) at the output times; those passed are filled."""
         return np.asarray(self.output.states)
+
+    @property
+    def kept_rows(self) -> int:
+        """Number of rows kept between the outputs."""
+        return int(self.progress.counts[step_loop.KEPT])
 
     @property
     def outputs(self) -> int:
@@ -92,6 +99,9 @@ class StepRun:
         InputError
             If an event is not finite.
         """
+        counts = self.progress.counts
+        if self.kept and step_loop.is_crowded(counts, self.kept.times):
+            halve(self.kept, counts)
         try:
             status = self.step(most)
         finally:

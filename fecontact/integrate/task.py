@@ -26,6 +26,8 @@ class Task:
         Longest step [s].
     events : sequence of ContactEvents, Crossing and Event
         Events to locate; empty unless that is among its ``abilities``.
+    keep_steps : bool
+        Whether to keep what is between the outputs, see :class:`KeptSteps`.
     progress : callable or None
         Called occasionally with the time reached [s].
     """
@@ -36,4 +38,5 @@ class Task:
     rtol: float
     max_step: float | None = None
     events: Sequence[AnyEvent] = ()
+    keep_steps: bool = False
     progress: Callable[[float], None] | None = None

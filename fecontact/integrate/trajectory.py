@@ -14,6 +14,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.contact_works import ContactWorks
 from fecontact.integrate.events import Events
+from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.loads import load_rows
 from fecontact.system.powers import POWERS
@@ -181,6 +182,8 @@ class Solution:
         F without the impulses of rigid stops. In space R is (N, n, 2), along both tangents.
     events : Events or None
         Located events in chronological order.
+    kept : KeptSteps or None
+        Motion between the outputs.
     """
 
     time: Array
@@ -193,6 +196,7 @@ class Solution:
     normal_force: Array | None = None
     friction_force: Array | None = None
     events: Events | None = None
+    kept: KeptSteps | None = None
 
 
 @read_only_arrays
@@ -224,6 +228,8 @@ class Trajectory(ContactWorks, Summarised):
         is (N, n, 2). None if laws give the forces.
     events : Events or None
         Located events in chronological order; None if none were requested.
+    kept : KeptSteps or None
+        Motion between the outputs, from which plots are drawn where these are far apart.
     """
 
     system: ContactSystem
@@ -239,6 +245,7 @@ class Trajectory(ContactWorks, Summarised):
     held_normal_force: Array | None = None
     held_friction_force: Array | None = None
     events: Events | None = None
+    kept: KeptSteps | None = None
 
     def summary(self) -> list[tuple[str, str]]:
         """Status, time span and system; nothing that is costly to compute."""
@@ -288,7 +295,11 @@ class Trajectory(ContactWorks, Summarised):
             if (values := getattr(self, name)) is not None}
         time = kept["time"]
         events = None if self.events is None else self.events.between(time[0], time[-1])
-        return replace(self, **kept, **counted, events=events)
+        steps = self.kept
+        if steps is not None:
+            rows = (steps.time > time[0]) & (steps.time < time[-1])
+            steps = steps.part(rows, self.work[chosen.start])
+        return replace(self, **kept, **counted, events=events, kept=steps)
 
     @cached_property
     def limits_exceeded(self) -> tuple[str, ...]:

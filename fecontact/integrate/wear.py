@@ -188,7 +188,7 @@ def wear_history(
     with shown(progress or None, lambda: progress_bar("Wearing", float(blocks), 0.0)) as tell:
         if settling:
             state = _end(simulate(system, time + settling * cycle, t_start=time, initial=state,
-                                  outputs=2, **options), "settling").states[-1]
+                                  outputs=2, keep_steps=False, **options), "settling").states[-1]
             time += settling * cycle
             times[0] = time
         worn = system

@@ -271,6 +271,8 @@ class SimulationSettings:
     static_coefficient : float, tuple of float or mapping, optional
         For 'set-valued': limit of R/F in stick [-], given as ``restitution``; default that of the
         law.
+    keep_steps : bool
+        Keep the motion between the outputs for plots, at most 16 MB.
     events : bool
         Locate touch-down, lift-off, stick and slip of every contact node and store them with the
         run.
@@ -293,6 +295,7 @@ class SimulationSettings:
     impact_law: str | None = None
     tangential_restitution: PerNode | dict[str, PerNode] | None = None
     static_coefficient: PerNode | dict[str, PerNode] | None = None
+    keep_steps: bool = True
     events: bool = False
     stop: tuple[str, ...] = ()
     initial: Literal["rest", "sliding", "preload"] | RigidStart | PointStart = "rest"

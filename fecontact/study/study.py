@@ -400,12 +400,12 @@ class Study(Summarised, StudyModels):
 
     def run(
         self, progress: bool | Callable[[float], None] | None = None,
-        checkpoint: Path | None = None,
+        checkpoint: Path | None = None, keep_steps: bool | None = None,
     ) -> Trajectory:
         """Run the study from ``t_start`` to ``t_end``; see :func:`fecontact.simulate`.
 
         Solvers without checkpoints ignore ``checkpoint``. The file is kept after the run: remove
-        it once the run is written.
+        it once the run is written. ``keep_steps`` takes the place of that of the study.
         """
         settings, t_end, system = self.simulation, self.t_end, self.system()
         solver = settings.chosen_solver()
@@ -422,7 +422,8 @@ class Study(Summarised, StudyModels):
             return simulate(system, t_end, t_start=settings.t_start,
                             initial=initial, outputs=settings.outputs,
                             solver=solver, rtol=settings.rtol, max_step=settings.max_step,
-                            progress=progress,
+                            progress=progress, keep_steps=(
+                                settings.keep_steps if keep_steps is None else keep_steps),
                             events=(ContactEvents(settings.stop)
                                     if settings.events or settings.stop else None))
 

@@ -155,7 +155,7 @@ def _run(batch: Batch, base: Study, case: SweepCase) -> tuple[Trajectory, Study]
     with warnings.catch_warnings():
         # They go into the row.
         warnings.simplefilter("ignore", ModelWarning)
-        trajectory = study.run()
+        trajectory = study.run(keep_steps=False)
     if trajectory.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
     if trajectory.status not in (Status.FINISHED, Status.EVENT):

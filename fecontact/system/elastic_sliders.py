@@ -211,12 +211,34 @@ def within_limits(system: Any, times: Array, states: Array, counts: Integers) ->
     return found
 
 
-def book_stored(work: Array, energy: Array) -> None:
-    """Count energies (N, n) in the springs of elements as stored, not as lost, in work (N, p).
+def booked(
+    system: Any, counts: Integers, times: Array, states: Array, work: Array,
+    start: tuple[float, Array],
+) -> tuple[Array, Array]:
+    """States within their limits, and work in which springs of elements store what they took.
 
-    The works of nodes may follow those of the system.
+    Parameters
+    ----------
+    system : ContactSystem
+        With these elements or without.
+    counts : (n,) array
+        Elements of each node.
+    times, states, work : (N,), (N, size), (N, p) or (N, p + 2 n) arrays
+        Of a run; not changed.
+    start : (time, (size,) array)
+        Its start, and the state there.
     """
-    stored = energy - energy[0]
+    if not counts.any() or not len(times):
+        return states, work
+    states, work = within_limits(system, times, states, counts), work.copy()
+    first = within_limits(system, np.array(start[:1]), start[1][None], counts)
+    _book(work, stored_in_sliders(system, states, counts)
+          - stored_in_sliders(system, first, counts))
+    return states, work
+
+
+def _book(work: Array, stored: Array) -> None:
+    """Count energies (N, n) put into springs of elements as stored, not as lost, in work."""
     n = stored.shape[1]
     work[:, BRISTLES] += stored.sum(axis=1)
     work[:, FRICTION] -= stored.sum(axis=1)

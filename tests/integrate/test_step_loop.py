@@ -13,6 +13,7 @@ from fecontact.core.records import ANY, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.step_loop import (
     BEYOND,
+    COUNTS,
     FAILED,
     FINISHED,
     MINIMUM_STEP,
@@ -125,7 +126,7 @@ def _value(x, k, step, data):
 
 
 @helper
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     for k in range(2):
         data.output.states[row, k] = _value((data.output.times[row] - step.t) / step.h, k, step,
                                             data)
@@ -166,7 +167,7 @@ def start(kind, end, *, rtol=1e-8, level=-np.inf, outputs=21, step=1e-3):
     numbers = np.zeros(2)
     numbers[STEP] = step
     times = np.linspace(0.0, end, outputs)
-    return Data(kind, rtol, level, Progress(numbers, np.zeros(5, dtype=np.int64),
+    return Data(kind, rtol, level, Progress(numbers, np.zeros(COUNTS, dtype=np.int64),
                                             np.array([1.0, 0.0])),
                 Output(times, np.zeros((outputs, 2))), np.zeros((7, 2)), np.zeros(2))
 

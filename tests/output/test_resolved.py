@@ -12,8 +12,6 @@ from fecontact import read_case, write_case
 from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
 from fecontact.integrate import SetValued
-from fecontact.integrate.nonsmooth import driver
-from fecontact.integrate.step_loop import RUNNING, STEPS, TIME
 from fecontact.laws import ExponentialFriction, LinearContact, RoughSurface
 from fecontact.output.plots.run import thinned
 from fecontact.plot import plot_contact_map, plot_friction_work, plot_history, plot_phase
@@ -118,7 +116,7 @@ def test_slip_is_measured_along_the_motion():
                                                            fine.time))
 
 
-def test_set_valued_runs_are_repeated_with_what_they_were_told():
+def test_rebounds_shorter_than_the_outputs_are_drawn():
     """A ball on a rigid stop: rebounds of e, e^2 ... that are shorter than the times between."""
     system = point_mass("y", load=fc.Load(9.81 * MASS))
     run = fc.simulate(system, 0.55, initial=np.sqrt(MASS) * np.array([0.1, 0.0]), outputs=12,
@@ -132,30 +130,6 @@ def test_set_valued_runs_are_repeated_with_what_they_were_told():
     second = fine.displacement("B")[fine.time > np.sqrt(2.0 * 0.1 / 9.81), 1]
     assert second.max() == pytest.approx(0.25 * 0.1, rel=5e-3)
     assert fine.normal_force[-1, 0] == pytest.approx(9.81 * MASS)
-
-
-def test_repeats_that_take_far_more_steps_than_the_run_are_given_up(monkeypatch):
-    """Set-valued steps can become very short from a state at the border of stick and slip."""
-    run = fc.simulate(friction_oscillator(), 0.1, outputs=11, solver=SetValued())
-    begin, calls = driver.start, []
-
-    def start(*given, **options):
-        made = begin(*given, **options)
-        made.advance(1)
-
-        def loop(most):
-            calls.append(most)
-            made.progress.counts[STEPS] += most
-            made.progress.numbers[TIME] += 1e-6
-            return RUNNING
-
-        return replace(made, loop=loop)
-
-    monkeypatch.setattr(driver, "start", start)
-    found = resolved(run)
-    assert found.trajectory is run
-    assert found.reason == "between them the run took too many steps"
-    assert 0 < len(calls) < 100
 
 
 def test_files_read_back_are_drawn_alike(tmp_path, capsys):
@@ -173,24 +147,15 @@ def test_pictures_say_where_they_are_too_coarse(tmp_path):
     by_hand = made_by_hand(times=11)
     found = resolved(by_hand)
     assert found.trajectory is by_hand
-    assert "not computed by a run" in found.note
+    assert "has kept nothing" in found.note
     figure = plot_phase(by_hand, 2)
     assert [" ".join(text.get_text().split()) for text in figure.texts] == [found.note]
     assert not plot_phase(hit(7), component="y").texts
-
-
-def test_long_runs_and_wrong_outputs_stay_as_they_are():
+    assert "has kept nothing" in resolved(hit(7, keep_steps=False)).note
+    # As after a run that was too long: two of the rows are left.
     run = hit(7)
-    run.statistics["steps"] = 10**9
-    assert "too many steps" in resolved(run).note
-    # Outputs between which the system does not move: each is shifted by hand.
-    wrong = hit(9)
-    shifted = wrong.modal_coordinates.copy()
-    shifted[1::2] += 1e-2
-    wrong = replace(wrong, modal_coordinates=shifted)
-    found = resolved(wrong)
-    assert found.trajectory is wrong
-    assert "does not lead from output to output" in found.note
+    sparse = replace(run, kept=run.kept.part(slice(None, None, len(run.kept.time) // 2)))
+    assert "too long to keep more" in resolved(sparse).note
 
 
 def test_thinned_lines_keep_single_peaks_at_uneven_times():
@@ -205,20 +170,3 @@ def test_thinned_lines_keep_single_peaks_at_uneven_times():
     rest = np.abs(shown) < 2.0
     assert np.abs(np.interp(np.linspace(0.01, 0.99, 500), x[rest], shown[rest])
                   - np.sin(7.0 * np.linspace(0.01, 0.99, 500))).max() < 0.01
-
-
-def test_repeats_that_end_early_with_as_many_outputs_do_not_count(monkeypatch):
-    """The last output of a run that ends early is where it ended, before the time wanted."""
-    from fecontact.analysis import resolved as module
-
-    run = hit(7)
-
-    def cut(system, t_end, *, outputs, **options):
-        again = fc.simulate(system, t_end, outputs=outputs, **options)
-        time = again.time.copy()
-        time[-1] = 0.5 * (time[-2] + time[-1])
-        return fc.Trajectory(again.system, time, again.modal_coordinates, again.modal_velocities,
-                             again.work, fc.Status.ENERGY_GREW, again.statistics)
-
-    monkeypatch.setattr(module, "simulate", cut)
-    assert len(module.resolved(run).trajectory.time) == len(run.time)

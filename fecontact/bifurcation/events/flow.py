@@ -41,10 +41,10 @@ from fecontact.integrate.nonsmooth.problem import (
 from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at
 from fecontact.integrate.nonsmooth.transitions import decide_clusters
 from fecontact.integrate.step_loop import (
+    COUNTS,
     FAILED,
     NOT_A_NUMBER,
     OUTPUTS,
-    RATES,
     RUNNING,
     STEP,
     TAKEN,
@@ -132,7 +132,7 @@ class Reached(NamedTuple):
     """How far a motion has come."""
 
     numbers: Annotated[Array, STEP + 1]
-    counts: Annotated[Integers, RATES + 1]
+    counts: Annotated[Integers, COUNTS]
     state: Annotated[Array, STATES]
 
 
@@ -316,9 +316,9 @@ def _close(step, writes, data):
 
 
 @helper
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """Fill a row of the output, which is at the end of the step."""
-    data.output.states[row] = data.room.places[STAGES]
+    output.states[row] = data.room.places[STAGES]
 
 
 @helper

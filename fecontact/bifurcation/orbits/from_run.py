@@ -117,7 +117,7 @@ def _run(
     times = np.append(begin, outputs) if extra else outputs
     times[-1] = end
     run = simulate(system, end, t_start=begin, initial=initial, outputs=times, solver=solver,
-                   rtol=rtol)
+                   rtol=rtol, keep_steps=False)
     if run.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
     if run.status is not Status.FINISHED:

@@ -83,6 +83,7 @@ class Data(NamedTuple):
     progress: state.Progress
     room: state.Room
     output: state.Output
+    kept: state.Output
     collocation: Collocation
     vary: Vary
 
@@ -166,9 +167,9 @@ def _close(step, writes, data):
 
 
 @routine
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """Fill a row of the output."""
-    output, c = data.output, data.collocation
+    c = data.collocation
     m = c.accelerations.shape[1]
     x = 2.0 * (output.times[row] - step.t) / step.h - 1.0
     for k in range(m):
@@ -290,7 +291,7 @@ def _attempt(step, last, smallest, data):
     return TAKEN, min(h, control.longest)
 
 
-METHOD = Method("collocation", Data, _aim, _attempt, _fill, _go_on, close=_close)
+METHOD = Method("collocation", Data, _aim, _attempt, _fill, _go_on, close=_close, places=4)
 # Runs by collocation are of these systems, with any number of columns, or none.
 SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Room,
                                           state.Output, Collocation))

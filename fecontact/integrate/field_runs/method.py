@@ -62,7 +62,7 @@ class Progress(NamedTuple):
 
     Attributes
     ----------
-    numbers, counts : (5,), (5,) arrays
+    numbers, counts : (5,), (8,) arrays
         Time, length of the next step and so on; numbers of steps and so on.
     state, rate, sizes : (d,) arrays
         The state, its rate, and the largest size of each state so far, or its floor.
@@ -269,9 +269,9 @@ def _close(step, writes, data):
 
 
 @routine
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """Fill a row of the output; the columns are stored and restarted there."""
-    progress, room, output, varied = data.progress, data.room, data.output, data.varied
+    progress, room, varied = data.progress, data.room, data.varied
     if output.times[row] == step.target:
         for k in range(len(room.after)):
             output.states[row, k] = room.after[k]

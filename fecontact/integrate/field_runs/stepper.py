@@ -17,6 +17,7 @@ from fecontact.integrate.field_runs.variational import Varied, varied_for
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.step_loop import (
+    COUNTS,
     RUNNING,
     STEP,
     TIME,
@@ -42,7 +43,7 @@ class FieldSteps(StepRun):
     function : PythonFunction or None
         Where Python evaluates it.
     progress, room, output, varied, watch
-        What the integrator goes on from, works with and fills.
+        What the integrator goes on from, works with and fills; it keeps nothing between outputs.
     """
 
     moving: VectorField
@@ -54,6 +55,7 @@ class FieldSteps(StepRun):
     varied: Varied
     watch: Watch
     found: list[tuple[Array, Array]] = field(default_factory=list)
+    kept: tuple[()] = ()
 
     @property
     def transitions(self) -> Array:
@@ -132,8 +134,9 @@ def start_field(
     vectors, squares = np.zeros((6, d)), np.zeros((2, d, d))
     return FieldSteps(
         field, kernel, function,
-        Progress(numbers, np.zeros(5, dtype=np.int64), np.array(state, dtype=float), np.zeros(d),
-                 _FLOOR * np.array(field.state_scales(values), dtype=float), np.zeros((d, d))),
+        Progress(numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float),
+                 np.zeros(d), _FLOOR * np.array(field.state_scales(values), dtype=float),
+                 np.zeros((d, d))),
         Room(vectors[0], vectors[1], squares[0], np.zeros((tableau.STAGES, d)), vectors[2],
              vectors[3], vectors[4], vectors[5], squares[1], np.zeros(d, dtype=np.int64),
              np.zeros((3, d)), np.zeros((3, d)), np.zeros((3, COEFFICIENTS)),

@@ -14,6 +14,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.coefficients import Coefficient, node_values
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
+from fecontact.integrate.kept_steps import KeptSteps, room_for_rows
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
@@ -47,6 +48,7 @@ def integrate_set_valued(
     longest: float | None = None,
     max_step: float | None = None,
     events: Sequence[AnyEvent] = (),
+    keep_steps: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Solution:
     r"""Integrate with friction whose smoothing slope k_s is infinite.
@@ -90,6 +92,8 @@ def integrate_set_valued(
         Limit of these [s].
     events : sequence of ContactEvents, Crossing and Event
         Events to locate, from event to event only.
+    keep_steps : bool
+        Whether to keep rows between the outputs.
     progress : callable, optional
         Called with the time reached [s] now and then.
 
@@ -114,7 +118,7 @@ def integrate_set_valued(
     run = start(system, state, times, rtol=rtol, method=method, restitution=restitution,
                 impact_law=impact_law, tangential_restitution=tangential_restitution,
                 static_coefficient=static_coefficient, longest=longest, max_step=max_step,
-                events=events)
+                events=events, keep_steps=keep_steps)
     output, times, counts = run.output, run.times, run.progress.counts
     n, m, solid = system.basis.contact_nodes, system.basis.modes, system.basis.dimension == 3
     try:
@@ -137,12 +141,20 @@ def integrate_set_valued(
         time, states = np.append(time, last), np.vstack([states, Y])
         friction = np.vstack([friction, friction[-1:]])
         normal = np.vstack([normal, normal[-1:]])
-    if solid:
-        friction = np.stack([friction[:, :n], friction[:, n:]], axis=-1)
     end = 2 * m + POWER_COUNT
-    return Solution(time, states[:, : 2 * m].copy(), states[:, 2 * m : end].copy(), ended,
-                    statistics, node_friction_work=states[:, end:].copy(), normal_force=normal,
-                    friction_force=friction, events=run.events)
+
+    def columns(states: Array, friction: Array, normal: Array) -> dict[str, Array]:
+        if solid:
+            friction = np.stack([friction[:, :n], friction[:, n:]], axis=-1)
+        return {"states": states[:, : 2 * m].copy(), "work": states[:, 2 * m : end].copy(),
+                "normal_force": normal, "friction_force": friction}
+
+    between = [values[: run.kept_rows] for values in run.kept]
+    kept = KeptSteps(between[0], **columns(*between[1:])).before(time[-1])
+    return Solution(time, status=ended, statistics=statistics,
+                    node_friction_work=states[:, end:].copy(), events=run.events,
+                    kept=kept if keep_steps else None,
+                    **columns(states, friction, normal))
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +164,7 @@ class Run(StepRun):
     loop: Callable[[int], int]
     progress: kinds.Progress
     output: kinds.Output
+    kept: kinds.Output
     watch: Watch
     method: str
     found: list[tuple[Array, Array]] = field(default_factory=list)
@@ -175,6 +188,7 @@ def start(
     longest: float | None = None,
     max_step: float | None = None,
     events: Sequence[AnyEvent] = (),
+    keep_steps: bool = False,
 ) -> Run:
     """A run before its first step; see :func:`integrate_set_valued`."""
     times = np.ascontiguousarray(times, dtype=float)
@@ -192,14 +206,15 @@ def start(
     if longest == default and method == "event-driven" and restitution is None:
         most = np.inf if max_step is None else float(max_step)
         limits = limits._replace(longest=min(longest_between_events(system, times), most))
-    output = kinds.Output(times, np.empty((len(times), len(course.state))),
-                          np.empty((len(times), len(course.carried))),
-                          np.empty((len(times), system.basis.contact_nodes)))
+    sizes = len(course.state), len(course.carried), system.basis.contact_nodes
+    room = room_for_rows(keep_steps, sum(sizes))
+    output, kept = (kinds.Output(rows, *(np.empty((len(rows), size)) for size in sizes))
+                    for rows in (times, np.zeros(room)))
     workspace = kinds.workspace_for(problem)
     loop: Callable[..., int]
     watch = watch_for(system, events, False)
     watch = watch._replace(note=note_events.address if events else 0)
-    data = problem, limits, course, output
+    data = problem, limits, course, output, kept
     if solid and restitution is not None:
         from fecontact.integrate.nonsmooth import impact_steps
         from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
@@ -218,7 +233,7 @@ def start(
         _require_no_events(events)
         loop = partial(time_stepping.run_steps, time_stepping.Data(
             *data, workspace, stepping_room(problem, in_space() if solid else IN_PLANE)))
-    return Run(loop, course, output, watch, method)
+    return Run(loop, course, output, kept, watch, method)
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:

@@ -94,6 +94,7 @@ class Data(NamedTuple):
     limits: Limits
     progress: Progress
     output: Output
+    kept: Output
     workspace: Workspace
     room: Room
     watch: Watch
@@ -163,10 +164,9 @@ def _show(t, progress, output, w):
 
 
 @routine
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """Fill a row of the output."""
-    p, progress, output, w, room = (data.problem, data.progress, data.output, data.workspace,
-                                    data.room)
+    p, progress, w, room = data.problem, data.progress, data.workspace, data.room
     time, state = output.times[row], output.states[row]
     interpolate((time - step.t) / step.h, progress.state, room.parts, state)
     set_rates(time, state, p, progress, w, room, room.rate)
@@ -352,7 +352,8 @@ def _take_to_event(step, data):
     if step.h > 0.0:
         take(step, p, progress, w, room)
         row = progress.counts[OUTPUTS]
-        if p.rigid != 0 or data.watch.note != 0 or data.output.times[row] <= step.target:
+        looked_into = data.output.times[row] <= step.target or len(data.kept.times) > 0
+        if p.rigid != 0 or data.watch.note != 0 or looked_into:
             prepare_dense(step, p, progress, w, room)
 
 
@@ -481,7 +482,7 @@ def _change(step, h, data):
 
 
 METHOD = Method("events", Data, aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,
-                find_end=_find_end, stop_at=_stop_at)
+                find_end=_find_end, stop_at=_stop_at, places=6)
 run_events = step_loop(METHOD)
 # For nodes of which each has a slip velocity of its own.
 SMALL = Sized(

@@ -98,6 +98,7 @@ class Data(NamedTuple):
     limits: Limits
     progress: Progress
     output: Output
+    kept: Output
     room: ImpactRoom
 
 
@@ -288,9 +289,9 @@ def _fill_within(row, t, h, Y, out, which, output, room):
 
 
 @routine
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """Fill a row of the output, by the first half of the step or the second."""
-    output, room = data.output, data.room
+    room = data.room
     half = 0.5 * step.h
     middle = step.t + half
     if output.times[row] <= middle:
@@ -363,5 +364,5 @@ def _go_on(step, h, data):
     return pace(step, progress, data.output.times), h
 
 
-METHOD = Method("impacts", Data, aim, _attempt, _fill, _go_on, _begin)
+METHOD = Method("impacts", Data, aim, _attempt, _fill, _go_on, _begin, places=2)
 run_impact_steps = step_loop(METHOD)

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, Size, Vector, allocate
 from fecontact.core.types import Array, Integers
+from fecontact.integrate import step_loop
 from fecontact.integrate.step_loop import (
     CUT,
     MINIMUM_STEP,
     OUTPUTS,
-    RATES,
     REJECTIONS,
     RUNNING,
     STEP,
@@ -46,8 +46,8 @@ LAST_ERROR, REPEATED, UNCUT, MARK = range(STEP + 1, NUMBERS)
 # that gained energy; changes in a row without any time between them; whether the step ends at one,
 # and whether that has just begun to move; how often a step was cut; whether what its begin has is
 # known from the step before; steps at the time `MARK`.
-COUNTS = 13
-EVENTS, IMPACTS, GAINED, IDLE, AT_EVENT, CUTS, KNOWN, MARKED = range(RATES + 1, COUNTS)
+COUNTS = step_loop.COUNTS + 8
+EVENTS, IMPACTS, GAINED, IDLE, AT_EVENT, CUTS, KNOWN, MARKED = range(step_loop.COUNTS, COUNTS)
 # A run is stuck that advances by less than this part of its span in so many steps.
 _MANY_STEPS, _LEAST_PART = 20_000, 1e-8
 # Entries of Progress.largest: slip velocity, penetration rate and penetration.

@@ -90,6 +90,7 @@ class Data(NamedTuple):
     limits: Limits
     progress: Progress
     output: Output
+    kept: Output
     workspace: Workspace
     room: Room
 
@@ -196,10 +197,9 @@ def _slip_changes(w, room):
 
 
 @routine
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """State at an output time within a step, by cubics through both ends."""
-    p, progress, output, w, room = (data.problem, data.progress, data.output, data.workspace,
-                                    data.room)
+    p, progress, w, room = data.problem, data.progress, data.workspace, data.room
     m, h = p.system.rows.shape[2], step.target - step.t
     Y, new, before, after = progress.state, room.new, room.before, room.after
     states, time = output.states, output.times[row]
@@ -418,5 +418,5 @@ def _go_on(step, h, data):
     return pace(step, progress, data.output.times), h
 
 
-METHOD = Method("implicit", Data, aim, _attempt, _fill, _go_on, _begin)
+METHOD = Method("implicit", Data, aim, _attempt, _fill, _go_on, _begin, places=1)
 run_steps = step_loop(METHOD)

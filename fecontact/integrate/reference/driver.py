@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.kept_steps import GrowingRows, KeptSteps, room_for_rows
 from fecontact.integrate.reference.watched import Watched
 from fecontact.integrate.run_limits import (
     breaks,
@@ -22,16 +23,17 @@ from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
-    book_stored,
+    booked,
     exact_arrays,
     excesses,
     slider_counts,
     stick_again,
-    stored_in_sliders,
-    within_limits,
 )
 from fecontact.system.kernels import right_hand_side
 from fecontact.system.powers import NODE_POWERS, POWERS, powers
+
+# Rows between outputs are kept at so many places of a step.
+_PLACES = 2
 
 
 class Equations(NamedTuple):
@@ -86,6 +88,7 @@ def integrate(
                                   longest_step(system, times, task.max_step))
     pieces, sliders = smooth_pieces(system, times), slider_counts(system)
     result = np.empty((len(times), size + extra))
+    kept = GrowingRows(room_for_rows(task.keep_steps, size + extra))
     done, y = pass_break(system, float(times[0]), pieces[0].begin, times, 0, result,
                          np.concatenate([state, np.zeros(extra)]))
     t, status = pieces[0].begin, Status.FINISHED
@@ -113,6 +116,8 @@ def integrate(
                 for row in range(done, reached):
                     result[row] = steps.dense(float(times[row]))
                 done = reached
+                for part in np.linspace(steps.begin, t, _PLACES + 1)[1:].tolist():
+                    kept.add(part, steps.dense)
                 if left is not None and t < piece.end:
                     steps = start_steps(within, t, y, piece.end)
                 if task.progress is not None:
@@ -126,12 +131,15 @@ def integrate(
     times, result = times[:done], result[:done]
     if status is not Status.FINISHED and t > times[-1] and np.isfinite(y).all():
         times, result = np.append(times, t), np.vstack([result, y])
-    states, work = result[:, :size], result[:, size:]
-    if sliders.any():
-        states, work = within_limits(system, times, states, sliders), work.copy()
-        book_stored(work, stored_in_sliders(system, states, sliders))
-    return Solution(times, states, work, status, statistics,
-                    events=None if watched is None else watched.events)
+
+    def columns(times: Array, values: Array) -> tuple[Array, Array]:
+        return booked(system, sliders, times, values[:, :size], values[:, size:],
+                      (float(task.times[0]), result[0, :size]))
+
+    between = KeptSteps(kept.time, *columns(kept.time, kept.values.reshape(-1, size + extra)))
+    return Solution(times, *columns(times, result), status, statistics,
+                    events=None if watched is None else watched.events,
+                    kept=between.part(~np.isin(kept.time, times)) if task.keep_steps else None)
 
 
 def _within(

@@ -15,9 +15,10 @@ from fecontact.core.files.atomic_write import replaced
 from fecontact.core.files.stored import DamagedError, npz_arrays, reading
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.run import Run
-from fecontact.integrate.step_loop import OUTPUTS
+from fecontact.integrate.step_loop import HALVED, KEPT, OUTPUTS
 
 _COUNTS = 1  # place of the counts among the leaves of the progress
+_MOST_HALVED = 62
 
 
 @dataclass
@@ -84,10 +85,17 @@ class Checkpoint:
         events = like("found", np.zeros((0, 3)), len(stored["found"]))
         if not np.isfinite(events).all() or (events[:, 1] < 0.0).any():
             raise DamagedError("events of no kind were found")
+        rows = int(kept[_COUNTS][KEPT])
+        if not rows <= len(run.kept.times) or kept[_COUNTS][HALVED] > _MOST_HALVED:
+            raise DamagedError(f"{rows} rows are kept between outputs, with room for "
+                               f"{len(run.kept.times)}")
+        between = [like(f"kept{index}", values, rows) for index, values in enumerate(run.kept)]
         run.found.append((events, like("found_states", run.states, len(events))))
         for item, value in zip(parts, kept, strict=True):
             item[...] = value
         run.states[:done], run.work[:done] = states, work
+        for values, stored_rows in zip(run.kept, between, strict=True):
+            values[:rows] = stored_rows
 
     def _parts(self) -> list[Any]:
         """The arrays from which a run goes on."""
@@ -112,10 +120,12 @@ class Checkpoint:
         rows = [np.zeros((0, 3)), *(rows for rows, _ in self.run.found)]
         states = [self.run.states[:0], *(states for _, states in self.run.found)]
         with replaced(self.path) as part, part.open("wb") as file:
+            parts = {f"part{index}": item for index, item in enumerate(self._parts())}
+            parts |= {f"kept{index}": values[: self.run.kept_rows]
+                      for index, values in enumerate(self.run.kept)}
             np.savez(file, mark=self.mark, states=self.run.states[:done],
                      work=self.run.work[:done], found=np.vstack(rows),
-                     found_states=np.vstack(states), **{
-                         f"part{index}": item for index, item in enumerate(self._parts())})
+                     found_states=np.vstack(states), **parts)
         self._written = clock.monotonic()
 
 

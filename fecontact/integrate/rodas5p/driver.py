@@ -2,6 +2,7 @@
 
 import time as clock
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from fecontact.integrate import step_loop
 from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
+from fecontact.integrate.kept_steps import KeptSteps, room_for_rows
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
@@ -25,6 +27,7 @@ from fecontact.integrate.rodas5p.state import (
     Output,
     Problem,
     Progress,
+    output_for,
     progress_for,
     room_for,
 )
@@ -42,11 +45,9 @@ from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
-    book_stored,
+    booked,
     exact_arrays,
     slider_counts,
-    stored_in_sliders,
-    within_limits,
 )
 from fecontact.system.friction_memory import velocity_scale
 from fecontact.system.powers import DRIVE, NODE_POWERS, POWER_COUNT
@@ -77,6 +78,7 @@ def start(
     vary_rtol: float | None = None,
     events: Sequence[AnyEvent] = (),
     method: str = "auto",
+    keep_steps: bool = False,
 ) -> Run:
     """A run from ``times[0]``, before its first step.
 
@@ -111,6 +113,8 @@ def start(
         What to watch for.
     method : 'auto', 'rodas5p', 'radau' or 'power-series'
         How to go on; 'auto' as :class:`fecontact.integrate.Auto` says.
+    keep_steps : bool
+        Whether to keep rows between the outputs; not of runs with derivatives.
     """
     require_state(state, np.inf)
     basis = system.basis
@@ -147,8 +151,9 @@ def start(
         problem,
         _progress(system, control, times, state),
         room_for(m, n, states, basis.dimension, blocks),
-        Output(times, np.zeros((len(times), len(state))),
-               np.zeros((len(times), POWER_COUNT + NODE_POWERS * n))),
+        output_for(times, len(state), n),
+        output_for(np.zeros(room_for_rows(keep_steps, len(state) + POWER_COUNT + NODE_POWERS * n)),
+                   len(state), n),
         Vary(exact_arrays(above.arrays, counts), exact_arrays(below.arrays, counts), width,
              _moved_both_ways(system, above, below),
              variation_for(columns, m, n, states, basis.dimension, width,
@@ -174,7 +179,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
     output = run.output
     return Run(
         run.problem, _progress(system, control, run.times, state), run.room,
-        Output(output.times, np.zeros_like(output.states), np.zeros_like(output.work)),
+        Output(output.times, np.zeros_like(output.states), np.zeros_like(output.work)), run.kept,
         run.variation, run.watch,
         None if run.series is None else from_state(run.series, system, state),
         None if run.collocation is None else collocation_for(
@@ -286,22 +291,24 @@ def integrate(
     checkpoint: Path | None = None,
     events: Sequence[AnyEvent] = (),
     method: str = "auto",
+    keep_steps: bool = False,
 ) -> Solution:
     """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
     begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, method=method)
-    kept = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
-    if kept is not None:
-        kept.read()
+    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, method=method,
+                keep_steps=keep_steps)
+    stored = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
+    if stored is not None:
+        stored.read()
     ended, result = None, step_loop.RUNNING
     try:
-        result = finish(run, progress, keep=None if kept is None else kept.keep)
+        result = finish(run, progress, keep=None if stored is None else stored.keep)
     except KeyboardInterrupt:
         if not run.outputs:  # nothing was computed that could be kept
             raise
         ended = Status.INTERRUPTED
-        if kept is not None:
-            kept.write()
+        if stored is not None:
+            stored.write()
     statistics: dict[str, Any] = {"method": run.method, **run.statistics,
                                   "seconds": clock.perf_counter() - begin}
     if ended is None:
@@ -314,13 +321,15 @@ def integrate(
     if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
         times = np.append(times, run.time)
         states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
-    counts = run.problem.control.slider_counts
-    if counts.any():
-        states, work = within_limits(system, times, states, counts), work.copy()
-        book_stored(work, stored_in_sliders(system, states, counts))
+    begun, counts = (float(times[0]), run.states[0]), run.problem.control.slider_counts
+    time, *values = (column[: run.kept_rows] for column in run.kept)
+    kept = KeptSteps(time, *booked(system, counts, time, values[0], values[1], begun))
+    kept = replace(kept, work=kept.work[:, :POWER_COUNT].copy()).before(times[-1])
+    states, work = booked(system, counts, times, states, work, begun)
     lost, creep = np.split(work[:, POWER_COUNT:], NODE_POWERS, axis=1)
     return Solution(times, states, work[:, :POWER_COUNT], ended, statistics,
-                    node_friction_work=lost, node_creep_work=creep, events=run.events)
+                    node_friction_work=lost, node_creep_work=creep, events=run.events,
+                    kept=kept if keep_steps else None)
 
 
 def _place(run: Run, ended: Status) -> str:

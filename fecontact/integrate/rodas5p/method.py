@@ -85,6 +85,7 @@ class Data(NamedTuple):
     progress: state.Progress
     room: state.Room
     output: state.Output
+    kept: state.Output
     vary: Vary
     watch: Watch
 
@@ -373,10 +374,9 @@ def _close(step, writes, data):
 
 
 @routine
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """Fill a row of the output."""
-    problem, progress, room, output, vary = (data.problem, data.progress, data.room,
-                                             data.output, data.vary)
+    problem, progress, room, vary = data.problem, data.progress, data.room, data.vary
     time = output.times[row]
     part = (time - step.t) / step.h
     tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
@@ -435,7 +435,7 @@ def _go_on(step, h, data):
 
 
 METHOD = Method("rodas5p", Data, _aim, _attempt, _fill, _go_on, _begin, _resume, _close, _full,
-                _find_end, _stop_at)
+                _find_end, _stop_at, places=2)
 advance = step_loop(METHOD)
 SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Room, state.Output),
               more=lambda modes, nodes: {Variation: {"columns": (0, None)}})

@@ -29,6 +29,8 @@ class Run(StepRun):
         Output times and what belongs to them; rows from ``outputs`` on are not filled yet. Work
         of the powers :data:`fecontact.system.powers.POWERS`, then friction work of each node and
         its part in stick [J].
+    kept : Output
+        The same at times between the outputs; without room if none are kept.
     variation : Vary
         Derivatives that go with the run.
     progress : Progress
@@ -45,6 +47,7 @@ class Run(StepRun):
     progress: Progress
     room: Room
     output: Output
+    kept: Output
     variation: Vary
     watch: Watch
     series: Series | None = None
@@ -91,18 +94,18 @@ class Run(StepRun):
             # Compiled for runs that need it only.
             from fecontact.integrate.series import method as by_series
 
-            data = by_series.Data(self.problem, self.progress, self.output, self.watch,
-                                  self.series)
+            data = by_series.Data(self.problem, self.progress, self.output, self.kept,
+                                  self.watch, self.series)
             loop = by_series.advance_for(self.problem)
         elif self.collocation is not None:
             from fecontact.integrate.collocation import method as by_collocation
 
             data = by_collocation.Data(self.problem, self.progress, self.room, self.output,
-                                       self.collocation, self.variation)
+                                       self.kept, self.collocation, self.variation)
             nodes, _, modes = self.problem.system.rows.shape
             loop = by_collocation.SMALL.of(modes, nodes)
         else:
-            data = Data(self.problem, self.progress, self.room, self.output, self.variation,
-                        self.watch)
+            data = Data(self.problem, self.progress, self.room, self.output, self.kept,
+                        self.variation, self.watch)
             loop = advance_for(self.problem, self.variation)
         return partial(loop, data)

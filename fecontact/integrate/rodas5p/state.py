@@ -6,12 +6,12 @@ import numpy as np
 
 from fecontact.core.records import ANY, allocate
 from fecontact.core.types import Array, Integers
-from fecontact.integrate import bernstein, courses
+from fecontact.integrate import bernstein, courses, step_loop
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import Blocks, near_blocks
 from fecontact.integrate.rodas5p.step_length import LAST_ROOT
-from fecontact.integrate.step_loop import RATES, STEP, TIME
+from fecontact.integrate.step_loop import STEP, TIME
 from fecontact.system.nodes import (
     AXES,
     CONTACT_FIELDS,
@@ -23,7 +23,7 @@ from fecontact.system.nodes import (
     GroundMotion,
     SystemArrays,
 )
-from fecontact.system.powers import WORKS
+from fecontact.system.powers import NODE_POWERS, POWER_COUNT, WORKS
 
 # Entries of Progress.numbers, after those of `step_length`. CAUTIOUS is the length of a step that
 # failed, while what made it fail may still lie ahead, else zero. ENERGY is the largest energy or
@@ -32,8 +32,8 @@ NUMBERS = 9
 SPEED_SCALE, CAUTIOUS, ENERGY, UNFELT = range(LAST_ROOT + 1, NUMBERS)
 # Entries of Progress.counts after those of the step loop: the node at which the error is largest,
 # and switches at one time so far.
-COUNTS = 7
-WORST_NODE, SWITCHES = range(RATES + 1, COUNTS)
+COUNTS = step_loop.COUNTS + 2
+WORST_NODE, SWITCHES = range(step_loop.COUNTS, COUNTS)
 
 
 class Control(NamedTuple):
@@ -166,7 +166,7 @@ class Progress(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Output times (N,), and states (N, size) and work (N, p + 2 n) there."""
+    """Times (N,), and states (N, size) and work (N, p + 2 n) there: outputs, or what is kept."""
 
     times: Annotated[Array, ANY]
     states: Annotated[Array, ANY, SIZE]
@@ -241,6 +241,12 @@ def room_for(
         reduced=stage_solver.reduced_for(modes, nodes, states, dimension),
         scratch=gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1),
         gradients_after=gradients_for(nodes, states, dimension))
+
+
+def output_for(times: Array, size: int, nodes: int) -> Output:
+    """Rows for so many times, to be filled."""
+    return Output(times, np.zeros((len(times), size)),
+                  np.zeros((len(times), POWER_COUNT + NODE_POWERS * nodes)))
 
 
 def progress_for(

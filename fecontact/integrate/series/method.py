@@ -77,6 +77,7 @@ class Data(NamedTuple):
     problem: state.Problem
     progress: state.Progress
     output: state.Output
+    kept: state.Output
     watch: Watch
     series: Series
 
@@ -331,9 +332,9 @@ def _attempt(step, last, smallest, data):
 
 
 @routine
-def _fill(row, step, data):
+def _fill(row, output, step, data):
     """Fill a row of the output."""
-    progress, output, series = data.progress, data.output, data.series
+    progress, series = data.progress, data.series
     m = len(series.q)
     x = (output.times[row] - step.t) / step.unit
     for i in range(m):
@@ -377,7 +378,7 @@ def _stop_at(part, step, data):
 
 
 METHOD = Method("series", Data, _aim, _attempt, _fill, _go_on, full=_full, find_end=_find_end,
-                stop_at=_stop_at)
+                stop_at=_stop_at, places=12)
 advance = step_loop(METHOD)
 SMALL = Sized(partial(step_loop, METHOD),
               (state.Problem, state.Progress, state.Output, Series), FEW)

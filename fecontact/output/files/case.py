@@ -12,11 +12,12 @@ from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.stored import DamagedError, array, from_json, member, reading, text, texts
 from fecontact.integrate.events import Events
+from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.laws.registry import UntrustedError, law_files, trusting
 from fecontact.output.files.dataset import to_pandas, to_xarray
 from fecontact.output.files.frames import frame_indices
-from fecontact.output.files.hdf5 import new_file, open_file
+from fecontact.output.files.hdf5 import new_file, open_file, store_compressed
 from fecontact.output.files.stored_system import store_model, stored_tables
 from fecontact.output.files.vtkhdf import write_vtkhdf
 from fecontact.reduction.modal_basis import ModalBasis
@@ -34,6 +35,9 @@ _STATE = {"time": "s", "modal_coordinates": "kg^0.5 m", "modal_velocities": "kg^
 _OPTIONAL = {"memory": "as the friction law says", "node_friction_work": "J",
              "node_creep_work": "J",
              "held_normal_force": "N", "held_friction_force": "N"}
+# Motion between the outputs.
+_KEPT_FORCES = {"normal_force": "N", "friction_force": "N"}
+_KEPT = {"time": "s", "states": "as y = [q, q', z]", "work": "J"} | _KEPT_FORCES
 # Recorded results of user-defined laws, so that a run can be drawn without their code.
 _OF_LAWS = {"penetration_rate": "m/s", "ground_rate": "m/s", "contact_energy": "J"}
 _CONTACT = {"normal_force": "N", "friction_force": "N", "penetration": "m",
@@ -153,6 +157,8 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
         except UntrustedError as error:
             if of_laws is None:
                 raise
+            # What these laws give between the outputs is not recorded.
+            state.pop("kept", None)
             from fecontact.output.files.recorded_laws import recorded_system
 
             system = recorded_system(basis, model.tables, str(path), state, *of_laws, str(error))
@@ -176,6 +182,8 @@ def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
             if name == "held_friction_force" and basis.dimension == 3:
                 shape = (N, n, 2)
             state[name] = array(stored, name, shape)
+    if "kept" in stored:
+        state["kept"] = _read_kept(member(stored, "kept"), state, m, n)
     if "events" in stored:
         events = member(stored, "events")
         times = array(events, "time", (None,))
@@ -185,6 +193,22 @@ def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
         state["events"] = Events(times, tuple(texts(events, "kind", len(times))), nodes,
                                  array(events, "states", (len(times), None)))
     return state
+
+
+def _read_kept(stored: Any, state: dict[str, Any], m: int, n: int) -> KeptSteps:
+    """What a run has kept between its outputs; ``state`` has the arrays at these."""
+    time = array(stored, "time", (None,))
+    count, outputs = len(time), state["time"]
+    if not ((np.diff(time) > 0.0).all() and (time > outputs[0]).all() and (
+            time < outputs[-1]).all() and not np.isin(time, outputs).any()):
+        raise DamagedError("the times kept between the outputs are not ascending between these")
+    memory = 0 if state.get("memory") is None else state["memory"].shape[1]
+    held = {name: state.get(f"held_{name}") for name in _KEPT_FORCES}
+    return KeptSteps(
+        time, array(stored, "states", (count, 2 * m + memory)),
+        array(stored, "work", (count, len(POWERS))),
+        **{name: array(stored, name, (count, *values.shape[1:]))
+           for name, values in held.items() if values is not None})
 
 
 def _require_states(system: ContactSystem, state: dict[str, Any]) -> None:
@@ -230,6 +254,12 @@ def _write_trajectory(group: Any, trajectory: Trajectory) -> None:
         data.attrs["unit"] = unit
         if name in _IN_SPACE.values():
             data.attrs["component_names"] = list(_TANGENTS)
+    if (steps := trajectory.kept) is not None and len(steps.time):
+        between = group.create_group("kept")
+        for name, unit in _KEPT.items():
+            if (values := getattr(steps, name)) is not None:
+                store_compressed(between, name, values)
+                between[name].attrs["unit"] = unit
     if trajectory.events is not None:
         events = group.create_group("events")
         for name, unit in (("time", "s"), ("node", ""), ("states", "as y = [q, q', z]")):

@@ -58,8 +58,7 @@ def plot_spectrum(
 ) -> "Figure":
     """Plot the spectrum of a quantity of a run, with its peaks.
 
-    It is that of the motion between the outputs, which is computed again where they are too far
-    apart.
+    Where outputs are too far apart, it is that of what the run has kept between them too.
 
     Parameters
     ----------
