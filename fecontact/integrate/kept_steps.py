@@ -78,7 +78,7 @@ class GrowingRows:
 
     def add(self, time: float, state_at: Callable[[float], Array]) -> None:
         """Keep the state at a time, unless it is one of those that are left out by now."""
-        if not self._room:
+        if not self._room or (self._rows and not time > self._rows[-1][0]):
             return
         self._passed += 1
         if self._passed >= self._every:

@@ -65,7 +65,7 @@ def _keep_none(row, step, reached, data):
     """Nothing: no rows are kept between outputs."""
 
 
-def _keeping(fill, places):
+def _keeping(fill: Any, places: int) -> tuple[Any, Any]:
     """The functions by which a loop keeps rows at so many places of each step.
 
     A place is kept unless an output lies between it and the place before. Where the rows have been

@@ -46,7 +46,7 @@ def test_fine_outputs_are_taken_as_they_are():
 def test_histories_that_cannot_be_resolved_are_warned_of():
     run = free_vibration(40)
     assert fastest_period(run) == pytest.approx(1.0 / HERTZ, rel=0.03)
-    strange = replace(run, statistics={})
+    strange = replace(run, kept=None)
     with pytest.warns(ModelWarning, match=r"outputs lie 5\.13 ms apart, .*\(14[0-9.]+ Hz\)"
                                           r".*run with outputs = 4\d\d or more"):
         evenly_sampled_history(strange, "velocity", "C", "y")

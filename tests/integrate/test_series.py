@@ -479,6 +479,6 @@ def test_what_small_systems_take_for_granted(modes, nodes):
     own = runs[0]
     progressed(own, 10**9)
     general = runs[1]
-    advance(Data(general.problem, general.progress, general.output, general.watch,
+    advance(Data(general.problem, general.progress, general.output, general.kept, general.watch,
                  general.series), 10**9)
     assert own.states == pytest.approx(general.states, rel=1e-9, abs=1e-14)

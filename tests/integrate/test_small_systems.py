@@ -83,7 +83,7 @@ def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
     own, other = (run_of(system(modes, nodes), max_step=2e-5) for _ in range(2))
     assert method.advance_for(own.problem, own.variation) is not method.advance
     own.advance(400)
-    method.advance(method.Data(other.problem, other.progress, other.room, other.output,
+    method.advance(method.Data(other.problem, other.progress, other.room, other.output, other.kept,
                                other.variation, other.watch), 400)
     assert own.statistics == other.statistics
     assert own.time == pytest.approx(other.time, rel=1e-12)
