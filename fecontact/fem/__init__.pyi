@@ -6,6 +6,7 @@ from .material import AnisotropicMaterial
 from .material_axes import CylindricalAxes, MaterialAxes
 from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
+from .pretension import PretensionSection, with_pretension
 from .rotation import Rotation
 from .solids.shapes import Cylinder, LapStrip, Plate, Ring, SolidBlock, SphereSegment
 from .supports import HingeSupport
@@ -26,6 +27,7 @@ __all__ = [
     "Plate",
     "PointMass",
     "PointSpring",
+    "PretensionSection",
     "Ring",
     "Rotation",
     "SolidBlock",
@@ -37,4 +39,5 @@ __all__ = [
     "pair_both_faces",
     "pair_faces",
     "stress_of",
+    "with_pretension",
 ]

@@ -272,16 +272,24 @@ def _weighted_nodes(body: _Body, name: str) -> tuple[Integers, Array]:
     nodes = body.group_nodes(name)
     if name not in body.mesh.boundaries:
         return nodes, np.ones(len(nodes))
-    facets = body.facet_nodes(body.mesh.boundaries[name])
+    face = _face(body, name)
     weights = np.zeros(len(body.nodes))
-    np.add.at(weights, facets, Facets(body.nodes, facets).shape_integrals)
+    np.add.at(weights, face.nodes, face.shape_integrals)
     return nodes, weights[nodes]
+
+
+def _face(body: _Body, boundary: str) -> Facets:
+    facets = body.facet_nodes(body.mesh.boundaries[boundary])
+    if body.nodes.shape[1] == 2:
+        # Ends before the middle.
+        facets = facets[:, [0, -1, *range(1, facets.shape[1] - 1)]]
+    return Facets(body.nodes, facets)
 
 
 def _tied(unknowns: Unknowns, one: Tie, name: str) -> Equations:
     d, body = unknowns.d, unknowns.body
-    facets = body.facet_nodes(body.mesh.boundaries[one.independent])
-    face = Facets(body.nodes, facets)
+    face = _face(body, one.independent)
+    facets = face.nodes
     nodes = np.setdiff1d(body.group_nodes(one.dependent), facets)
     reach = one.tolerance or _REACH * float((face.shape_integrals.sum(axis=1) ** (1 / (d - 1))
                                              ).mean())

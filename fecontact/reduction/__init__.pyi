@@ -10,6 +10,7 @@ from .assembly.nonlinear_springs import (
     PolynomialSpring,
 )
 from .assembly.point_pairing import PointPairing
+from .assembly.tightened import TightenedBolts, tightened
 from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
@@ -41,6 +42,7 @@ __all__ = [
     "PolynomialSpring",
     "ReductionQuality",
     "Spring",
+    "TightenedBolts",
     "Weld",
     "assembled_basis",
     "bodies_convergence",
@@ -53,4 +55,5 @@ __all__ = [
     "polynomial_stiffness",
     "reduce_bodies",
     "rows_from_dofs",
+    "tightened",
 ]

@@ -10,6 +10,7 @@ from fecontact.core.tables import convert_fields, from_table, located, shown, to
 from fecontact.core.types import Coordinates
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.groups import Box
+from fecontact.fem.pretension import PretensionSection, with_pretension
 from fecontact.fem.shapes import Beam, Block, Pendulum
 from fecontact.fem.solids.shapes import (
     Cylinder,
@@ -44,6 +45,9 @@ class MeshFile:
         Points to name: a group of the file, or the node nearest to [x, y], of solids [x, y, z] [m].
     part : str, optional
         One of several bodies in the file: the name of a group of its cells.
+    pretension : mapping of name to table
+        ``[geometry.pretension.NAME]``: sections of bolts; NAME is that of the control point, on
+        which a force along x is the tension in the bolt.
     """
 
     file: str
@@ -52,6 +56,7 @@ class MeshFile:
     points: Mapping[str, str | Coordinates] = field(default_factory=dict)
 
     part: str | None = None
+    pretension: Mapping[str, PretensionSection] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         convert_fields(self)
@@ -61,9 +66,12 @@ class MeshFile:
         """Read the mesh; ``folder`` is that of the study file."""
         from fecontact.fem.mesh_files import read_mesh
 
-        return read_mesh(folder / self.file, scale=self.scale,
+        mesh = read_mesh(folder / self.file, scale=self.scale,
                          boundaries=self.boundaries or None, points=self.points or None,
                          part=self.part)
+        for name, section in self.pretension.items():
+            mesh = with_pretension(mesh, name, section)
+        return mesh
 
 
 Geometry = Beam | Pendulum | Block | SolidShape | MeshFile

@@ -27,9 +27,6 @@ _OPPOSITE, _PART = -0.7, 0.25
 _STIFFNESS = 1e13  # of a proposed contact [Pa/m]: a deflection of 0.1 um under 1 MPa
 _CONSTRAINTS: Mapping[str, type] = {
     "ties": Tie, "couplings": Coupling, "equations": LinearEquation}
-_REMEDIES = {
-    "PRE-TENSION SECTION": "cut the bolt there, and give its force in [load] as opposite pressures "
-                           "on both faces of the cut"}
 _MOST_NODES = 16  # of a proposed interface
 
 
@@ -141,7 +138,8 @@ class Imported:
                  if not touching & _rows(mesh.boundaries.get(name, np.empty((0, 2), np.int64)))}
         references = _references(mesh)
         fixed: dict[str, str] = {}
-        for word, components in self.contents.supports:
+        for given, components in self.contents.supports:
+            word = self.contents.single.get(given, given)
             name = references.get(word.upper()) or known.get(word.upper())
             held = " ".join(_in_plane(one) if mesh.dimension == 2 else one
                             for one in components.split())
@@ -157,7 +155,8 @@ class Imported:
         """Forces and moments at reference points of bodies, and these points."""
         forces: list[dict[str, object]] = []
         points: dict[str, set[str]] = {body: set() for body in bodies}
-        for word, component, value in self.contents.forces:
+        for given, component, value in self.contents.forces:
+            word = self.contents.single.get(given, given)
             for body in bodies:
                 mesh = self.meshes[body]
                 single = {name.upper(): name for name, nodes in mesh.points.items()
@@ -226,8 +225,6 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
                      f"second-order hexahedra, or bricks with incompatible modes with degree = 1, "
                      f"which are stiffer than hourglass control on coarse meshes, by 2 % in "
                      f"frequency for the Brake-Reuss beam.")
-    notes += [f"*{keyword} is not read; {remedy}." for keyword, remedy in _REMEDIES.items()
-              if contents.keywords[keyword]]
     interfaces: list[tuple[str, str]] = []
     for face, other in _facing(meshes, contents):
         try:

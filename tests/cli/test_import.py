@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bolted_clamp import clamp_deck, clamp_mesh
 from meshes_for_tests import rectangle
 from solid_blocks import block_mesh
 
@@ -146,11 +147,14 @@ def test_pieces_of_one_body(place):
     assert found.interfaces == (("body.A-top", "body.B-contact"),)
 
 
-def test_remedies_for_what_is_not_read(place):
-    (place / "a.inp").write_text(deck(*STACK, more="*PRE-TENSION SECTION, SURFACE=S, NODE=1\n"))
-    notes = imported("a.inp").notes
-    assert any(note.startswith("*PRE-TENSION SECTION is not read; cut the bolt there, and give its "
-                               "force in [load]") for note in notes)
+def test_the_force_of_a_bolt(place):
+    """That on the control node of its section, which the deck names by its number."""
+    (place / "a.inp").write_text(clamp_deck(clamp_mesh(), {})
+                                 + "*BOUNDARY\nHELD, 1, 3\n*STEP\n*STATIC\n*CLOAD\n9001, 1, 2e4\n")
+    study = Study.from_toml(imported("a.inp").toml(place), place / "study.toml")
+    force, = study.load.forces
+    assert (force.point, force.component, force.signal.value) == ("BOLT", "x", 2e4)
+    assert (study.body.fixed, study.basis.loads) == ({"HELD": "xyz"}, ("BOLT",))
 
 
 def test_a_single_body_and_units(cli, place):

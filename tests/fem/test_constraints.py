@@ -109,6 +109,26 @@ def test_nodes_that_coincide_make_the_whole_block():
     assert tied.expansion.shape[1] == whole.expansion.shape[1]
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+def test_plane_nodes_that_coincide_make_the_whole_plate(degree):
+    whole = ElasticBody(rectangle(0.2, 0.1, 4, 2), STEEL, degree=degree)
+    tied = ElasticBody(cut_plate((2, 2), (2, 2), TIE), STEEL, degree=degree)
+    assert eigenfrequencies_hz(tied, 9)[3:] == pytest.approx(
+        eigenfrequencies_hz(whole, 9)[3:], rel=1e-9)
+
+
+def test_shares_of_a_plane_face_are_those_of_its_length():
+    """The mean of u_y = x^2 over a side of two quadratic elements is L^2 / 3."""
+    mesh = rectangle(0.1, 0.1, 2, 2)
+    body = ElasticBody(Mesh(mesh.nodes, mesh.cells, mesh.boundaries, constraints=[
+        Coupling("top", "hub", (0.05, 0.1), "distributing")]), STEEL)
+    moved = np.column_stack([0.0 * body.nodes[:, 0], body.nodes[:, 0] ** 2]).ravel()
+    mean, turn = (body.motion_rows("hub") @ moved)[1:]
+    assert mean == pytest.approx(0.1**2 / 3.0, rel=1e-12)
+    # int (x - L/2) x^2 dx / int (x - L/2)^2 dx = L
+    assert turn == pytest.approx(0.1, rel=1e-10)
+
+
 def test_a_beam_cut_in_two_and_tied_across_other_cells_is_the_whole_one():
     """Fixed at one end: supports, dependent nodes and their independent ones together."""
     whole = ElasticBody(block_mesh((8, 4, 2)), STEEL, fixed={"left": "xyz"})

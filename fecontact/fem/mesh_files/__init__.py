@@ -7,6 +7,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_constraints, named_points
 from fecontact.fem.mesh_files.med import read_med
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
+from fecontact.fem.pretension import cut_along
 
 _BYTES_OF_A_GRID_POINT = 200.0  # coordinates and a cell of eight nodes, with copies
 
@@ -48,8 +50,8 @@ def read_mesh(
     (Abaqus, MED), elements by property number (Nastran). Points are physical points, node sets,
     groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
     second-order elements are kept, coincident nodes merged, nodes without a cell left out. Ties,
-    couplings and equations of Abaqus files become ``mesh.constraints``, whose nodes are not merged;
-    masses, springs and dashpots become ``mesh.attachments``.
+    couplings, equations and sections of bolts of Abaqus files become ``mesh.constraints``, whose
+    nodes are not merged; masses, springs and dashpots become ``mesh.attachments``.
     Sections of Abaqus files become ``mesh.materials``, in SI units if the file's forces are in N
     and its mass fits to them, such as tonnes beside mm.
 
@@ -123,11 +125,17 @@ def _mesh(
 ) -> Mesh:
     """Mesh of the contents of a file, with the names of its groups and those given."""
     mesh, groups = body_mesh(raw, scale)
-    return Mesh(mesh.nodes, mesh.cells, named_boundaries(mesh, groups, boundaries),
+    made = Mesh(mesh.nodes, mesh.cells, named_boundaries(mesh, groups, boundaries),
                 named_points(mesh, groups, points), mesh.curved_edges, mesh.curved_middles,
                 named_constraints(groups.constraints, boundaries, points), mesh.cell_groups,
-                groups.materials, mesh.bricks,
-                named_constraints(groups.attachments, boundaries, points))
+                groups.materials, mesh.bricks)
+    for surface, control, direction in raw.sections:
+        if surface in groups.inner:
+            made = cut_along(made, control, groups.inner[surface], direction)
+        elif surface in made.boundaries:
+            raise MeshError(f"The surface '{surface}' of a section of a bolt lies on the outline; "
+                            f"give faces inside the bolt.")
+    return replace(made, attachments=named_constraints(groups.attachments, boundaries, points))
 
 
 def write_mesh(mesh: Mesh, path: str | Path) -> None:

@@ -27,7 +27,13 @@ from fecontact.fem.mesh_files.abaqus_attachments import (
     is_point_element,
     refused,
 )
-from fecontact.fem.mesh_files.abaqus_constraints import READ, Block, Names, constraints_of
+from fecontact.fem.mesh_files.abaqus_constraints import (
+    READ,
+    Block,
+    Names,
+    constraints_of,
+    sections_of,
+)
 from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
 from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
@@ -49,7 +55,7 @@ _FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 
 # Keywords that stiffen or load the mesh by other means than its plane and solid elements.
 _UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT",
-           "PRE-TENSION SECTION", "FASTENER", "CONNECTOR SECTION", "JOINT")
+           "FASTENER", "CONNECTOR SECTION", "JOINT")
 _GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
 _KINDS = {"NSET": "nodes", "ELSET": "elements"}
 _PARALLEL = 1e-9  # sine of the angle between directions that span no plane
@@ -190,7 +196,8 @@ def _constrained(assembly: "_Assembly", bodies: list["_Instance"]) -> tuple[RawM
             unread.append(what)
         else:
             joined.attachments += attachments_of(keyword, options, lines, elements, names)
-    joined.apart = bool(joined.constraints)
+    joined.sections = list(sections_of(assembly.constraints, names))
+    joined.apart = bool(joined.constraints or joined.sections)
     joined.separate &= not _connected(joined, joined.constraints, first[: len(bodies)])
     return joined, unread
 

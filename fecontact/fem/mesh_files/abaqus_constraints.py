@@ -13,8 +13,9 @@ from fecontact.fem.mesh_files.abaqus_keywords import Options
 
 Block = tuple[str, Options, list[str]]
 # Keywords that constrain displacements, and those that go on with the one before.
-READ = ("EQUATION", "TIE", "COUPLING", "KINEMATIC COUPLING", "MPC", "RIGID BODY", "TRANSFORM",
-        "KINEMATIC", "DISTRIBUTING")
+SECTION = "PRE-TENSION SECTION"
+READ = (SECTION, "EQUATION", "TIE", "COUPLING", "KINEMATIC COUPLING", "MPC", "RIGID BODY",
+        "TRANSFORM", "KINEMATIC", "DISTRIBUTING")
 _MPC = ("BEAM", "TIE", "PIN")
 # Options that change what a keyword means.
 _REFUSED = {"TIE": ("CYCLIC SYMMETRY",), "COUPLING": ("ORIENTATION", "INFLUENCE RADIUS"),
@@ -80,9 +81,15 @@ class Names:
         return self.name_of(int(nodes[0]), word), self.place(int(nodes[0]))
 
     def name_of(self, node: int, word: str) -> str:
-        """Name of the group of one node, which is made if there is none."""
+        """Name of the group of one node, which is made if there is none.
+
+        A node that a deck gives by its number has the name of a set of this node alone, if any.
+        """
         if node not in self.references:
-            name = f"node {word}" if whole_number(word) is not None else word
+            name = word
+            if whole_number(word) is not None:
+                name = next((group for group, nodes in self.groups.items()
+                             if len(nodes) == 1 and nodes[0] == node), f"node {word}")
             self.references[node] = name
             self.groups.setdefault(name, np.array([node]))
         return self.references[node]
@@ -123,12 +130,39 @@ def constraints_of(blocks: list[Block], names: Names) -> tuple[list[Constraint],
                 found += _rigid_body(options, names)
             case "EQUATION":
                 found += _equations(lines, names)
+            case "PRE-TENSION SECTION" if "SURFACE" not in options:
+                unread.append(f"*{SECTION} without SURFACE")
             case "MPC":
                 for line in lines:
                     more = _mpc(line, names)
                     found += more
                     unread += [] if more else [f"*MPC {words_of(line)[0]}"]
     return found, unread
+
+
+def sections_of(
+    blocks: list[Block], names: Names
+) -> Iterator[tuple[str, str, list[float] | None]]:
+    """Surface, control node and direction (None for the normal) of each section of a bolt.
+
+    Raises
+    ------
+    MeshError
+        For unknown nodes and surfaces, and a direction of another number of components.
+    """
+    for keyword, options, lines in blocks:
+        if keyword != SECTION or "SURFACE" not in options:
+            continue
+        where = f"*{SECTION} of '{options['SURFACE']}'"
+        if "NODE" not in options:
+            raise MeshError(f"{where} has no control node; give NODE= on its line.")
+        surface = names.group_of(options["SURFACE"], where, True)
+        control, _ = names.reference(options["NODE"], where)
+        values = [number_of(word, where) for line in lines for word in words_of(line)]
+        if values and len(values) < (2 if names.planar else 3):
+            raise MeshError(f"{where} has a direction of {len(values)} components; give all of "
+                            f"them, or none.")
+        yield surface, control, values[: 2 if names.planar else 3] or None
 
 
 def words_of(line: str) -> list[str]:

@@ -1,7 +1,7 @@
 """Contents of an Abaqus or CalculiX deck: keywords that are read, skipped, and element types."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -37,6 +37,8 @@ class DeckContents:
         motion that it does, with spaces between them: x y z phi_x phi_y phi_z.
     forces : tuple of (str, str, float)
         Sets on which ``*CLOAD`` acts in the first step, the component and the value.
+    single : mapping of str to str
+        Sets of one node, by its number.
     """
 
     keywords: Counter[str] = field(default_factory=Counter)
@@ -44,6 +46,7 @@ class DeckContents:
     pairs: tuple[tuple[str, str], ...] = ()
     supports: tuple[tuple[str, str], ...] = ()
     forces: tuple[tuple[str, str, float], ...] = ()
+    single: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def loads(self) -> dict[str, int]:
@@ -78,13 +81,19 @@ def deck_contents(path: Path) -> DeckContents:
     pairs: list[tuple[str, str]] = []
     supports: dict[str, set[int]] = {}
     forces: list[tuple[str, str, float]] = []
+    single: dict[str, str] = {}
     for keyword, options, lines in deck.blocks():
         rows = [[word.strip() for word in line.split(",")] for line in lines] if (
-            keyword in ("CONTACT PAIR", "BOUNDARY", "CLOAD")) else []
+            keyword in ("CONTACT PAIR", "BOUNDARY", "CLOAD", "NSET")
+            or (keyword == "NODE" and "NSET" in options)) else []
         if keyword == "ELEMENT":
             # Data of an element go on after a comma at the end of a line.
             elements[options.get("TYPE", "").upper()] += sum(
                 not line.endswith(",") for line in lines)
+        elif "NSET" in options and len(rows) == 1 and "GENERATE" not in options:
+            words = rows[0][:1] if keyword == "NODE" else [word for word in rows[0] if word]
+            if len(words) == 1:
+                single.setdefault(words[0], options["NSET"])
         elif keyword == "CONTACT PAIR":
             pairs += [(row[0], row[1]) for row in rows if len(row) > 1]
         elif keyword == "BOUNDARY" and not deck.keywords["END STEP"]:
@@ -98,7 +107,7 @@ def deck_contents(path: Path) -> DeckContents:
     return DeckContents(
         deck.keywords, elements, tuple(pairs),
         tuple((name, " ".join(COMPONENTS[dof - 1] for dof in sorted(held)))
-              for name, held in supports.items() if held), tuple(forces))
+              for name, held in supports.items() if held), tuple(forces), single)
 
 
 COMPONENTS = ("x", "y", "z", "phi_x", "phi_y", "phi_z")

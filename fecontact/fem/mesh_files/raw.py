@@ -66,6 +66,8 @@ class RawMesh:
         In the unit of the file; equations name nodes by their rows in ``points``.
     attachments : list of PointMass or PointSpring
         In units of the file, with forces in N; they name nodes by their rows in ``points``.
+    sections : list of (str, str, list of floats or None)
+        Surface, control node and direction of sections of bolts; None for the normal.
     apart : bool
         Whether nodes at one place are different ones.
     chosen : str
@@ -88,6 +90,7 @@ class RawMesh:
     separate: bool = False
     constraints: list[Constraint] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
+    sections: list[tuple[str, str, list[float] | None]] = field(default_factory=list)
     apart: bool = False
     chosen: str = ""
     cell_sets: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
@@ -148,7 +151,7 @@ class Groups:
 
     ``empty`` are the names of groups without nodes, edges or faces of the body, ``cells`` those of
     groups of cells. ``constraints`` and ``attachments`` are in SI units, with nodes of the mesh;
-    ``materials`` are those of groups of cells.
+    ``materials`` are those of groups of cells. ``inner`` are groups of sides between cells.
     """
 
     boundaries: dict[str, Integers]
@@ -158,6 +161,7 @@ class Groups:
     constraints: tuple[Constraint, ...] = ()
     attachments: tuple[Attachment, ...] = ()
     materials: dict[str, AnyMaterial] = field(default_factory=dict)
+    inner: dict[str, Integers] = field(default_factory=dict)
 
 
 def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
@@ -276,6 +280,7 @@ def on_outline(mesh: Mesh, chosen: NDArray[np.bool_]) -> Integers:
 def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
     boundaries: dict[str, Integers] = {}
     points: dict[str, Integers] = {}
+    inner: dict[str, Integers] = {}
     row = {frozenset(facet): k for k, facet in enumerate(mesh.outline.tolist())}
     for name, group in raw.nodes.items():
         nodes = np.unique(number[group])
@@ -308,6 +313,7 @@ def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
             boundaries[name] = mesh.outline[outer]
         elif rows:
             points.setdefault(name, np.unique(np.concatenate(met)))
+            inner[name] = np.concatenate([one.reshape(-1, mesh.outline.shape[1]) for one in met])
     if mesh.dimension == 3:
         for name, group in raw.edges.items():
             nodes = np.unique(number[group[:, :2]])
@@ -315,7 +321,8 @@ def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
                 points.setdefault(name, nodes[nodes >= 0])
     kept = {*boundaries, *points}
     empty = tuple(name for name in (*raw.nodes, *raw.edges, *sides) if name not in kept)
-    return Groups(boundaries, points, empty, tuple(name for name in raw.parts if name not in kept))
+    return Groups(boundaries, points, empty,
+                  tuple(name for name in raw.parts if name not in kept), inner=inner)
 
 
 def _faces(raw: RawMesh) -> dict[str, list[Integers]]:
