@@ -6,6 +6,7 @@ from .output.plots.analysis import (
     plot_spectrum,
 )
 from .output.plots.bifurcation_diagram import plot_branches
+from .output.plots.campbell import plot_campbell
 from .output.plots.contact_map import plot_contact_map
 from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.fields import plot_stress
@@ -37,6 +38,7 @@ __all__ = [
     "plot_basins",
     "plot_branches",
     "plot_buckling",
+    "plot_campbell",
     "plot_contact_map",
     "plot_convergence",
     "plot_eigenvalues",

@@ -1,4 +1,5 @@
 from .buckling import BucklingLoads, buckling_loads
+from .campbell import CampbellDiagram, campbell
 from .comparison import Comparison, compare_runs
 from .complex_modes import ComplexModes, complex_modes, prestressed_modes
 from .histories import History, history
@@ -26,6 +27,7 @@ from .spectra import (
 
 __all__ = [
     "BucklingLoads",
+    "CampbellDiagram",
     "Comparison",
     "ComplexModes",
     "History",
@@ -41,6 +43,7 @@ __all__ = [
     "Strobe",
     "amplitude_spectrum",
     "buckling_loads",
+    "campbell",
     "compare_runs",
     "complex_modes",
     "count_periods",

@@ -33,6 +33,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.mesh,
     study.modes,
     turning.buckling,
+    turning.campbell,
     study.preload,
     study.run,
     study.wear,

@@ -1,41 +1,43 @@
-"""Rotation of a plane body: Coriolis matrix, centrifugal force and stiffness of its stress."""
+"""Rotation of a body about an axis: Coriolis matrix, centrifugal force and its softening."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
-from fecontact.core.checks import as_floats, is_numeric
+from fecontact.core.checks import as_direction, as_place, is_numeric
 from fecontact.core.errors import InputError, require_finite, shown
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 
 
 @dataclass(frozen=True)
 class Rotation:
-    r"""Rotation of a plane body at constant speed about a point of its plane.
+    r"""Rotation of a body at constant speed about an axis, of a plane body about a point.
 
     Displacements u are those in the frame that rotates with the body; supports, ground, drive and
-    loads rotate with it. With places X, the speed Omega and the centre c
+    loads rotate with it. With places X, the speed Omega, the axis e through c, S u = e x u and
+    P = -S S, which takes the part across the axis,
 
-    .. math:: M u'' + 2 \Omega M J u' + (K + K_\sigma - \Omega^2 M) u = \Omega^2 M (X - c),
-        \quad J = \begin{bmatrix} 0 & -1 \\ 1 & 0 \end{bmatrix}
+    .. math:: M u'' + 2 \Omega M S u' + (K + K_\sigma - \Omega^2 M P) u = \Omega^2 M P (X - c)
 
     Parameters
     ----------
     speed : float
-        Omega, positive counter-clockwise [rad/s].
-    centre : (x, y)
-        The point that does not move [m].
+        Omega, positive counter-clockwise, seen against the axis [rad/s].
+    centre : (x, y) or (x, y, z)
+        c, a point that does not move; two numbers in a solid have z = 0 [m].
     coriolis : bool
-        Coriolis forces, the skew damping ``2 Omega M J``.
+        Coriolis forces, the skew damping ``2 Omega M S``.
     centrifugal_load : bool
         The centrifugal force on the undeformed body, which stretches it.
     spin_softening : bool
-        What the centrifugal force adds with the displacement, ``-Omega^2 M u``.
+        What the centrifugal force adds with the displacement, ``-Omega^2 M P u``.
     stress_stiffening : bool
         The geometric stiffness K_sigma of the stress under the centrifugal force.
+    axis : (x, y, z)
+        e, of any length above zero, of solids; in the plane z.
 
     Raises
     ------
@@ -44,33 +46,58 @@ class Rotation:
     """
 
     speed: Annotated[float, Unit("rad/s")]
-    centre: Annotated[tuple[float, float], Unit("m")] = (0.0, 0.0)
+    centre: Annotated[Coordinates, Unit("m")] = (0.0, 0.0)
     coriolis: bool = True
     centrifugal_load: bool = True
     spin_softening: bool = True
     stress_stiffening: bool = True
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
         require_finite("Rotation", speed=self.speed)
-        centre = as_floats(self.centre, "centre") if is_numeric(self.centre) else np.zeros(0)
-        if centre.shape != (2,) or not np.isfinite(centre).all():
-            raise InputError(f"Rotation: centre = {shown(self.centre)} must be two finite numbers, "
-                             f"x and y [m].")
-        object.__setattr__(self, "centre", tuple(centre.tolist()))
+        object.__setattr__(self, "centre", as_place(
+            self.centre if is_numeric(self.centre) else (), "Rotation: centre"))
         for name in ("coriolis", "centrifugal_load", "spin_softening", "stress_stiffening"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError(f"Rotation: {name} = {getattr(self, name)!r} must be true or "
                                  f"false.")
+        object.__setattr__(self, "axis", as_direction(
+            self.axis if is_numeric(self.axis) else (), "Rotation: axis"))
+        if len(self.axis) != 3:
+            raise InputError(f"Rotation: axis = {shown(self.axis)} must have three components, x, "
+                             f"y and z.")
+
+    def at(self, body: ElasticBody) -> tuple[Array, Array]:
+        """Matrix S (d, d) and centre c (d,) in the space of a body.
+
+        InputError for an axis or centre that a plane body cannot have.
+        """
+        d = body.dimension
+        if d == 2 and (len(self.centre) != 2 or self.axis != (0.0, 0.0, 1.0)):
+            raise InputError("Rotation: a plane body turns about z and a centre (x, y); leave axis "
+                             "and the third number out.")
+        x, y, z = self.axis
+        S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return S[:d, :d], np.array([*self.centre, 0.0][:d])
 
 
-def coriolis_matrix(body: ElasticBody) -> Any:
-    """``2 M J``, skew, sparse (2 N, 2 N): the Coriolis matrix per speed, without supports [kg]."""
+def coriolis_matrix(body: ElasticBody, rotation: Rotation) -> Any:
+    """``2 M S``, skew, sparse (d N, d N): the Coriolis matrix per speed, without supports [kg]."""
     import scipy.sparse as sp
 
-    return sp.csc_array(sp.kron(body.component_mass, np.array([[0.0, -2.0], [2.0, 0.0]])))
+    return sp.csc_array(sp.kron(body.component_mass, 2.0 * rotation.at(body)[0]))
 
 
-def centrifugal_force(body: ElasticBody, centre: tuple[float, float]) -> Array:
-    """``M (X - c)`` (2 N,): the centrifugal force per squared speed, without supports [kg m]."""
-    return np.asarray(body.mass @ (body.nodes - np.array(centre)).ravel())
+def softening_matrix(body: ElasticBody, rotation: Rotation) -> Any:
+    """``M P``, sparse (d N, d N): what softens the stiffness per squared speed [kg]."""
+    import scipy.sparse as sp
 
+    S, _ = rotation.at(body)
+    return sp.csc_array(sp.kron(body.component_mass, -S @ S))
+
+
+def centrifugal_force(body: ElasticBody, rotation: Rotation) -> Array:
+    """``M P (X - c)`` (d N,): the centrifugal force per squared speed, without supports [kg m]."""
+    S, centre = rotation.at(body)
+    across = (centre - body.nodes) @ (S @ S)
+    return np.asarray(body.component_mass @ across).ravel()

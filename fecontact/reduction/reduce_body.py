@@ -47,7 +47,6 @@ from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.prestress import (
     coupled,
     geometric_stiffness,
-    refuse_circles,
     resists_rotation,
 )
 from fecontact.reduction.rotating import modal_rotation
@@ -104,7 +103,7 @@ def modal_basis(
     loads : sequence of 'gravity' or place
         Adds static responses to gravity or loads (also moments at reference points).
     rotation : Rotation, optional
-        Of the plane body: displacements are those in its frame, modes those at rest.
+        Displacements are those in the frame that rotates with the body, modes those at rest.
     prestress : BodyFields, optional
         Static state whose stress stiffens the body; see :mod:`fecontact.reduction.prestress`.
     rows : sequence of sparse (k, d N) arrays
@@ -134,13 +133,6 @@ def modal_basis(
     if not 0.0 <= tolerance < 1.0:
         raise InputError(f"tolerance = {tolerance!r} must be zero or above, and below one.")
     d = body.dimension
-    if rotation is not None and d == 3:
-        raise InputError("rotation is that of plane bodies; leave it out for a solid.")
-    if rotation is not None:
-        refuse_circles(body, "rotation")
-        if body.added:
-            raise InputError("rotation is that of bodies without masses and springs at points; "
-                             "leave it out, or give attachments = ().")
     face = contact_groups(body, contact, contact_nodes)
     named = [_point(body, place, name) for name, place in (("B", B), ("C", C))]
     further = [place_rows(body, place, name) for name, place in points.items()]

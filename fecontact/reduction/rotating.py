@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
@@ -11,9 +12,11 @@ from fecontact.fem.rotation import (
     Rotation,
     centrifugal_force,
     coriolis_matrix,
+    softening_matrix,
 )
 from fecontact.fem.stress_stiffness import stress_stiffness
 from fecontact.reduction.eigenmodes import FreeSystem
+from fecontact.reduction.prestress import refuse_circles
 
 
 @read_only_arrays
@@ -24,7 +27,7 @@ class ModalRotation:
     Attributes
     ----------
     speed : float
-        Angular speed W of the body and its frame, positive counter-clockwise [rad/s].
+        Angular speed W of the body and its frame [rad/s].
     coriolis : (m, m) array
         Skew; ``W coriolis`` is part of the damping.
     stiffening : (m, m) array
@@ -43,21 +46,31 @@ class ModalRotation:
 def modal_rotation(
     body: ElasticBody, system: FreeSystem, rotation: Rotation, shapes: Array
 ) -> ModalRotation:
-    """The terms of a rotation in mass-normalised shapes (2 N, m) of the body at rest.
+    """The terms of a rotation in mass-normalised shapes (d N, m) of the body at rest.
 
     The stress is that of the linear static response to the centrifugal force; where supports do
     not balance it, the inertia of the rigid motion does.
+
+    Raises
+    ------
+    InputError
+        For couplings, masses and springs at points, and an axis that a plane body cannot have.
     """
+    refuse_circles(body, "rotation")
+    if body.added:
+        raise InputError("rotation is that of bodies without masses and springs at points; leave "
+                         "it out, or give attachments = ().")
     m = shapes.shape[1]
-    force = centrifugal_force(body, rotation.centre)
+    force = centrifugal_force(body, rotation)
     coriolis, stiffening, load = np.zeros((m, m)), np.zeros((m, m)), np.zeros(m)
     if rotation.coriolis:
-        coriolis = shapes.T @ (coriolis_matrix(body) @ shapes)
+        coriolis = shapes.T @ (coriolis_matrix(body, rotation) @ shapes)
         coriolis = 0.5 * (coriolis - coriolis.T)
     if rotation.centrifugal_load:
         load = shapes.T @ force
     if rotation.spin_softening:
-        stiffening -= np.eye(m)
+        softening = shapes.T @ (softening_matrix(body, rotation) @ shapes)
+        stiffening -= 0.5 * (softening + softening.T)
     if rotation.stress_stiffening:
         stiffening += _stress_stiffening(body, system, force, shapes)
     return ModalRotation(rotation.speed, coriolis, stiffening, load)
@@ -67,18 +80,19 @@ def _stress_stiffening(
     body: ElasticBody, system: FreeSystem, force: Array, shapes: Array
 ) -> Array:
     """Geometric stiffness (m, m) of the stress under a force, and of hinges under its reactions."""
-    E = body.expansion
+    E, d = body.expansion, body.dimension
     stretched = E @ system.deflection(E.T @ force)
     geometric = shapes.T @ (stress_stiffness(body, stretched) @ shapes)
     stiffening = np.asarray(0.5 * (geometric + geometric.T))
     rigid = E @ (system.rigid @ (system.rigid.T @ (E.T @ force)))
-    reaction = (body.stiffness @ stretched - force + body.mass @ rigid).reshape(-1, 2)
-    for nodes, centre, *_ in body.hinges:
+    reaction = (body.stiffness @ stretched - force + body.mass @ rigid).reshape(-1, d)
+    for nodes, centre, axis in body.hinges:
         # Nodes at r run on circles: turned by an angle a they also move by -a^2 r / 2.
         arm = body.nodes[nodes] - centre
-        motion = shapes.reshape(-1, 2, shapes.shape[1])[nodes]
-        angle = np.einsum("i,im->m", arm[:, 0], motion[:, 1]) - np.einsum(
-            "i,im->m", arm[:, 1], motion[:, 0])
-        angle /= (arm**2).sum()
+        if d == 3:
+            arm = arm - np.outer(arm @ axis, axis)
+        turned = np.column_stack([-arm[:, 1], arm[:, 0]]) if d == 2 else np.cross(axis, arm)
+        motion = shapes.reshape(-1, d, shapes.shape[1])[nodes]
+        angle = np.einsum("ik,ikm->m", turned, motion) / (arm**2).sum()
         stiffening -= (reaction[nodes] * arm).sum() * np.outer(angle, angle)
     return stiffening

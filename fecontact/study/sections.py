@@ -63,7 +63,8 @@ class BodySettings:
         that turns about its centre; 'hinge_x', 'hinge_y', 'hinge_z' name the axis in a solid.
         At reference points of couplings also 'clamped', or components such as 'x y phi_z'.
     rotation : Rotation, optional
-        ``[body.rotation]``: the body rotates at a constant speed about a point of its plane.
+        ``[body.rotation]``: the body rotates at a constant speed about an axis, of a plane body
+        about a point of its plane.
     """
 
     material: str | None = None
@@ -129,7 +130,7 @@ class BodySettings:
         """
         if mesh.dimension == 3:
             usual = BodySettings()
-            for key in ("thickness", "plane", "rotation"):
+            for key in ("thickness", "plane"):
                 if (value := getattr(self, key)) != getattr(usual, key):
                     raise InputError(f"ElasticBody: {key} = {shown(plain(value))} is for plane "
                                      f"bodies, but the mesh is that of a solid; leave it out.")

@@ -148,6 +148,21 @@ class ComplexModes(Summarised):
         return self.frequencies_hz[self.grows]
 
 
+def followed(eigenvalues: ComplexArray) -> ComplexArray:
+    """Eigenvalues (N, d), sorted so that each column follows one mode from point to point.
+
+    Each is taken to go on in a straight line, so that lines that cross stay apart.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    result = eigenvalues.copy()
+    for k in range(1, len(result)):
+        ahead = 2.0 * result[k - 1] - result[k - 2] if k > 1 else result[0]
+        distance = np.abs(ahead[:, None] - eigenvalues[k][None, :])
+        result[k] = eigenvalues[k][linear_sum_assignment(distance)[1]]
+    return result
+
+
 def _biorthonormal(
     left: ComplexArray, right: ComplexArray, eigenvalues: ComplexArray, near: float
 ) -> ComplexArray:

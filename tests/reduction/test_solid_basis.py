@@ -8,7 +8,6 @@ from fecontact import InputError, Material, modal_basis
 from fecontact.fem.body_forces import boundary_forces
 from fecontact.fem.contact_face import contact_groups
 from fecontact.fem.faces.surface import Surface
-from fecontact.fem.rotation import Rotation
 from fecontact.io import read_basis, write_basis
 from fecontact.reduction import BasisReport, ModeShapes, mode_convergence
 from fecontact.reduction.eigenmodes import strain_energies
@@ -175,8 +174,6 @@ def test_compliance_converges_with_the_mesh_and_the_modes():
 
 def test_what_solids_do_not_have_is_refused():
     body = block_body((2, 1, 1))
-    with pytest.raises(InputError, match="rotation is that of plane bodies"):
-        modal_basis(body, 6, rotation=Rotation(100.0))
     with pytest.raises(InputError, match=r"rows of shape \(3, 4\) must be \(k, 135\)"):
         modal_basis(body, 6, rows=[np.zeros((3, 4))])
     with pytest.raises(InputError, match=r"coordinates x, y, z"):

@@ -314,7 +314,6 @@ def test_keys_of_space_in_a_plane_study(changes, message):
     ({"body.thickness": 0.01}, r"\[body\]: thickness = 0\.01 is for plane bodies, but the mesh is "
                                r"that of a solid; leave it out"),
     ({"body.plane": "strain"}, r"\[body\]: plane = \"strain\" is for plane bodies"),
-    ({"body.rotation": {"speed": 1.0}}, r"\[body\]: rotation = .* is for plane bodies"),
     ({"load.gravity": [0.0, -9.81]}, r"\[load\]: gravity = \[0\.0, -9\.81\] is for plane bodies, "
                                      r".*; give the accelerations along x, y and z"),
     ({"load.forces": [{"component": "phi", "signal": {"law": "constant", "value": 1.0}}]},

@@ -1,4 +1,4 @@
-"""Commands on a body under stress: ``buckling``."""
+"""Commands on a body under stress, and on one that rotates: ``buckling``, ``campbell``."""
 
 from typing import Annotated
 
@@ -47,3 +47,59 @@ def buckling(
         picture = folder / f"{described.name}-buckling.png"
         plot_buckling(found, path=picture)
         echo_written(picture)
+
+
+def campbell(
+    study: StudyFile,
+    /,
+    *,
+    speeds: Annotated[tuple[float, float], Parameter(help=(
+        "Lowest and highest speed of rotation [rad/s]."))],
+    points: Annotated[int, Parameter(help="Number of speeds, equally spaced.")] = 101,
+    count: Annotated[int, Parameter(help="Number of modes, the lowest at the first speed.")] = 12,
+    orders: Annotated[tuple[float, ...], Parameter(consume_multiple=True, help=(
+        "Engine orders: their lines are drawn, and the speeds printed at which they meet a "
+        "frequency."))] = (),
+    set_: Changes = None,
+    output: Folder = None,
+) -> None:
+    """Frequencies and damping of a rotating body over its speed: NAME-campbell.png and .csv.
+
+    The body is that of a study with [body.rotation], without contact; frequencies are those in the
+    frame that rotates with it.
+    """
+    import numpy as np
+
+    from fecontact.analysis.campbell import campbell as diagram_of
+    from fecontact.cli.console import waiting
+    from fecontact.cli.run_files import read_study
+    from fecontact.cli.tables import table
+    from fecontact.core.files.atomic_write import output_folder, write_text
+    from fecontact.core.files.csv_text import csv_text
+    from fecontact.output.plots.campbell import plot_campbell
+
+    described = read_study(study, set_)
+    if described.bodies or described.body.rotation is None:
+        raise InputError(f"{described.title}: campbell is for a single body that rotates; describe "
+                         f"it in [geometry], [body] and [body.rotation].")
+    if points < 2 or not speeds[0] < speeds[1]:
+        raise InputError(f"--points {points} and --speeds {speeds[0]:g} {speeds[1]:g} must be at "
+                         f"least two speeds, the lower one first.")
+    with output_folder(output or described.results) as folder:
+        with waiting("Computing modes"):
+            diagram = diagram_of(described.modal_basis(), np.linspace(*speeds, points), count=count)
+        echo(str(diagram))
+        if orders:
+            show(table("order", "critical speeds [rad/s]", left=2, rows=(
+                (f"{order:g}", ", ".join(f"{speed:.5g}" for speed in diagram.critical_speeds(order))
+                 or "none") for order in orders)))
+        modes = range(1, diagram.eigenvalues.shape[1] + 1)
+        file = folder / f"{described.name}-campbell.csv"
+        write_text(file, csv_text([
+            ("speed", *(f"{name}_{k}" for name in ("frequency_hz", "damping_ratio")
+                        for k in modes)),
+            *([repr(float(value)) for value in row] for row in np.column_stack(
+                [diagram.speeds, diagram.frequencies_hz, diagram.damping_ratios]))]))
+        picture = folder / f"{described.name}-campbell.png"
+        plot_campbell(diagram, orders=orders, path=picture)
+        echo_written(file, picture)

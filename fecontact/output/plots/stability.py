@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import branch_label, name_axis
 from fecontact.output.plots.style import DASHES, distinct_colours
+from fecontact.system.complex_modes import followed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,11 +47,11 @@ def plot_eigenvalues(
     from fecontact.bifurcation.continuation.branch import Branch
 
     require_kind("plot_eigenvalues", Branch, branch=branch)
-    values, followed = branch.parameter, _followed(branch.column("eigenvalues"))
+    values, lines = branch.parameter, followed(branch.column("eigenvalues"))
     with new_figure(8.0, 6.4, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         modes = []
-        for mode in followed.T:
+        for mode in lines.T:
             hertz = mode.imag / (2.0 * np.pi)
             inside = (hertz >= range_hz[0]) & (hertz <= range_hz[1])
             if (hertz >= 0.0).all() and hertz.any() and inside.any():
@@ -133,15 +133,3 @@ def plot_stability_map(
         name_axis(axis, "y", y_label or found.labels[1], found.second)
         axis.grid(False)
     return figure
-
-
-def _followed(eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Eigenvalues (N, d), sorted so that each column follows one mode from point to point."""
-    from scipy.optimize import linear_sum_assignment
-
-    result = eigenvalues.copy()
-    for k in range(1, len(result)):
-        ahead = 2.0 * result[k - 1] - result[k - 2] if k > 1 else result[0]
-        distance = np.abs(ahead[:, None] - eigenvalues[k][None, :])
-        result[k] = eigenvalues[k][linear_sum_assignment(distance)[1]]
-    return result

@@ -11,6 +11,7 @@ from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import BodyFields, StressAxes, body_elements, stress_of
 from fecontact.fem.points import Place, place_rows
+from fecontact.fem.rotation import Rotation, centrifugal_force
 from fecontact.laws.excitation import BOUNDARY_STRESSES, Load
 from fecontact.laws.signals.base import Signal
 from fecontact.reduction.eigenmodes import FreeSystem
@@ -25,6 +26,7 @@ def static_solution(
     *,
     points: Mapping[str, Place] | None = None,
     time: float = 0.0,
+    rotation: Rotation | None = None,
     stress_axes: StressAxes = "global",
 ) -> BodyFields:
     """Displacement and stress of a body at rest under loads, ``K u = f`` with its supports.
@@ -44,6 +46,8 @@ def static_solution(
         Further names of points, as for :func:`~fecontact.modal_basis`, 'C' among them.
     time : float
         [s]
+    rotation : Rotation, optional
+        Adds the centrifugal load of the undeformed body at this speed; loads turn with the body.
     stress_axes : 'global' or 'material'
         Axes of the stresses in anisotropic materials: x, y, z or those of the material.
 
@@ -59,7 +63,10 @@ def static_solution(
     require_kind("static_solution", Mapping, points={} if points is None else points)
     require_finite("static_solution", time=time)
     system = FreeSystem.of(body)
+    require_kind("static_solution", (Rotation, type(None)), rotation=rotation)
     force = nodal_forces(body, load, points or {}, time)
+    if rotation is not None:
+        force += rotation.speed**2 * centrifugal_force(body, rotation)
     _require_balance(body, body.expansion @ system.rigid, force)
     u = np.asarray(body.expansion @ system.deflection(body.expansion.T @ force))
     return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension),
