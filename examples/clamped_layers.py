@@ -32,7 +32,6 @@ from fecontact import (
     LoadPath,
     Material,
     Mesh,
-    PointLoad,
     load_history,
 )
 from fecontact.fem import pair_faces
@@ -77,10 +76,8 @@ def layers(columns: int = 40, nodes: Literal["all"] | int = 20) -> ContactSystem
     return ContactSystem(
         bodies=bases,
         interfaces=[Interface("joint", pairing, PrescribedForce(1.0), ConstantFriction(MU))],
-        load=Load(
-            boundaries=tuple(BoundaryLoad(name, pressure=1.0)
-                             for name in ("upper.top", "lower.bottom")),
-            forces=tuple(PointLoad(f"{name}.end", "y", signal=0.0) for name in bases)))
+        load=Load(boundaries=tuple(BoundaryLoad(name, pressure=1.0)
+                                   for name in ("upper.top", "lower.bottom"))))
 
 
 def cycle(system: ContactSystem, limit: float, steps: int = 10) -> LoadHistory:
@@ -91,7 +88,8 @@ def cycle(system: ContactSystem, limit: float, steps: int = 10) -> LoadHistory:
     pressure = limit / (MU * WIDTH * HEIGHT)
     pressed = system.with_({"interfaces.joint.normal.force": pressure * LENGTH * WIDTH})
     half = [0.0, 0.5 * END_LOAD, -0.5 * END_LOAD, 0.5 * END_LOAD]
-    path = LoadPath(load_scale=pressure, forces=[half, half], steps=steps)
+    ends = {"upper.end.y": half, "lower.end.y": half}
+    path = LoadPath(load_scale=pressure, forces=ends, steps=steps)
     return load_history(pressed, path, tangential_stiffness=STUCK * LENGTH * WIDTH, rtol=1e-4)
 
 

@@ -24,7 +24,6 @@ from fecontact import (
     Material,
     Mesh,
     ModalBasis,
-    PointLoad,
     load_history,
     modal_basis,
 )
@@ -122,9 +121,10 @@ def pressed(poisson_ratio: float, elements: int = 12, size: float = 60.0) -> Lin
         # So stiff that the body alone gives way.
         basis, LinearContact(1e6 * peak / b * basis.tributary.sum()),
         ConstantFriction(MU, smoothing_slope=1e6),
-        load=Load(LINE_FORCE, forces=(PointLoad("C", "x", signal=0.0),)),
+        load=Load(LINE_FORCE),
         gap=basis.contact_x**2 / (2.0 * RADIUS))
-    history = load_history(system, LoadPath(forces=[(0.0, 0.5 * MU * LINE_FORCE)], steps=10))
+    path = LoadPath(forces={"C.x": (0.0, 0.5 * MU * LINE_FORCE)}, steps=10)
+    history = load_history(system, path)
     area = basis.tributary
     first, last = history.normal_force[[0, -1]] / area
     return LineContact(basis.contact_x, first, last, history.friction_force[-1] / area,

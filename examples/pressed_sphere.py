@@ -163,10 +163,9 @@ def pressed(elements: int, part: float = PART) -> PressedSphere:
         # So stiff that the body alone gives way.
         basis, LinearContact(1e5 * exact.peak / WIDTH * basis.tributary.sum()),
         ConstantFriction(MU),
-        load=fc.Load(exact.load, (fc.PointLoad("C", "x", signal=0.0),)),
-        gap=basis.contact_places[:, 2])
+        load=fc.Load(exact.load), gap=basis.contact_places[:, 2])
     Q = part * MU * exact.load
-    history = fc.load_history(system, fc.LoadPath(forces=[(0.0, Q, -Q, Q)], steps=STEPS),
+    history = fc.load_history(system, fc.LoadPath(forces={"C.x": (0.0, Q, -Q, Q)}, steps=STEPS),
                               rtol=1e-3)
     return PressedSphere(history, exact, part)
 

@@ -25,7 +25,6 @@ from fecontact import (
     Material,
     Mesh,
     ModalBasis,
-    PointLoad,
     equilibrium,
     load_history,
 )
@@ -146,7 +145,7 @@ def contact(cylinder: Material, block: Material, elements: int) -> ContactSystem
     return ContactSystem(
         bodies=bases,
         interfaces=[Interface("line", pairing, stiff, ConstantFriction(MU, smoothing_slope=1e6))],
-        load=Load(LINE_FORCE, forces=(PointLoad("C", "x", signal=0.0),)))
+        load=Load(LINE_FORCE))
 
 
 def pressed(cylinder: Material, block: Material, elements: int = 12) -> HertzContact:
@@ -160,7 +159,8 @@ def pressed(cylinder: Material, block: Material, elements: int = 12) -> HertzCon
 def sheared(elements: int = 12) -> ShearedContact:
     """Steel on steel pressed first, without friction, then sheared by Q = mu P / 2."""
     system = contact(STEEL, STEEL, elements)
-    history = load_history(system, LoadPath(forces=[(0.0, 0.5 * MU * LINE_FORCE)], steps=10))
+    path = LoadPath(forces={"C.x": (0.0, 0.5 * MU * LINE_FORCE)}, steps=10)
+    history = load_history(system, path)
     area = system.basis.tributary
     return ShearedContact(
         system.basis.contact_x, history.normal_force[-1] / area, *hertz(STEEL, STEEL),

@@ -160,6 +160,6 @@ def _joined(run: Trajectory, kept: KeptSteps) -> Trajectory:
         if (values := getattr(run, name)) is not None}
     for name in counted:
         if (values := getattr(run, name)) is not None:
-            columns[name] = np.column_stack([
-                np.interp(time[order], run.time, column) for column in values.T])
+            columns[name] = np.array([np.interp(time[order], run.time, column)
+                                      for column in values.T]).reshape(-1, len(time)).T
     return replace(run, time=time[order], kept=None, **columns)

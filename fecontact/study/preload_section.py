@@ -21,8 +21,9 @@ class PreloadSettings(LoadPath):
     ----------
     load_scale : float or list
         Factor of constant loads [-]; one number, or one for each vertex of the path, as below.
-    forces : list of float or list, optional
-        Values of ``load.forces``, in their order [N], [N m]; by default their constant parts.
+    forces : mapping of text to float or list, or list of these, optional
+        Forces and moments by point and component, ``{"C.x" = [0.0, 30.0]}`` [N], [N m]; or the
+        values of ``load.forces``, in their order. By default their constant parts.
     motion_x, motion_y, motion_z : float or list, optional
         Displacements of the driven ends of the springs at B [m], along z of solids; by default
         their constant parts.

@@ -160,3 +160,14 @@ def test_energies_balance_between_the_outputs_too(solver):
 def test_what_is_no_choice_is_named():
     with pytest.raises(InputError, match="keep_steps"):
         run(friction_oscillator, Auto(), keep_steps="all")
+
+
+def test_systems_without_contact_keep_their_motion():
+    from fecontact.analysis.resolved import resolved
+
+    basis = fc.basis_from_matrices(np.eye(1), [[100.0]], {"B": [[1.0], [0.0], [0.0]]})
+    found = fc.simulate(fc.ContactSystem(basis), 3.0, initial=np.array([1.0, 0.0]), outputs=4)
+    fine = resolved(found).trajectory
+    np.testing.assert_allclose(fine.modal_coordinates[:, 0], np.cos(10.0 * fine.time), atol=1e-5)
+    assert len(fine.time) > 100
+    assert fine.friction_work.shape == (len(fine.time), 0)

@@ -219,3 +219,29 @@ def test_summary_is_short():
     assert len(repr(history)) < 300
     assert "1 stick" in repr(history.state())
     assert fc.load_history is load_history
+
+
+def test_forces_by_name_are_those_of_the_system_or_further_ones():
+    laws = ExponentialFriction(0.6, 0.3, 1000.0, 1e6), RoughSurface(1e6, 1e-4, 0.0)
+    options = {"spring": 2e5, "nodes": 3}
+    pulls, turn = (0.0, 7.0, -5.0, 6.0), (0.0, 1e-3, 0.0, 0.0)
+    own = [PointLoad("C", "x", signal=Constant(3.0)), PointLoad("C", "y", signal=Constant(-2.0))]
+    scale = (1.0, 1.0, 0.5, 1.0)
+    listed = load_history(block(*laws, load=Load(10.0, own), **options), LoadPath(
+        scale, forces=(pulls, tuple(-2.0 * one for one in scale)), steps=4))
+    named = load_history(block(*laws, load=Load(10.0, own), **options),
+                         LoadPath(scale, forces={"C.x": pulls}, steps=4))
+    bare = load_history(block(*laws, load=Load(10.0), **options), LoadPath(
+        scale, forces={"C.x": pulls, "C.y": tuple(-2.0 * one for one in scale)}, steps=4))
+    for one in (named, bare):
+        np.testing.assert_allclose(one.friction_force, listed.friction_force, rtol=1e-12)
+        np.testing.assert_allclose(one.normal_force, listed.normal_force, rtol=1e-12)
+    assert bare.loop(1, 3, "C.x").loss == listed.loop(1, 3).loss
+    # Its system rests at the end of the path, which that of the user would not.
+    assert bare.system.load.forces[0].signal == Constant(6.0)
+    there = block(*laws, load=Load(10.0), **options)
+    moved = load_history(there, LoadPath(forces={"0.x": turn}, steps=2)).modal_coordinates
+    assert np.abs(moved).max() > 0.0
+    for name, said in (("D.x", "no point 'D'"), ("C.u", "component 'u'"), ("C", "a point and a")):
+        with pytest.raises(InputError, match=said):
+            load_history(there, LoadPath(forces={name: turn}))

@@ -1,19 +1,53 @@
 """Loads and motions of a path as rows of numbers, and whose motion the travel is."""
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 
+from fecontact.core.checks import whole_number
 from fecontact.core.errors import InputError
+from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import listed
-from fecontact.laws.excitation import AXES
+from fecontact.laws.excitation import AXES, PointLoad
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.arrays import with_motions
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.interfaces import MotionSource, motion_sources
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.quasistatic.path import LoadPath
+
+
+def with_named_forces(system: ContactSystem, path: LoadPath) -> tuple[ContactSystem, LoadPath]:
+    """The system with all forces that a path names, and the path with their values in order.
+
+    Forces that the system lacks get their values at the end of the path, so that it rests there.
+
+    Raises
+    ------
+    InputError
+        For a point or a component that does not exist.
+    """
+    if not isinstance(path.forces, Mapping):
+        return system, path
+    basis, left = system.basis, dict(path.forces)
+    forces, values = list(system.load.forces), []
+    for force in forces:
+        value = left.pop(f"{force.point}.{force.component}", None)
+        values.append(path.constant_part(_constant(force.signal)) if value is None else value)
+    for name, value in left.items():
+        point, _, component = name.rpartition(".")
+        number = whole_number(point)
+        place: str | int = point if number is None else number
+        with located(f"LoadPath: forces.{name}:"):
+            basis.point_row(place, component)
+        at_end = value[-1] if isinstance(value, tuple) else float(value or 0.0)
+        forces.append(PointLoad(place, cast(Any, component), signal=at_end))
+        values.append(value)
+    return (system.with_(load=replace(system.load, forces=tuple(forces))),
+            replace(path, forces=tuple(values)))
 
 
 def given_rows(system: ContactSystem, path: LoadPath) -> Array:
@@ -25,24 +59,25 @@ def given_rows(system: ContactSystem, path: LoadPath) -> Array:
         For another number of forces than the system has, motions in space of a plane body, and a
         travel that could be that of several sides.
     """
-    arrays, forces = system.arrays, system.load.forces
+    arrays, forces, own = system.arrays, system.load.forces, path.forces
+    assert not isinstance(own, Mapping)
     d = system.basis.dimension
     scale = path.at_points(path.load_scale)
     loads = np.outer(scale, arrays.constant_load)
-    if path.forces is not None and len(path.forces) != len(forces):
-        raise InputError(f"LoadPath: forces has {len(path.forces)} entries, but the system has "
-                         f"{len(forces)} in load.forces; give one for each.")
+    if own is not None and len(own) != len(forces):
+        raise InputError(f"LoadPath: forces has {len(own)} entries, but the system has "
+                         f"{len(forces)} in load.forces; give one for each, or name them.")
     for k, signal in enumerate(system.load.signals.values()):
-        value = (scale * _constant(signal) if path.forces is None or k >= len(forces)
-                 else path.at_points(path.forces[k]))
+        value = (scale * _constant(signal) if own is None or k >= len(forces)
+                 else path.at_points(own[k]))
         loads += np.outer(value, arrays.load_shapes[k])
     if d == 2:
         for name in ("motion_z", "travel_y"):
             if getattr(path, name) is not None:
                 raise InputError(f"LoadPath: {name} is for solids, but the body is plane; leave "
                                  f"it out.")
-    ends = [scale * _constant(motion) if own is None else path.at_points(own)
-            for own, motion in zip((path.motion_x, path.motion_y, path.motion_z)[:d],
+    ends = [scale * _constant(motion) if end is None else path.at_points(end)
+            for end, motion in zip((path.motion_x, path.motion_y, path.motion_z)[:d],
                                    system.drive.motions[:d], strict=True)]
     travel = [path.at_points(path.travel), path.at_points(path.travel_y or 0.0)][: d - 1]
     _require_one_side(system, path, travel)

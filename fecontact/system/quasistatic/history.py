@@ -1,6 +1,6 @@
 """Result of quasi-static loading: equilibria along a path, work and loss, force loops."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -33,8 +33,8 @@ class Loop(Summarised):
     Attributes
     ----------
     action : str
-        'load', 'motion_x', 'motion_y', 'travel', or 'forces.K' for the force number K; of solids
-        'motion_z' and 'travel_y' too.
+        'load', 'motion_x', 'motion_y', 'travel', or a force by point and component, 'C.x'; of
+        solids 'motion_z' and 'travel_y' too. Of several forces at one place 'forces.K'.
     displacement : (N,) array
         Displacement on which the force does its work [m]; of the load, per unit of its scale
         [N m].
@@ -295,8 +295,12 @@ class LoadHistory(Summarised):
         forces = travel_forces(self.system, self.tangential_forces)
         for axis, name in enumerate(travels):
             yield name, self.travels[:, axis], forces[:, axis]
+        # Those that a path names have become a list beside the system's.
+        assert not isinstance(path.forces, Mapping)
+        names = [f"{force.point}.{force.along}" for force in self.system.load.forces]
         for k, values in enumerate(path.forces or ()):
-            yield f"forces.{k}", q @ arrays.load_shapes[k], path.at_points(values)[: len(self)]
+            name = names[k] if names.count(names[k]) == 1 else f"forces.{k}"
+            yield name, q @ arrays.load_shapes[k], path.at_points(values)[: len(self)]
 
 
 def _turnover(displacement: Array, force: Array) -> float:

@@ -15,7 +15,7 @@ from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.nodes import SystemArrays
-from fecontact.system.quasistatic.given import given_rows, travelled, travelling
+from fecontact.system.quasistatic.given import given_rows, travelled, travelling, with_named_forces
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, kept_for, march
 from fecontact.system.quasistatic.path import LoadPath
@@ -85,6 +85,7 @@ def load_history(
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"load_history: rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
     require_sliders(system)
+    system, path = with_named_forces(system, path)
     given, arrays = given_rows(system, path), travelling(system)
     if start is None:
         loads, ends, travel = np.split(given[0], [system.basis.modes, 1 - system.basis.dimension])

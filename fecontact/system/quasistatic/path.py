@@ -1,5 +1,6 @@
 """Paths of quasi-static loading: loads and motions at vertices, straight lines between."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -29,9 +30,10 @@ class LoadPath:
     ----------
     load_scale : float or list
         Factor of constant loads and constant parts [-].
-    forces : list of float or list, optional
-        Values of the forces of the system's ``load.forces``, in their order [N], [N m]; they are
-        not scaled.
+    forces : mapping of text to float or list, or list of these, optional
+        Forces and moments by point and component, ``{"C.x": (0.0, 30.0)}`` [N], [N m]: those of
+        the system there, or further ones. Or the values of its ``load.forces``, in their order.
+        They are not scaled. ``history.system`` has the further ones with their last values.
     motion_x, motion_y, motion_z : float or list, optional
         Displacements of the driven ends of the springs at B, along z of solids [m].
     travel : float or list
@@ -51,7 +53,8 @@ class LoadPath:
     """
 
     load_scale: float | tuple[float, ...] = 1.0
-    forces: tuple[float | tuple[float, ...], ...] | None = None
+    forces: (tuple[float | tuple[float, ...], ...] | dict[str, float | tuple[float, ...]]
+             | None) = None
     motion_x: Annotated[float | tuple[float, ...] | None, Unit("m")] = None
     motion_y: Annotated[float | tuple[float, ...] | None, Unit("m")] = None
     motion_z: Annotated[float | tuple[float, ...] | None, Unit("m")] = field(
@@ -64,10 +67,18 @@ class LoadPath:
     def __post_init__(self) -> None:
         for name in _HISTORIES:
             object.__setattr__(self, name, _values(getattr(self, name), name))
-        if self.forces is not None:
+        if isinstance(self.forces, Mapping):
+            for name in self.forces:
+                if not all(str(name).rpartition(".")):
+                    raise InputError(f"LoadPath: forces names {shown(name)}; give a point and a "
+                                     f"component of it, such as 'C.x' or '0.y'.")
+            object.__setattr__(self, "forces", {
+                name: _values(value, f"forces.{name}") for name, value in self.forces.items()})
+        elif self.forces is not None:
             if not isinstance(self.forces, tuple | list | np.ndarray):
-                raise InputError(f"LoadPath: forces = {shown(self.forces)} must be a list with one "
-                                 f"entry for each of load.forces.")
+                raise InputError(f"LoadPath: forces = {shown(self.forces)} must be a mapping "
+                                 f"such as {{'C.x': (0.0, 30.0)}}, or a list with one entry for "
+                                 f"each of load.forces.")
             object.__setattr__(self, "forces", tuple(
                 _values(value, f"forces[{k}]") for k, value in enumerate(self.forces)))
         lengths = {name: len(value) for name, value in self._histories()
@@ -98,7 +109,16 @@ class LoadPath:
 
     def _histories(self) -> list[tuple[str, Values | None]]:
         given = [(name, getattr(self, name)) for name in _HISTORIES]
-        return given + [(f"forces[{k}]", value) for k, value in enumerate(self.forces or ())]
+        forces = self.forces or ()
+        if isinstance(forces, Mapping):
+            return given + [(f"forces.{name}", value) for name, value in forces.items()]
+        return given + [(f"forces[{k}]", value) for k, value in enumerate(forces)]
+
+    def constant_part(self, value: float) -> Values:
+        """What takes the constant part of a load at the vertices: the value times the scale."""
+        if isinstance(self.load_scale, tuple):
+            return tuple(value * scale for scale in self.load_scale)
+        return value * self.load_scale
 
     @property
     def vertices(self) -> int:
