@@ -42,6 +42,7 @@ from .reduction.modal_basis import ModalBasis
 from .reduction.reduce_body import modal_basis
 from .study.study import Study
 from .sweeps.sweep import sweep
+from .system.assembly import Assembly
 from .system.contact_quantities import ContactState
 from .system.contact_system import ContactSystem
 from .system.forcing_period import forcing_period
@@ -56,6 +57,7 @@ __version__: str
 
 __all__ = [
     "AnalysisError",
+    "Assembly",
     "Beam",
     "Block",
     "BoundaryLoad",

@@ -16,6 +16,7 @@ from .output.files.export import export_csv, export_fields, export_mat, export_n
 from .output.files.field_runs import read_run, write_run
 from .output.files.hdf5 import read_basis, write_basis
 from .output.files.pvd import export_pvd
+from .output.files.pyvista_grid import to_pyvista
 from .output.files.stored_system import read_system
 from .output.files.wear import read_wear, write_wear
 from .output.report.branch_report import report_branches
@@ -60,6 +61,7 @@ __all__ = [
     "report_sweep",
     "report_widget",
     "to_pandas",
+    "to_pyvista",
     "to_xarray",
     "write_basis",
     "write_branch",

@@ -4,6 +4,7 @@ from .elements.cell_kinds import CellKind
 from .fields import BodyFields, stress_of
 from .material import AnisotropicMaterial
 from .material_axes import CylindricalAxes, MaterialAxes
+from .mesh_files import mesh_from
 from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
 from .pretension import PretensionSection, with_pretension
@@ -36,6 +37,7 @@ __all__ = [
     "Tie",
     "TwoPassPairing",
     "finer_face",
+    "mesh_from",
     "pair_both_faces",
     "pair_faces",
     "stress_of",

@@ -26,6 +26,7 @@ from fecontact.fem.elements.cell_geometry import (
 )
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
 from fecontact.fem.elements.refinement import refined
+from fecontact.fem.elements.structured import structured
 from fecontact.fem.material import AnyMaterial
 
 # Eight-node bricks: trilinear displacements alone, or with incompatible modes of each cell.
@@ -90,6 +91,37 @@ class Mesh(Summarised):
     materials: Mapping[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
     attachments: Sequence[Attachment] = ()
+
+    @classmethod
+    def grid(cls, x: ArrayLike, y: ArrayLike, z: ArrayLike | None = None) -> "Mesh":
+        """A rectangle of quadrilaterals, or a box of hexahedra, between lines of nodes.
+
+        Parameters
+        ----------
+        x, y, z : ascending sequences of float
+            Coordinates of the lines [m]; without z the body is plane.
+
+        Returns
+        -------
+        Mesh
+            With the boundaries ``left`` (first x), ``right``, ``bottom`` and ``top``; in space
+            bottom and top are those of z, ``front`` (first y) and ``back`` those of y. Points are
+            the corners, such as ``"bottom left"`` or ``"top back right"``.
+
+        Raises
+        ------
+        InputError
+            Unless they are two or more finite, ascending numbers.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from fecontact import Mesh
+        >>> plate = Mesh.grid(np.linspace(0.0, 0.2, 41), np.linspace(0.0, 0.01, 5))
+        >>> len(plate.cells), sorted(plate.boundaries)
+        (160, ['bottom', 'left', 'right', 'top'])
+        """
+        return cls(*structured((x, y) if z is None else (x, y, z)))
 
     def __post_init__(self) -> None:
         nodes = np.array(as_floats(self.nodes, "Mesh nodes"))

@@ -83,6 +83,59 @@ def read_mesh(
         return _mesh(_raw(path).part(part), scale, boundaries or {}, points or {})
 
 
+def mesh_from(
+    found: Any,
+    *,
+    scale: float = 1.0,
+    boundaries: Mapping[str, str | Box] | None = None,
+    points: Mapping[str, str | Coordinates] | None = None,
+) -> Mesh:
+    """A mesh of meshio, scikit-fem or PyVista, with its groups.
+
+    Groups are the cell sets and point sets of meshio, and what its ``gmsh:physical`` and
+    ``field_data`` name; boundaries and subdomains of scikit-fem. PyVista's meshes have none: name
+    boundaries and points by their places.
+
+    Parameters
+    ----------
+    found : meshio.Mesh, skfem.Mesh or pyvista.DataSet
+        Of the elements that :func:`read_mesh` takes; a plane one in two coordinates or at z = 0.
+    scale, boundaries, points
+        As of :func:`read_mesh`.
+
+    Raises
+    ------
+    InputError, MeshError
+        For another kind of object, and as :func:`read_mesh`.
+
+    Examples
+    --------
+    >>> import skfem
+    >>> from fecontact.fem import mesh_from
+    >>> square = skfem.MeshQuad().refined(2).with_boundaries({"base": lambda x: x[1] == 0.0})
+    >>> mesh = mesh_from(square, scale=0.01)
+    >>> len(mesh.cells), len(mesh.boundaries["base"])
+    (16, 4)
+    """
+    kinds = {one.__module__.partition(".")[0] for one in type(found).__mro__}
+    _require_scale("mesh_from", scale)
+    if "pyvista" in kinds:
+        import pyvista
+
+        raw = _raw_mesh(pyvista.to_meshio(found))
+    elif "meshio" in kinds and hasattr(found, "cells"):
+        raw = _raw_mesh(found)
+    elif "skfem" in kinds and hasattr(found, "facets"):
+        raw = _raw_of_skfem(found)
+    else:
+        raise InputError(f"mesh_from: {type(found).__name__} is no mesh of meshio, scikit-fem or "
+                         f"PyVista; give one of these, or read a file by read_mesh.")
+    try:
+        return _mesh(raw, scale, boundaries or {}, points or {})
+    except (MeshError, InputError) as error:
+        raise type(error)(f"mesh_from: {error}") from None
+
+
 def read_bodies(path: str | Path, *, scale: float = 1.0) -> dict[str, Mesh]:
     """Meshes of all parts of a file that are bodies of their own, or of the one body, named "".
 
@@ -103,12 +156,16 @@ def read_bodies(path: str | Path, *, scale: float = 1.0) -> dict[str, Mesh]:
         return {name: _mesh(raw.part(name or None), scale, {}, {}) for name in names}
 
 
+def _require_scale(owner: str, scale: float) -> None:
+    if not (isinstance(scale, Real) and 0.0 < scale < np.inf):
+        raise InputError(f"{owner}: scale = {scale!r} (metres per unit of the mesh) must be a "
+                         f"finite number above zero.")
+
+
 @contextlib.contextmanager
 def _located(path: Path, scale: float) -> Iterator[None]:
     """Begin messages with the file; InputError for a scale that is none."""
-    if not (isinstance(scale, Real) and 0.0 < scale < np.inf):
-        raise InputError(f"{path}: scale = {scale!r} (metres per unit of the file) must be a "
-                         f"finite number above zero.")
+    _require_scale(str(path), scale)
     _reader(path)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
@@ -335,24 +392,65 @@ def _by_meshio(format_name: str, source: Path | io.StringIO) -> Any:
 
 
 def _raw_mesh(found: Any) -> RawMesh:
-    """Contents of a mesh of meshio, with the groups of line elements in Nastran files."""
+    """Contents of a mesh of meshio, with its groups."""
     edges: dict[str, list[Integers]] = {}
     parts: dict[str, list[tuple[str, Integers]]] = {}
-    references = found.cell_data.get("nastran:ref", [])
-    for block, numbers in zip(found.cells, references, strict=False):
-        if block.type in ("line", "line3") and len(numbers) == len(block.data):
-            for number in np.unique(numbers):
-                edges.setdefault(str(number), []).append(block.data[numbers == number, :2])
-        elif block.dim >= 2 and len(numbers) == len(block.data):
-            for number in np.unique(numbers):
-                parts.setdefault(str(number), []).append((block.type,
-                                                          block.data[numbers == number]))
+    nodes: dict[str, list[Integers]] = {name: [np.asarray(rows, np.int64).ravel()]
+                                        for name, rows in found.point_sets.items()}
+    for name, number, rows in _groups_of_meshio(found):
+        block = found.cells[number]
+        cells = block.data[rows]
+        if block.dim >= 2:
+            parts.setdefault(name, []).append((block.type, cells))
+        elif block.dim == 1:
+            edges.setdefault(name, []).append(cells[:, :2])
+        else:
+            nodes.setdefault(name, []).append(cells.ravel())
     return RawMesh(
         found.points,
         [(block.type, block.data) for block in found.cells if block.dim >= 2],
         edges={name: np.concatenate(rows) for name, rows in edges.items()},
+        nodes={name: np.concatenate(rows) for name, rows in nodes.items()},
         parts=parts,
     )
+
+
+def _groups_of_meshio(found: Any) -> Iterator[tuple[str, int, Any]]:
+    """Name, number of the block, and chosen rows of it, of each group of cells."""
+    for name, sets in found.cell_sets.items():
+        for number, rows in enumerate(sets):
+            # Sets of Gmsh's own names tell which entities bound which.
+            if rows is not None and len(rows) and not name.startswith("gmsh:"):
+                yield name, number, np.asarray(rows, np.int64)
+    names = {(int(tag), int(dim)): name for name, (tag, dim) in (
+        (name, np.ravel(value)[:2]) for name, value in found.field_data.items()
+        if np.size(value) >= 2)}
+    for key in ("nastran:ref", "gmsh:physical"):
+        for number, values in enumerate(found.cell_data.get(key, [])):
+            block = found.cells[number]
+            if len(values) != len(block.data):
+                continue
+            for tag in np.unique(values).tolist():
+                name = names.get((tag, block.dim), str(tag) if key == "nastran:ref" else "")
+                if name and name not in found.cell_sets:
+                    yield name, number, np.flatnonzero(values == tag)
+
+
+def _raw_of_skfem(found: Any) -> RawMesh:
+    """Contents of a mesh of scikit-fem, with its boundaries and subdomains."""
+    from skfem.io.meshio import to_meshio
+
+    raw = _raw_mesh(to_meshio(found, encode_cell_data=False))
+    kind, cells = raw.cells[0]
+    groups = {name: np.asarray(found.facets[:, facets].T, np.int64)
+              for name, facets in (found.boundaries or {}).items()}
+    if raw.is_solid:
+        raw.faces = {name: [rows] for name, rows in groups.items()}
+    else:
+        raw.edges = groups
+    raw.cell_sets = {name: [(kind, cells[np.asarray(rows, np.int64)])]
+                     for name, rows in (found.subdomains or {}).items()}
+    return raw
 
 
 @contextlib.contextmanager

@@ -1,0 +1,35 @@
+"""A run at one time as a grid of PyVista."""
+
+import numpy as np
+import pytest
+
+import fecontact as fc
+from fecontact.core.errors import InputError
+from fecontact.io import to_pyvista
+from fecontact.laws import ConstantFriction, LinearContact
+
+pytest.importorskip("pyvista")
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_a_grid_has_the_fields_of_the_run(space):
+    lines = [np.linspace(0.0, 0.1, 4), np.linspace(0.0, 0.02, 3), np.linspace(0.0, 0.02, 3)]
+    mesh = fc.Mesh.grid(*lines[: 3 if space else 2])
+    basis = fc.modal_basis(fc.ElasticBody(mesh), 8, contact="bottom")
+    system = fc.ContactSystem(basis, LinearContact(1e8), ConstantFriction(0.3),
+                              load=fc.Load(gravity=(0.0, 0.0, -9.81)[3 - mesh.nodes.shape[1] :]))
+    run = fc.simulate(system, 1e-3, outputs=11)
+    grid = to_pyvista(run, 0.48e-3)
+    d, shapes = mesh.nodes.shape[1], basis.mode_shapes
+    assert grid.field_data["time"][0] == run.time[5]
+    np.testing.assert_allclose(grid.points[:, :d], shapes.nodes, rtol=1e-6)
+    moved = np.einsum("ndm,m->nd", shapes.shapes, run.modal_coordinates[5])
+    np.testing.assert_allclose(grid.point_data["displacement"][:, :d], moved, rtol=1e-4,
+                               atol=1e-6 * np.abs(moved).max())
+    force = grid.point_data["contact_force"][:, d - 1].sum()
+    assert force == pytest.approx(run.normal_force[5].sum(), rel=1e-5)
+    size = grid.volume if space else grid.area
+    assert size == pytest.approx(np.prod([np.ptp(line) for line in lines[:d]]))
+    assert to_pyvista(run).field_data["time"][0] == run.time[-1]
+    with pytest.raises(InputError, match=r"time = 2\.0 must be from 0 to"):
+        to_pyvista(run, 2.0)
