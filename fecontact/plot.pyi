@@ -9,10 +9,11 @@ from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.campbell import plot_campbell
 from .output.plots.contact_map import plot_contact_map
 from .output.plots.diagram_insets import Inset, phase_inset
+from .output.plots.diameters import plot_diameters
 from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
 from .output.plots.many_runs import plot_basins, plot_poincare_scan, plot_runs
-from .output.plots.modes import plot_buckling, plot_convergence, plot_modes
+from .output.plots.modes import plot_buckling, plot_convergence, plot_modes, plot_wheel
 from .output.plots.phase_space import plot_phase_space
 from .output.plots.preload import plot_loop, plot_shear
 from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
@@ -41,6 +42,7 @@ __all__ = [
     "plot_campbell",
     "plot_contact_map",
     "plot_convergence",
+    "plot_diameters",
     "plot_eigenvalues",
     "plot_energies",
     "plot_friction_work",
@@ -65,6 +67,7 @@ __all__ = [
     "plot_strobed",
     "plot_sweep",
     "plot_wear",
+    "plot_wheel",
     "render_mode",
     "render_phase_space",
     "rendering_problem",

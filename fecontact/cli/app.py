@@ -34,6 +34,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     study.modes,
     turning.buckling,
     turning.campbell,
+    turning.diameters,
     study.preload,
     study.run,
     study.wear,

@@ -1,5 +1,6 @@
 from .attachments import PointMass, PointSpring
 from .constraints import Coupling, LinearEquation, Term, Tie
+from .cyclic_symmetry import CyclicSymmetry, SectorNodes
 from .elements.cell_kinds import CellKind
 from .fields import BodyFields, stress_of
 from .material import AnisotropicMaterial
@@ -17,6 +18,7 @@ __all__ = [
     "BodyFields",
     "CellKind",
     "Coupling",
+    "CyclicSymmetry",
     "Cylinder",
     "CylindricalAxes",
     "HingeSupport",
@@ -31,6 +33,7 @@ __all__ = [
     "PretensionSection",
     "Ring",
     "Rotation",
+    "SectorNodes",
     "SolidBlock",
     "SphereSegment",
     "Term",

@@ -1,5 +1,6 @@
 """Rotation of a body about an axis: Coriolis matrix, centrifugal force and its softening."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -76,9 +77,13 @@ class Rotation:
         if d == 2 and (len(self.centre) != 2 or self.axis != (0.0, 0.0, 1.0)):
             raise InputError("Rotation: a plane body turns about z and a centre (x, y); leave axis "
                              "and the third number out.")
-        x, y, z = self.axis
-        S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        return S[:d, :d], np.array([*self.centre, 0.0][:d])
+        return cross_matrix(self.axis)[:d, :d], np.array([*self.centre, 0.0][:d])
+
+
+def cross_matrix(axis: Sequence[float]) -> Array:
+    """S (3, 3) of the vector product ``S u = e x u`` with an axis e."""
+    x, y, z = axis
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def coriolis_matrix(body: ElasticBody, rotation: Rotation) -> Any:

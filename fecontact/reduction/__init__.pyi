@@ -21,6 +21,7 @@ from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
 from .rotating import ModalRotation
+from .sector_modes import SectorModes, WheelShape, sector_modes
 
 __all__ = [
     "BasisReport",
@@ -41,9 +42,11 @@ __all__ = [
     "PointPairing",
     "PolynomialSpring",
     "ReductionQuality",
+    "SectorModes",
     "Spring",
     "TightenedBolts",
     "Weld",
+    "WheelShape",
     "assembled_basis",
     "bodies_convergence",
     "eigenfrequencies_hz",
@@ -55,5 +58,6 @@ __all__ = [
     "polynomial_stiffness",
     "reduce_bodies",
     "rows_from_dofs",
+    "sector_modes",
     "tightened",
 ]

@@ -186,7 +186,7 @@ def modal_basis(
         mode_shapes=ModeShapes(
             nodes=body.nodes,
             cells=linear_cells(body.nodes, elements),
-            outline=_outline(body),
+            outline=first_order(body, body.mesh.outline),
             shapes=shapes.reshape(-1, d, len(w)),
             stress=stress_of(body, shapes),
             restriction=restriction,
@@ -426,9 +426,9 @@ def _point(body: ElasticBody, place: Place | None, name: str) -> Rows:
     return place_rows(body, place, name)
 
 
-def _outline(body: ElasticBody) -> Integers:
-    """First-order edges (k, 2), or facets of a solid, between the nodes of the outline."""
-    sides = body.facet_nodes(body.mesh.outline)
+def first_order(body: ElasticBody, facets: Integers) -> Integers:
+    """First-order edges (k, 2), or facets of a solid, between the displacement nodes of some."""
+    sides = body.facet_nodes(facets)
     if body.dimension == 3:
         return linear_facets(sides)
     return np.concatenate([sides[:, i : i + 2] for i in range(sides.shape[1] - 1)])

@@ -363,6 +363,9 @@ def elastic_bodies(study: Bodies, meshes: Mapping[str, Mesh], title: str) -> dic
     found = {}
     for name, one in study.bodies.items():
         with located(f"{title}: [bodies.{name}.body]:", "ElasticBody"):
+            if one.body.symmetry is not None:
+                raise InputError("symmetry is for a single body, one sector of a wheel; leave it "
+                                 "out.")
             if one.body.rotation is not None:
                 raise InputError("rotation is for a single body: rows in its frame would turn "
                                  "against those of the others. Prescribe the sliding of its "

@@ -197,5 +197,9 @@ class StudyModels:
             return reduced_bodies(self._bases, self._pairings, self.links, self._bodies,
                                   self.title)
         body = self._body
+        if self.body.symmetry is not None:
+            raise InputError(f"{self.title}: [body.symmetry] makes the body one sector of a wheel, "
+                             f"whose modes `fecontact diameters` computes; leave it out to take "
+                             f"the sector alone.")
         with located(f"{self.title}: [basis]:"):
             return Reduced(self.basis.modal_basis(body, self.body.rotation))

@@ -1,4 +1,4 @@
-"""Commands on a body under stress, and on one that rotates: ``buckling``, ``campbell``."""
+"""Commands on bodies under stress, that rotate, or repeat: ``buckling``, ``campbell``..."""
 
 from typing import Annotated
 
@@ -103,3 +103,55 @@ def campbell(
         picture = folder / f"{described.name}-campbell.png"
         plot_campbell(diagram, orders=orders, path=picture)
         echo_written(file, picture)
+
+
+def diameters(
+    study: StudyFile,
+    /,
+    *,
+    modes: Annotated[int, Parameter(help="Number of modes of each nodal diameter.")] = 6,
+    speed: Annotated[float | None, Parameter(help=(
+        "Speed of rotation [rad/s], for the line of excitation by engine orders."))] = None,
+    set_: Changes = None,
+    output: Folder = None,
+) -> None:
+    """Frequencies of a wheel over its nodal diameters, from the sector of [body.symmetry].
+
+    Writes NAME-diameters.png and .csv, and draws the lowest elastic mode of each diameter over the
+    whole wheel to NAME-wheel.png.
+    """
+    import numpy as np
+
+    from fecontact.cli.console import waiting
+    from fecontact.cli.run_files import read_study
+    from fecontact.cli.tables import table
+    from fecontact.core.files.atomic_write import output_folder, write_text
+    from fecontact.core.files.csv_text import csv_text
+    from fecontact.core.tables import located
+    from fecontact.output.plots.diameters import plot_diameters
+    from fecontact.output.plots.modes import plot_wheel
+    from fecontact.reduction.sector_modes import sector_modes
+
+    described = read_study(study, set_)
+    if described.bodies or described.body.symmetry is None:
+        raise InputError(f"{described.title}: diameters is for one sector of a wheel; describe it "
+                         f"in [geometry], [body] and [body.symmetry].")
+    with output_folder(output or described.results) as folder:
+        with waiting("Computing modes"), located(f"{described.title}: [body.symmetry]:",
+                                                 "CyclicSymmetry"):
+            found = sector_modes(described.elastic_body(), described.body.symmetry, modes)
+        show(table("diameter", "frequencies [Hz]", left=2, rows=(
+            (str(k), ", ".join(f"{value:.5g}" for value in row))
+            for k, row in zip(found.diameters, found.frequencies_hz, strict=True))))
+        name = folder / described.name
+        files = [name.with_name(f"{described.name}-{kind}") for kind in (
+            "diameters.csv", "diameters.png", "wheel.png")]
+        write_text(files[0], csv_text([
+            ("diameter", *(f"frequency_hz_{k}" for k in range(1, modes + 1))),
+            *((k, *(repr(float(value)) for value in row)) for k, row in zip(
+                found.diameters, found.frequencies_hz, strict=True))]))
+        plot_diameters(found, speed=speed, path=files[1])
+        elastic = [(k, int(np.argmax(row > 0.0))) for k, row in zip(
+            found.diameters, found.frequencies_hz, strict=True) if row.any()]
+        plot_wheel(found, elastic[:12], path=files[2])
+        echo_written(*files)

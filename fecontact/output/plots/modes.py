@@ -1,4 +1,4 @@
-"""Plots of the modes of a body and of its buckling: shapes and convergence."""
+"""Plots of shapes: modes of a body and of a wheel, buckling; and of their convergence."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +16,7 @@ from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart
+from fecontact.reduction.sector_modes import SectorModes
 from fecontact.system.statics.buckling import BucklingLoads
 
 if TYPE_CHECKING:
@@ -84,6 +85,41 @@ def plot_buckling(found: BucklingLoads, *, path: str | Path | None = None) -> "F
                          "buckle.")
     titles = [f"{factor:.5g} times the load" for factor in found.load_factors]
     return _shapes_figure(found.state, found.shapes, titles, path)
+
+
+def plot_wheel(
+    found: SectorModes, shown: Sequence[tuple[int, int]], *, phase: float = 0.0,
+    path: str | Path | None = None,
+) -> "Figure":
+    """Plot modes of a sector over the whole wheel.
+
+    Parameters
+    ----------
+    found : SectorModes
+        Of :func:`fecontact.reduction.sector_modes`.
+    shown : sequence of (int, int)
+        Nodal diameter and number of each mode, from 0.
+    phase : float
+        Phase of the vibration [rad]; pi / 2 for the other mode of each pair.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For modes that are not there, another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_wheel", SectorModes, found=found)
+    require_kind("plot_wheel", (Sequence, np.ndarray), shown=shown)
+    if not len(shown):
+        raise InputError("plot_wheel: shown is empty; give a nodal diameter and a number of a mode "
+                         "at least.")
+    wheels = [found.on_wheel(diameter, mode, phase) for diameter, mode in shown]
+    titles = [f"diameter {diameter}, " + (f"{hertz:.5g} Hz" if hertz else "rigid")
+              for diameter, mode in shown
+              for hertz in [float(found.frequencies_hz[found.row(diameter), mode])]]
+    return _shapes_figure(wheels[0], np.stack([one.displacement for one in wheels], axis=2),
+                          titles, path)
 
 
 class _Outlined(Protocol):

@@ -1,0 +1,119 @@
+"""Modes of one sector against those of the whole wheel, closed forms, and bad faces."""
+
+import numpy as np
+import pytest
+from meshes_for_tests import grid
+from sectors import hexagon_sector, ring_sector, whole_wheel
+
+from fecontact import ElasticBody, InputError, Material, Mesh, MeshError
+from fecontact.fem import CyclicSymmetry
+from fecontact.reduction import eigenfrequencies_hz, sector_modes
+
+STEEL = Material(2.1e11, 0.3, 7850.0)
+HEXAGON = CyclicSymmetry("low", "high", 6)
+
+
+def ring_symmetry(sectors):
+    return CyclicSymmetry("bottom", "top", sectors)
+
+
+CASES = {
+    "odd": (lambda: ring_sector(5), ring_symmetry(5), {}, {}),
+    "even, held": (lambda: ring_sector(4, triangles=True), ring_symmetry(4), {"left": "xy"}, {}),
+    "two": (lambda: ring_sector(2, around=8), ring_symmetry(2), {}, {}),
+    "axis": (lambda: hexagon_sector(3), HEXAGON, {}, {}),
+    "axis, linear": (lambda: hexagon_sector(3), HEXAGON, {}, {"degree": 1}),
+    "solid, axis": (lambda: hexagon_sector(2, 0.3), HEXAGON, {}, {}),
+    "solid, held": (lambda: hexagon_sector(2, 0.3), HEXAGON, {"bottom": "z"}, {}),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_sector_has_the_frequencies_of_the_whole_wheel(name):
+    """To 1e-9, each of the wheel's, double ones twice; rigid modes of the same number."""
+    mesh, symmetry, fixed, options = CASES[name]
+    sector = ElasticBody(mesh(), STEEL, fixed=fixed, **options)
+    wheel = ElasticBody(whole_wheel(sector.mesh, symmetry), STEEL, fixed=fixed, **options)
+    found = sector_modes(sector, symmetry, 8)
+    count = 14
+    expected = eigenfrequencies_hz(wheel, count + 1)[:count]
+    assert found.wheel_frequencies_hz[:count] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert (found.wheel_frequencies_hz == 0.0).sum() == (expected == 0.0).sum()
+
+
+@pytest.mark.parametrize("name", ["odd", "axis", "solid, axis"])
+def test_shapes_over_the_wheel_are_modes_of_it(name):
+    """Mass-normalised and orthogonal, with a small residual."""
+    mesh, symmetry, fixed, options = CASES[name]
+    sector = ElasticBody(mesh(), STEEL, fixed=fixed, **options)
+    wheel = ElasticBody(whole_wheel(sector.mesh, symmetry), STEEL, fixed=fixed, **options)
+    found = sector_modes(sector, symmetry, 4)
+    vectors, squares = [], []
+    for k in found.diameters:
+        for phase in (0.0,) if symmetry.is_real(k) else (0.0, np.pi / 2.0):
+            seen = found.on_wheel(k, 3, phase)
+            where = np.linalg.norm(seen.nodes[None] - wheel.nodes[:, None], axis=2)
+            assert where.min(axis=1).max() < 1e-9
+            assert len(seen.nodes) == len(wheel.nodes)
+            vectors.append(seen.displacement[where.argmin(axis=1)].ravel())
+            squares.append((2.0 * np.pi * found.frequencies_hz[found.row(k), 3]) ** 2)
+    X, w2 = np.stack(vectors, axis=1), np.array(squares)
+    assert X.T @ wheel.mass @ X == pytest.approx(np.eye(len(w2)), abs=1e-8)
+    residual = wheel.stiffness @ X - (wheel.mass @ X) * w2
+    assert np.abs(residual).max() < 1e-8 * np.abs(wheel.stiffness @ X).max()
+
+
+def test_thin_ring_has_its_closed_form():
+    """w_n^2 = E I n^2 (n^2 - 1)^2 / (rho A R^4 (n^2 + 1)); n waves have the diameter n mod N."""
+    N, R, h = 8, 1.0, 0.02
+    mesh = grid(np.array([R - 0.5 * h, R + 0.5 * h]), np.linspace(0.0, 2.0 * np.pi / N, 13),
+                warp=lambda at: at[:, :1] * np.column_stack([np.cos(at[:, 1]), np.sin(at[:, 1])]))
+    found = sector_modes(ElasticBody(mesh, STEEL), ring_symmetry(N), 3)
+    unit = np.sqrt(STEEL.youngs_modulus * h**2 / (12.0 * STEEL.density * R**4)) / (2.0 * np.pi)
+    for n in (2, 3, 4):
+        expected = unit * n * (n**2 - 1) / np.sqrt(n**2 + 1)
+        assert found.frequencies_hz[found.row(n), 0] == pytest.approx(expected, rel=3e-3)
+    five = unit * 5 * 24 / np.sqrt(26)
+    assert np.abs(found.frequencies_hz[found.row(3)] / five - 1.0).min() < 1e-2
+    assert found.frequencies_hz[0, 0] == 0.0
+    assert found.frequencies_hz[1, 0] == 0.0
+
+
+def test_axis_may_point_anywhere():
+    mesh = hexagon_sector(2, 0.3)
+    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    shift = np.array([0.3, -0.2, 0.5])
+    moved = Mesh(mesh.nodes @ turn.T + shift, mesh.cells, mesh.boundaries)
+    symmetry = CyclicSymmetry("low", "high", 6, tuple(shift + 0.7 * turn[:, 2]),
+                              tuple(2.0 * turn[:, 2]))
+    found = sector_modes(ElasticBody(moved, STEEL), symmetry, 5, diameters=(1, 3))
+    expected = sector_modes(ElasticBody(mesh, STEEL), HEXAGON, 5, diameters=(1, 3))
+    assert found.frequencies_hz == pytest.approx(expected.frequencies_hz, rel=1e-8)
+    assert found.diameters == (1, 3)
+
+
+def test_bad_sectors_are_refused():
+    sector = ElasticBody(ring_sector(8), STEEL)
+    for symmetry, words in (
+            (ring_symmetry(9), "0.0[0-9]+ m from its partner; give sectors = 8"),
+            (CyclicSymmetry("top", "bottom", 8), "exchange low and high"),
+            (CyclicSymmetry("bottom", "top", 8, (0.1, 0.0)), r"node at \(.* m from its partner"),
+            (CyclicSymmetry("bottom", "right", 8), "5 and 9 nodes off the axis"),
+            (CyclicSymmetry("bottom", "tip", 8), "no boundary named 'tip'")):
+        with pytest.raises(MeshError, match=words):
+            sector_modes(sector, symmetry, 2)
+    for words, call in (
+            ("two or more", lambda: CyclicSymmetry("a", "b", 1)),
+            ("both 'a'", lambda: CyclicSymmetry("a", "a", 3)),
+            ("three components", lambda: CyclicSymmetry("a", "b", 3, axis=(1.0, 0.0))),
+            ("axis of a plane body", lambda: sector_modes(
+                sector, CyclicSymmetry("bottom", "top", 8, axis=(1.0, 0.0, 0.0)))),
+            ("from 0 to N / 2 = 4", lambda: sector_modes(
+                sector, ring_symmetry(8), diameters=[5])),
+            ("must be one of 0, 1, 2, 3, 4", lambda: sector_modes(
+                sector, ring_symmetry(8), 3).row(7)),
+            ("hold other directions", lambda: sector_modes(
+                ElasticBody(ring_sector(8), STEEL, fixed={"left": "x"}), ring_symmetry(8)))):
+        with pytest.raises(InputError, match=words):
+            call()
