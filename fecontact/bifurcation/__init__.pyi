@@ -24,6 +24,7 @@ from .equilibria.stability_map import StabilityMap, stability_map
 from .fields import VectorField, vector_field
 from .fields.contact_field import ContactField, contact_field
 from .harmonic.method import HarmonicBalance
+from .harmonic.repeats import Repeats
 from .harmonic.response import FrequencyResponse, frequency_response
 from .nonlinear_modes.controlled_response import controlled_response
 from .nonlinear_modes.mode_response import ModeResponse, Resonance, mode_response
@@ -70,6 +71,7 @@ __all__ = [
     "PeriodDoublingPoint",
     "PeriodicMotion",
     "PoincareScan",
+    "Repeats",
     "Resonance",
     "ResonanceCurve",
     "ResponseSettings",

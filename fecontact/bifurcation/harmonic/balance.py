@@ -12,6 +12,7 @@ from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
+from fecontact.bifurcation.harmonic.repeats import Ties
 from fecontact.bifurcation.harmonic.series import (
     Series,
     differentiated,
@@ -71,6 +72,8 @@ class Balance:
         Makes compiled equations.
     orders : tuple of int, optional
         Harmonics of the series where some of 0 to H are left out: these are zero.
+    ties : Ties, optional
+        Modes of bodies that repeat the motion of another one.
     """
 
     field: VectorField
@@ -87,6 +90,7 @@ class Balance:
     kept: Kept = _NOTHING_KEPT
     compiled: CompiledBalance | None = None
     orders: tuple[int, ...] | None = None
+    ties: Ties | None = None
 
     def equations(self, value: float) -> Equations | None:
         """Compiled equations about a value of the parameter; None where there are none."""
@@ -178,7 +182,8 @@ class Balance:
     @cached_property
     def directions(self) -> Array | None:
         """Columns (m, r) of what contact nodes see, where these are few; see FewContacts."""
-        return contact_directions(self.field, self.values, self.harmonics)
+        return None if self.ties is not None else contact_directions(
+            self.field, self.values, self.harmonics)
 
     @cached_property
     def _weights(self) -> Array:
@@ -307,6 +312,8 @@ class Linearised:
         if m:
             turned[:, :m] = differentiated(turned[:, :m]) / period
         turned -= problem.series.projection @ rates[:, m : layout.states - layout.memory]
+        if problem.ties is not None:
+            problem.ties.residual(problem.coefficients(u), turned)
         found = turned.reshape(-1)
         found[problem.left_out] = u[problem.left_out]
         return found
@@ -437,6 +444,8 @@ class Linearised:
             found[:n] += self._coupled(self._followed)
         if problem.autonomous:
             found[n, :n], found[n, n:] = problem.phase_row, 0.0
+        if problem.ties is not None:
+            problem.ties.derivatives(found[:n], problem.harmonics)
         return zero_left_out(found, problem.left_out)
 
     def solve(self, row: Array, rhs: Array) -> Array:

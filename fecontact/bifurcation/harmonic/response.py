@@ -366,7 +366,7 @@ def _started(
         if level_name is not None:
             attempts.append(lambda values=values: _raised(  # type: ignore[misc]
                 field, values, free, field.index(level_name), method, options, held))
-        if isinstance(field, ContactField):
+        if isinstance(field, ContactField) and method.repeats is None:
             attempts.append(lambda values=values: _settled(  # type: ignore[misc]
                 field, values, free, method, options, held))
         for attempt in attempts:

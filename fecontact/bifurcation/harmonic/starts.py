@@ -18,6 +18,7 @@ from fecontact.bifurcation.harmonic.layout import element_rows, layout_of, memor
 from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.repeats import Repeats, ties_of
 from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.bifurcation.orbits import starts as orbit_starts
@@ -54,9 +55,10 @@ def problem_for(
         field, values.copy(), free, method.highest, method.count,
         np.zeros((2 * method.highest + 1, layout.harmonic)), scales, layout, periods,
         *timing_of(field, values, free), kept, orders=method.orders, stability=method.stability,
-        limits=limits)
-    # The problem is new: nobody has it yet.
-    object.__setattr__(found, "compiled", CompiledBalance.of(found))
+        limits=limits, ties=None if method.repeats is None else ties_of(method.repeats, field))
+    if found.ties is None:
+        # The problem is new: nobody has it yet.
+        object.__setattr__(found, "compiled", CompiledBalance.of(found))
     return found
 
 
@@ -163,7 +165,8 @@ def method_of(attributes: Mapping[str, Any]) -> HarmonicBalance:
     orders = attributes.get("orders")
     return HarmonicBalance(int(attributes["harmonics"]) if orders is None else
                            np.asarray(orders).tolist(), int(attributes["samples"]),
-                           stability=None if stability == "none" else stability)
+                           stability=None if stability == "none" else stability,
+                           repeats=Repeats.stored(attributes))
 
 
 def corrected(
