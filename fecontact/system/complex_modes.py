@@ -13,6 +13,8 @@ from fecontact.reduction.modal_basis import ModalBasis
 
 # Eigenvalues nearer than this, relative to the largest, share a space of eigenvectors.
 _REPEATED = 1e-9
+# Imaginary part, relative to the largest eigenvalue, that is rounding.
+_ROUNDED = 1e-13
 # Overlap of left and right eigenvectors below which there is no full set of them.
 _DEFECTIVE = 1e-14
 
@@ -64,7 +66,7 @@ class ComplexModes(Summarised):
         within : (d, k) array, optional
             Orthonormal columns that span the states which constraints allow.
         zero : float
-            Part of the largest eigenvalue up to which eigenvalues count as zero: rigid modes are
+            Part of the largest frequency up to which eigenvalues count as zero: rigid modes are
             double roots, which rounding parts.
 
         Raises
@@ -81,7 +83,9 @@ class ComplexModes(Summarised):
         free = np.eye(len(A)) if within is None else within
         eigenvalues, left, right = eig(free.T @ A @ free, left=True)
         left, right = free @ left, free @ right
-        size = np.abs(eigenvalues).max(initial=0.0)
+        # Fast decays, such as those of sliders without normal force, say nothing on frequencies.
+        largest, size = (np.abs(part).max(initial=0.0) for part in (eigenvalues, eigenvalues.imag))
+        size = size if size > _ROUNDED * largest else largest
         eigenvalues = np.where(np.abs(eigenvalues) <= zero * size, 0.0, eigenvalues)
         chosen = np.flatnonzero(eigenvalues.imag > 0.0)
         # Frequencies that coincide in flutter differ by rounding; the growing one comes first.
@@ -90,8 +94,8 @@ class ComplexModes(Summarised):
         found = np.asarray(eigenvalues[chosen], dtype=complex)
         shapes = right[:, chosen].astype(complex)
         if len(chosen):
-            largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(len(chosen))]
-            shapes = shapes * (np.abs(largest) / largest)
+            leading = shapes[np.abs(shapes).argmax(axis=0), np.arange(len(chosen))]
+            shapes = shapes * (np.abs(leading) / leading)
         duals = _biorthonormal(left[:, chosen].conj().astype(complex), shapes, found,
                                _REPEATED * size)
         real = np.sort(eigenvalues[eigenvalues.imag == 0.0].real)[::-1]

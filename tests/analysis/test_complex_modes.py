@@ -93,3 +93,13 @@ def test_linearised_contact():
     assert free == pytest.approx(np.sqrt(np.linalg.eigvalsh(K) - 0.05**2), rel=1e-9)
     with pytest.raises(InputError, match="A modal basis has no contact"):
         complex_modes(system.basis, "sliding")
+
+
+def test_fast_decays_hide_no_frequencies():
+    """Oscillators of 1 ... 1e6 rad/s and a rigid motion beside rates of -1e12: sliders at rest."""
+    w = np.array([0.0, 1.0, 7.0, 1e3, 1e6])
+    A = np.zeros((13, 13))
+    A[:5, 5:10], A[5:10, :5], A[10:, 10:] = np.eye(5), -np.diag(w**2), -1e12 * np.eye(3)
+    found = ComplexModes.of(A, zero=1e-7)
+    assert found.frequencies_hz == pytest.approx(w[1:] / (2.0 * np.pi), rel=1e-9)
+    assert len(found.real_eigenvalues) == 5
