@@ -15,6 +15,7 @@ import numpy as np
 
 from fecontact.core.checks import as_direction, as_place, is_numeric, require_kind
 from fecontact.core.errors import InputError, MeshError, shown
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Coordinates, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
@@ -104,7 +105,8 @@ class CyclicSymmetry:
         return np.linalg.norm(np.cross(self.axis, arm), axis=1)
 
 
-@dataclass(frozen=True)
+@read_only_arrays
+@dataclass(frozen=True, eq=False)
 class SectorNodes:
     """Nodes of a sector with neighbours: pairs ``low`` and ``high`` (p,), ``on_axis`` (a,)."""
 

@@ -352,16 +352,18 @@ class ModalBasis(Summarised):
                              f"{choices(self.boundaries) or 'none'}.")
         return np.asarray(self.boundary_rows[self.boundaries.index(boundary)])
 
-    def fields(self, q: ArrayLike) -> BodyFields:
+    def fields(self, q: ArrayLike, body: str | None = None) -> BodyFields:
         """Displacement and stress over the body at modal coordinates q (m,).
 
-        For example ``basis.fields(equilibrium(system).modal_coordinates)``. Stresses are as good
-        as the modes are for the loads: see ``loads`` of :func:`~fecontact.modal_basis`.
+        For example ``basis.fields(equilibrium(system).modal_coordinates)``; with ``body`` those of
+        one of several bodies. Stresses are as good as the modes are for the loads: see ``loads`` of
+        :func:`~fecontact.modal_basis`.
 
         Raises
         ------
         InputError
-            For a basis without shapes over the body, or another number of coordinates.
+            For a basis without shapes over the body, another number of coordinates, or an unknown
+            body.
         """
         shapes, values = self.mode_shapes, as_floats(q, "The modal coordinates")
         if shapes is None:
@@ -370,8 +372,17 @@ class ModalBasis(Summarised):
         if values.shape != (self.modes,):
             raise InputError(f"The modal coordinates must have shape ({self.modes},), not "
                              f"{values.shape}.")
-        return BodyFields(shapes.nodes, shapes.cells if shapes.elements is None
-                          else shapes.elements, shapes.shapes @ values, shapes.stress @ values)
+        elements = shapes.cells if shapes.elements is None else shapes.elements
+        first, end = 0, len(shapes.nodes)
+        if body is not None:
+            names = {part.name: part.nodes for part in self.parts}
+            if body not in names:
+                raise InputError(f"fields: there is no body {body!r}{nearest(body, names)}; the "
+                                 f"bodies are: {choices(names) or 'one without a name'}.")
+            first, end = names[body][0], sum(names[body])
+            elements = elements[(elements[:, 0] >= first) & (elements[:, 0] < end)] - first
+        return BodyFields(shapes.nodes[first:end], elements, shapes.shapes[first:end] @ values,
+                          shapes.stress[first:end] @ values)
 
     def with_dashpots(self, dashpots: Mapping[str | int, Sequence[float]]) -> "ModalBasis":
         """A copy with dashpots between points of the body and the inertial frame.

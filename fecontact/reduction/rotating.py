@@ -1,6 +1,6 @@
 """Rotation of a body in its modes: Coriolis, centrifugal and stress terms of the reduced body."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,12 +35,31 @@ class ModalRotation:
         stiffness.
     load : (m,) array
         ``W^2 load`` is the centrifugal force on the undeformed body.
+    axis, centre : (x, y, z)
+        Direction of the axis, and a point of it [m].
+    stressed : bool
+        Whether the stiffening includes that of the stress of the body, held by its supports alone.
     """
 
     speed: float
     coriolis: Array
     stiffening: Array
     load: Array
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    centre: tuple[float, ...] = (0.0, 0.0, 0.0)
+    stressed: bool = False
+
+    def in_modes(self, modes: Array) -> "ModalRotation":
+        """The same in other coordinates p, ``q = modes p`` with modes (m, k)."""
+        return replace(self, coriolis=modes.T @ self.coriolis @ modes,
+                       stiffening=modes.T @ self.stiffening @ modes, load=self.load @ modes)
+
+    def is_about_that_of(self, other: "ModalRotation") -> bool:
+        """True if both have the same axis and speed."""
+        apart = np.cross(np.subtract(self.centre, other.centre), self.axis)
+        size = 1e-9 * (1.0 + np.abs(self.centre).max())
+        return bool(self.speed == other.speed and np.abs(apart).max() <= size
+                    and np.allclose(self.axis, other.axis, rtol=0.0, atol=1e-9))
 
 
 def modal_rotation(
@@ -73,7 +92,8 @@ def modal_rotation(
         stiffening -= 0.5 * (softening + softening.T)
     if rotation.stress_stiffening:
         stiffening += _stress_stiffening(body, system, force, shapes)
-    return ModalRotation(rotation.speed, coriolis, stiffening, load)
+    return ModalRotation(rotation.speed, coriolis, stiffening, load, rotation.axis,
+                         (*rotation.centre, 0.0)[:3], rotation.stress_stiffening)
 
 
 def _stress_stiffening(

@@ -366,10 +366,6 @@ def elastic_bodies(study: Bodies, meshes: Mapping[str, Mesh], title: str) -> dic
             if one.body.symmetry is not None:
                 raise InputError("symmetry is for a single body, one sector of a wheel; leave it "
                                  "out.")
-            if one.body.rotation is not None:
-                raise InputError("rotation is for a single body: rows in its frame would turn "
-                                 "against those of the others. Prescribe the sliding of its "
-                                 "interfaces instead.")
             found[name] = one.body.elastic_body(meshes[name])
     return found
 
@@ -423,7 +419,8 @@ def body_bases(
         bases = reduce_bodies(
             bodies, list(faces.values()), made_links(study.links, bodies, title),
             modes={name: one.basis.modes for name, one in study.bodies.items()},
-            each={name: one.basis.options for name, one in study.bodies.items()})
+            each={name: {**one.basis.options, "rotation": one.body.rotation}
+                  for name, one in study.bodies.items()})
     for name, one in study.bodies.items():
         with located(f"{title}: [bodies.{name}.basis]:"):
             found[name] = one.basis.finished(bases[name])

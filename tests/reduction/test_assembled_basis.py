@@ -193,7 +193,7 @@ def test_bad_bodies_are_named(pair):
     bodies, pairing, bases, whole = pair
     turning = modal_basis(bodies["pad"], 6, contact=(), rotation=Rotation(10.0))
     for message, given, pairings in (
-        ("Body 'pad' rotates", {**bases, "pad": turning}, {}),
+        ("rotates with the stress that its supports", {**bases, "pad": turning}, {}),
         ("Body 'both' consists of several", {"both": whole}, {}),
         ("'disc', 'pad' all have a point C",
          {**bases, "disc": modal_basis(bodies["disc"], 4, contact=(), C=(1.0, -0.25))}, {}),

@@ -9,6 +9,7 @@ from fecontact import (
     ContactSystem,
     ElasticBody,
     InputError,
+    Interface,
     Load,
     Material,
     Mesh,
@@ -18,8 +19,10 @@ from fecontact import (
     static_solution,
 )
 from fecontact.analysis import complex_modes
-from fecontact.fem import Ring, Rotation
+from fecontact.fem import Ring, Rotation, pair_faces
+from fecontact.io import read_basis, write_basis
 from fecontact.laws import Frictionless, LinearContact
+from fecontact.reduction import FaceWeld, assembled_basis, reduce_bodies
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 
@@ -146,6 +149,54 @@ def test_centrifugal_load_presses_a_contact():
                             Load(), rotation=Rotation(W, centre, axis=(0.0, 1.0, 0.0)))
     top = state.displacement[body.nodes[:, 2] > size[2] - 1e-9, 2]
     assert (top < 0.0).all()
+
+
+def test_bodies_that_rotate_together_press_each_other(tmp_path):
+    """A block that can slide outwards leans on the next one with m W^2 r."""
+    W, size = 40.0, 0.1
+    rotation = Rotation(W, (-0.5, 0.5 * size), stress_stiffening=False)
+    bodies = {"inner": ElasticBody(rectangle(size, size, 2, 2), STEEL, fixed={"bottom": "y"}),
+              "outer": ElasticBody(rectangle(size, size, 2, 2).placed((size, 0.0)), STEEL,
+                                   fixed={"right": "xy"})}
+    pairing = pair_faces(bodies, "inner.right", "outer.left", nodes=2)
+    bases = reduce_bodies(bodies, [pairing], modes=6, rotation=rotation)
+    system = ContactSystem(bodies=bases, interfaces=[
+        Interface("root", pairing, LinearContact(1e10), Frictionless())])
+    force = equilibrium(system).normal_force.sum()
+    assert force == pytest.approx(bodies["inner"].total_mass * W**2 * (0.5 + 0.5 * size), rel=1e-4)
+    faster = equilibrium(system.with_(**{"basis.rotation.speed": 2.0 * W})).normal_force.sum()
+    assert faster == pytest.approx(4.0 * force, rel=1e-3)
+    write_basis(tmp_path / "basis.h5", system.basis)
+    assert read_basis(tmp_path / "basis.h5").rotation.centre == (-0.5, 0.05, 0.0)
+    slower = reduce_bodies(bodies, [pairing], modes=6, rotation=rotation,
+                           each={"outer": {"rotation": Rotation(
+                               W, (-0.4, 0.05), stress_stiffening=False)}})
+    with pytest.raises(InputError, match="'outer' does not rotate as 'inner' does"):
+        assembled_basis(slower, {"root": pairing})
+
+
+def test_welded_halves_rotate_like_the_whole():
+    """With the stress of their common state, in which the inner half carries the outer one."""
+    free, rotation = (Rotation(250.0, (0.0, 0.02), stress_stiffening=on) for on in (False, True))
+    whole = ElasticBody(rectangle(1.0, 0.04, 20, 1), STEEL, fixed={"left": "xy"})
+    halves = {"first": ElasticBody(rectangle(0.5, 0.04, 10, 1), STEEL, fixed={"left": "xy"}),
+              "second": ElasticBody(rectangle(0.5, 0.04, 10, 1).placed((0.5, 0.0)), STEEL)}
+    weld = FaceWeld(pair_faces(halves, "first.right", "second.left"))
+
+    def joined(each, how):
+        return assembled_basis(reduce_bodies(halves, [], [weld], modes=14, rotation=how,
+                                             each=each), {}, [weld])
+
+    basis = joined({}, free)
+    q = np.linalg.solve(basis.stiffness_matrix, basis.centrifugal_load)
+    basis = joined({name: {"prestress": basis.fields(q, name)} for name in halves}, free)
+    expected = modal_basis(whole, 24, contact=(), rotation=rotation)
+    found, wanted = (complex_modes(one).frequencies_hz[:3] for one in (basis, expected))
+    assert found == pytest.approx(wanted, rel=2e-3)
+    with pytest.raises(InputError, match="pull on each other"):
+        joined({}, rotation)
+    with pytest.raises(InputError, match=r"no body 'third'.*'first'"):
+        basis.fields(np.zeros(basis.modes), "third")
 
 
 def test_bad_axes_are_refused():

@@ -325,7 +325,7 @@ def test_commands_name_bodies_and_interfaces(tmp_path, capsys, monkeypatch):
     ({"interfaces.lining.other": "block.contact"},
      r"\[interfaces\.lining\]: no node of 'pad\.contact' has a partner on 'block\.contact'"),
     ({"bodies.pad.body.rotation": {"speed": 1.0}},
-     r"\[bodies\.pad\.body\]: rotation is for a single body"),
+     r"Body 'pad' does not rotate as '.*' does"),
     ({"bodies.pad": {"body": {}}}, r"\[bodies\.pad\] lacks the section \[bodies\.pad\.geometry\]"),
     ({"bodies.pad.geometri": {}}, r"\[bodies\.pad\] has no key 'geometri'"),
     ({"bodies.pad.geometry.widht": 1.0}, r"\[bodies\.pad\.geometry\] has no key 'widht'"),

@@ -292,9 +292,12 @@ def _elements(group: Any, nodes: int, dimension: int) -> Any:
 
 
 def _read_rotation(group: Any, modes: int) -> ModalRotation:
+    speed, stressed = (values(member(group, name)).item() for name in ("speed", "stressed"))
+    axis, centre = (tuple(bounded(group, name, (3,)).tolist()) for name in ("axis", "centre"))
     return ModalRotation(
-        float(values(member(group, "speed")).item()), bounded(group, "coriolis", (modes, modes)),
-        bounded(group, "stiffening", (modes, modes)), bounded(group, "load", (modes,)))
+        float(speed), bounded(group, "coriolis", (modes, modes)),
+        bounded(group, "stiffening", (modes, modes)), bounded(group, "load", (modes,)), axis,
+        centre, bool(stressed))
 
 
 def _read_quality(

@@ -6,7 +6,7 @@ assembled basis, for which a system needs no knowledge of the bodies.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, sp
 from fecontact.reduction.assembly.point_pairing import PointPairing
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
+from fecontact.reduction.rotating import ModalRotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,7 @@ def assembled_basis(
     ------
     InputError
         For names that are not those of bodies and points, names with a dot or used twice, pairings
-        of other meshes, bodies that rotate, and B or C at two bodies.
+        of other meshes, bodies that rotate differently, and B or C at two bodies.
     """
     require_kind("Several bodies", Mapping, bodies=bases, interfaces=pairings)
     _check_bodies(bases)
@@ -166,10 +167,21 @@ def assembled_basis(
         parts=places.parts,
         springs=tuple(springs),
         first_passes=tuple(halves),
+        rotation=_rotation(bases, places),
     )
     joints = [link for link in (links.values() if isinstance(links, Mapping) else links)
               if not isinstance(link, NonlinearSpring)]
     return linked(whole, joints) if joints else whole
+
+
+def _rotation(bases: Mapping[str, ModalBasis], places: "_Places") -> ModalRotation | None:
+    """The rotation that all bodies have in common."""
+    given = [one.rotation for one in bases.values() if one.rotation is not None]
+    if not given:
+        return None
+    return replace(given[0], coriolis=places.blocks([one.coriolis for one in given]),
+                   stiffening=places.blocks([one.stiffening for one in given]),
+                   load=np.concatenate([one.load for one in given]))
 
 
 class _Places:
@@ -335,13 +347,23 @@ def _check_bodies(bases: Mapping[str, ModalBasis]) -> None:
     for name, basis in bases.items():
         _check_name("body", name)
         require_kind(f"Body '{name}'", ModalBasis, basis=basis)
-        if basis.rotation is not None:
-            raise InputError(f"Body '{name}' rotates, which bodies of an assembly cannot do: rows "
-                             f"in its frame would turn against those of the others. Leave out "
-                             f"rotation and prescribe the sliding of its interfaces.")
         if basis.parts:
             raise InputError(f"Body '{name}' consists of several bodies itself; give these one by "
                              f"one.")
+    (first, one), *_ = bases.items()
+    for name, basis in bases.items():
+        if (basis.rotation is None) != (one.rotation is None) or (
+                basis.rotation is not None and one.rotation is not None
+                and not basis.rotation.is_about_that_of(one.rotation)):
+            raise InputError(f"Body '{name}' does not rotate as '{first}' does: rows in one frame "
+                             f"would turn against those of the other. Give all bodies the same "
+                             f"axis and speed, or leave out rotation and prescribe the sliding "
+                             f"of interfaces.")
+        if basis.rotation is not None and basis.rotation.stressed and len(bases) > 1:
+            raise InputError(f"Body '{name}' rotates with the stress that its supports alone make, "
+                             f"but bodies of an assembly pull on each other; give "
+                             f"Rotation(..., stress_stiffening=False), and the stress of the "
+                             f"common static state as prestress.")
     kinds = {name: basis.dimension for name, basis in bases.items()}
     if len(set(kinds.values())) > 1:
         plane, solid = (choices([name for name, d in kinds.items() if d == one]) for one in (2, 3))

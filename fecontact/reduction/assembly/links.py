@@ -218,7 +218,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     Parameters
     ----------
     basis : ModalBasis
-        Of one or several bodies that do not rotate.
+        Of one or several bodies.
     links : sequence of Spring, Bushing, Hinge, Weld or FaceWeld
         Between points of the basis; nonlinear springs only count in
         :func:`~fecontact.reduction.assembled_basis`.
@@ -282,6 +282,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
         boundary_rows=basis.boundary_rows @ modes,
         stiffness=None if skew is None else np.diag(w**2) + modes.T @ skew @ modes,
         parts=tuple(replace(part, modes=(0, 0)) for part in basis.parts),
+        rotation=None if basis.rotation is None else basis.rotation.in_modes(modes),
         link_load=load @ modes if load.any() else None,
     )
 
