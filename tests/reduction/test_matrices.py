@@ -299,7 +299,7 @@ def test_files_of_another_kind(tmp_path, suffix):
 
 def test_other_files():
     with pytest.raises(InputError, match=r"K\.op4: matrices are not read .* suffixes that are: "
-                                         r"\.mat, \.mm, \.mtx, \.npy, \.npz"):
+                                         r"\.dmig, \.mat, \.mm, \.mtx, \.npy, \.npz, \.pch"):
         read_matrix("K.op4")
     with pytest.raises(InputError, match=r"K\.mtx: there is no such file"):
         read_matrix("K.mtx")

@@ -14,6 +14,8 @@ from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
 from fecontact.core.read_only import read_only_arrays
 from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
+from fecontact.reduction.matrix_files.nastran import read_dmig
+from fecontact.reduction.matrix_files.substructure import HEADING, read_substructure
 
 _BANNER = b"%%MatrixMarket"
 
@@ -64,15 +66,16 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
 
     Matrix Market (.mtx, .mm), MATLAB (.mat up to version 7.3), NumPy and SciPy (.npy, .npz), and
     the text files of Abaqus' ``*MATRIX OUTPUT`` (.mtx) in the formats COORDINATE and MATRIX
-    INPUT; the format of a .mtx file is found from its content. One triangle of a symmetric
-    matrix suffices.
+    INPUT and of ``*SUBSTRUCTURE MATRIX OUTPUT`` (named STIFFNESS, MASS), and DMIG of Nastran's
+    punch files (.pch, .dmig); the format of a .mtx file is found from its content. One triangle of
+    a symmetric matrix suffices.
 
     Parameters
     ----------
     path : str or Path
         The file.
     name : str, optional
-        Name of the matrix in a file with several (.mat, .npz, MATRIX INPUT).
+        Name of the matrix in a file with several (.mat, .npz, MATRIX INPUT, DMIG, substructures).
 
     Raises
     ------
@@ -81,7 +84,7 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     """
     path = as_path(path, "a matrix")
     readers = {".mtx": _read_mtx, ".mm": _read_mtx, ".mat": _read_mat, ".npz": _read_npz,
-               ".npy": _read_npy}
+               ".npy": _read_npy, ".pch": read_dmig, ".dmig": read_dmig}
     if path.suffix.lower() not in readers:
         raise InputError(f"{path}: matrices are not read from files of this kind; the suffixes "
                          f"that are: {', '.join(sorted(readers))}.")
@@ -106,6 +109,9 @@ def _read_mtx(path: Path, name: str | None) -> tuple[Any, NDArray[np.int64] | No
     with path.open("rb") as stream:
         first = stream.readline()
     if not first.startswith(_BANNER):
+        text = path.read_text(encoding="utf-8", errors="replace")
+        if f"*{HEADING}" in text.upper():
+            return read_substructure(text, name)
         return read_abaqus_matrix(path, name)
     from scipy.io import mminfo, mmread
 

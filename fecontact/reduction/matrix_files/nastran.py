@@ -1,0 +1,137 @@
+"""Matrices of Nastran as text: DMIG in bulk data and punch files (.pch, .dmig, .bdf).
+
+A heading ``DMIG, NAME, 0, IFO, TIN`` says by IFO whether the matrix is square (1) or symmetric
+(6), of which one triangle is given. Each column ``DMIG, NAME, GJ, CJ, , G1, C1, A1, B1, G2, ...``
+holds the values A of rows (grid point G, component C); components of scalar points are 0. Fields
+are 8 or, after ``*``, 16 characters wide, or parted by commas.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.types import Integers
+
+_SYMMETRIC, _SQUARE = "6", "1"
+_COMPLEX = ("3", "4")
+
+
+def read_dmig(path: Path, name: str | None) -> tuple[Any, Integers]:
+    """Sparse matrix (d, d) and the labels (d, 2) of its degrees of freedom, point and component.
+
+    They are ordered by point and component.
+
+    Raises
+    ------
+    InputError
+        For a file without DMIG, an unknown name, complex or rectangular matrices, and fields that
+        are no numbers, with the number of the line.
+    """
+    import scipy.sparse as sp
+
+    headings: dict[str, list[str]] = {}
+    entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
+    for line, fields in _cards(path.read_text(encoding="utf-8", errors="replace")):
+        own, rest = fields[0].upper(), fields[1:]
+        if rest[0] == "0":
+            headings[own] = rest
+            continue
+        entries.setdefault(own, []).extend(_column(line, rest))
+    if not headings:
+        raise InputError("The file holds no DMIG; write the matrices with EXTSEOUT(DMIGPCH) or "
+                         "PARAM,EXTOUT,DMIGPCH.")
+    if name is None and len(headings) > 1:
+        raise InputError(f"Say which matrix to read by its name; the file holds: "
+                         f"{choices(headings)}.")
+    chosen = next(iter(headings)) if name is None else name.upper()
+    if chosen not in headings:
+        raise InputError(f"There is no matrix '{name}'{nearest(chosen, headings)}; the file holds: "
+                         f"{choices(headings)}.")
+    form, kind = (*headings[chosen][1:3], "", "")[:2]
+    if form not in (_SQUARE, _SYMMETRIC) or kind in _COMPLEX:
+        what = "complex" if kind in _COMPLEX else f"of the form {form!r}"
+        raise InputError(f"The matrix '{chosen}' is {what}; real square (1) and symmetric (6) ones "
+                         f"are read.")
+    rows = entries.get(chosen, [])
+    if not rows:
+        raise InputError(f"The matrix '{chosen}' has no columns.")
+    pairs = np.array([one[:4] for one in rows], np.int64).reshape(-1, 2)
+    labels, number = np.unique(pairs, axis=0, return_inverse=True)
+    column, row = number.reshape(-1, 2).T
+    values = np.array([one[4] for one in rows])
+    size = len(labels)
+    if len(np.unique(row * size + column)) < len(row):
+        raise InputError(f"The matrix '{chosen}' gives an entry a second time.")
+    if form == _SYMMETRIC:
+        beside = row != column
+        row, column, values = (np.concatenate([one, other[beside]]) for one, other in (
+            (row, column), (column, row), (values, values)))
+    return sp.csc_array((values, (row, column)), shape=(size, size)), labels
+
+
+def _column(line: int, fields: list[str]) -> Iterator[tuple[int, int, int, int, float]]:
+    """Point and component of a column, then of a row, and the value, of one card."""
+    point, component = (_whole(line, word) for word in fields[:2])
+    # Rows have four fields: point, component, real and imaginary part.
+    for start in range(3, len(fields), 4):
+        group = fields[start : start + 3]
+        if not any(group):
+            continue
+        if len(group) < 3:
+            raise InputError(f"Card of line {line} ends within an entry of a DMIG, so the file may "
+                             f"be cut off.")
+        yield point, component, _whole(line, group[0]), _whole(line, group[1]), _real(
+            line, group[2])
+
+
+def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Fields after the word DMIG of each card, with continuations, and the line of its begin."""
+    card: list[str] | None = None
+    begin = 0
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.partition("$")[0].rstrip()
+        if not line.strip():
+            continue
+        head, fields = _fields(line)
+        if card is not None and head[:1] in ("", "+", "*"):
+            card += fields
+            continue
+        if card is not None:
+            yield begin, card
+        card, begin = (fields if head.rstrip("*").upper() == "DMIG" else None), number
+    if card is not None:
+        yield begin, card
+
+
+def _fields(line: str) -> tuple[str, list[str]]:
+    """First field of a line and its others: 4 wide ones after ``*``, else 8."""
+    if "," in line:
+        head, *fields = (word.strip() for word in line.split(","))
+        count = 4 if "*" in head else 8
+        return head, (fields + [""] * count)[:count]
+    head = line[:8].strip()
+    width, count = (16, 4) if "*" in head else (8, 8)
+    return head, [line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)]
+
+
+def _whole(line: int, word: str) -> int:
+    try:
+        return int(word)
+    except ValueError:
+        raise InputError(f"Card of line {line}: {word[:40]!r} is no number of a point or component "
+                         f"of a DMIG.") from None
+
+
+def _real(line: int, word: str) -> float:
+    """A number, also with D for E, or without either, as 1.5-3."""
+    plain = word.upper().replace("D", "E")
+    sign = max(plain.rfind("+"), plain.rfind("-"))
+    if "E" not in plain and sign > 0:
+        plain = f"{plain[:sign]}E{plain[sign:]}"
+    try:
+        return float(plain)
+    except ValueError:
+        raise InputError(f"Card of line {line}: {word[:40]!r} is not a number of a DMIG.") from None
