@@ -22,6 +22,7 @@ from .report import BasisReport
 from .restriction import rows_from_dofs
 from .rotating import ModalRotation
 from .sector_modes import SectorModes, WheelShape, sector_modes
+from .sector_rotation import SectorRotation
 
 __all__ = [
     "BasisReport",
@@ -43,6 +44,7 @@ __all__ = [
     "PolynomialSpring",
     "ReductionQuality",
     "SectorModes",
+    "SectorRotation",
     "Spring",
     "TightenedBolts",
     "Weld",

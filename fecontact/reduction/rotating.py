@@ -50,7 +50,7 @@ class ModalRotation:
     stressed: bool = False
 
     def in_modes(self, modes: Array) -> "ModalRotation":
-        """The same in other coordinates p, ``q = modes p`` with modes (m, k)."""
+        """Rotation in other coordinates p, ``q = modes p`` with modes (m, k)."""
         return replace(self, coriolis=modes.T @ self.coriolis @ modes,
                        stiffening=modes.T @ self.stiffening @ modes, load=self.load @ modes)
 

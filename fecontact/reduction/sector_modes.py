@@ -19,8 +19,10 @@ from fecontact.fem.cyclic_symmetry import (
 )
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import body_elements, linear_cells
+from fecontact.fem.rotation import Rotation
 from fecontact.reduction.eigenmodes import FreeSystem, free_modes, frequencies_of
 from fecontact.reduction.reduce_body import first_order
+from fecontact.reduction.sector_rotation import SectorRotation, sector_rotation
 from fecontact.reduction.solid_motions import rigid_motions
 
 # Singular values of motions below which they keep the symmetry and the supports: faces of files in
@@ -54,6 +56,8 @@ class SectorModes(Summarised):
         First-order edges or facets of its outline that meet no neighbour.
     joined : SectorNodes
         Nodes that it shares with its neighbours.
+    rotation : SectorRotation or None
+        Terms of a rotation in these modes; ``rotation.frequencies_hz(speed)`` are those at speed.
     """
 
     symmetry: CyclicSymmetry
@@ -64,6 +68,7 @@ class SectorModes(Summarised):
     elements: Integers
     outline: Integers
     joined: SectorNodes
+    rotation: SectorRotation | None = None
 
     def summary(self) -> list[tuple[str, str]]:
         """Sectors, nodal diameters and frequencies."""
@@ -143,6 +148,7 @@ def sector_modes(
     modes: int = 6,
     *,
     diameters: Sequence[int] | Literal["all"] = "all",
+    rotation: Rotation | None = None,
 ) -> SectorModes:
     """Modes of a wheel of N equal sectors, each nodal diameter from one sector.
 
@@ -160,6 +166,9 @@ def sector_modes(
         Number of modes of each nodal diameter, the lowest, rigid ones included.
     diameters : sequence of int or 'all'
         Nodal diameters k from 0 to N / 2.
+    rotation : Rotation, optional
+        About the axis of the symmetry. Modes stay those at rest and carry the motion at speed: keep
+        enough of them.
 
     Raises
     ------
@@ -171,10 +180,15 @@ def sector_modes(
     nodes = sector_nodes(body, symmetry)
     chosen = _chosen(symmetry, diameters)
     found = [_modes_of(body, symmetry, nodes, k, modes) for k in chosen]
+    frequencies, shapes = (np.array(one) for one in zip(*found, strict=True))
+    turning = None
+    if rotation is not None:
+        B, inverse = cyclic_expansion(body, symmetry, nodes, 0)
+        rigid = _rigid(body, B, inverse, B.T @ body.mass @ B)
+        turning = sector_rotation(body, symmetry, rotation, frequencies**2, shapes, (B, rigid))
     return SectorModes(
-        symmetry, tuple(chosen), np.array([w for w, _ in found]) / (2.0 * np.pi),
-        np.array([shapes for _, shapes in found]), body.nodes, body_elements(body),
-        _open_outline(body, symmetry), nodes)
+        symmetry, tuple(chosen), frequencies / (2.0 * np.pi), shapes, body.nodes,
+        body_elements(body), _open_outline(body, symmetry), nodes, turning)
 
 
 def _chosen(symmetry: CyclicSymmetry, diameters: Iterable[int] | str) -> list[int]:

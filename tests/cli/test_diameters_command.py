@@ -25,6 +25,9 @@ def test_diameters_of_a_ring(tmp_path, capsys):
     table = np.genfromtxt(tmp_path / "ring-diameters.csv", delimiter=",", names=True)
     assert table["diameter"].tolist() == [0.0, 1.0, 2.0]
     assert table["frequency_hz_1"][2] > 0.0
+    assert execute(["diameters", str(path), "--modes", "3", "-o", str(tmp_path), "--set",
+                    "body.rotation.speed=50.0"]) == 0
+    assert "backwards at 50 rad/s" in capsys.readouterr().out
     for kind in ("diameters", "wheel"):
         assert (tmp_path / f"ring-{kind}.png").stat().st_size > 10_000
 

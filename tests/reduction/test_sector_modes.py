@@ -5,8 +5,9 @@ import pytest
 from meshes_for_tests import grid
 from sectors import hexagon_sector, ring_sector, whole_wheel
 
-from fecontact import ElasticBody, InputError, Material, Mesh, MeshError
-from fecontact.fem import CyclicSymmetry
+from fecontact import ElasticBody, InputError, Material, Mesh, MeshError, modal_basis
+from fecontact.analysis import complex_modes
+from fecontact.fem import CyclicSymmetry, Rotation
 from fecontact.reduction import eigenfrequencies_hz, sector_modes
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
@@ -77,6 +78,48 @@ def test_thin_ring_has_its_closed_form():
     assert np.abs(found.frequencies_hz[found.row(3)] / five - 1.0).min() < 1e-2
     assert found.frequencies_hz[0, 0] == 0.0
     assert found.frequencies_hz[1, 0] == 0.0
+
+
+def test_thin_ring_that_rotates_has_its_closed_form():
+    """+-2 n W / (n^2 + 1) + sqrt(w_n^2 + (n (n^2 - 1) W / (n^2 + 1))^2), backwards and forwards.
+
+    The one that runs backwards is faster, seen from the ring.
+    """
+    N, R, h = 8, 1.0, 0.04
+    mesh = grid(np.array([R - 0.5 * h, R + 0.5 * h]), np.linspace(0.0, 2.0 * np.pi / N, 13),
+                warp=lambda at: at[:, :1] * np.column_stack([np.cos(at[:, 1]), np.sin(at[:, 1])]))
+    found = sector_modes(ElasticBody(mesh, STEEL), ring_symmetry(N), 6, rotation=Rotation(0.0))
+    w = 2.0 * np.pi * found.frequencies_hz
+    W = 0.6 * w[2, 0]
+    forward, backward = found.rotation.frequencies_hz(W)
+    for n in (2, 3):
+        root = np.sqrt(w[n, 0] ** 2 + (n * (n**2 - 1) / (n**2 + 1) * W) ** 2)
+        for seen, sign in ((backward, 1.0), (forward, -1.0)):
+            expected = (root + sign * 2.0 * n * W / (n**2 + 1)) / (2.0 * np.pi)
+            assert seen[n, 0] == pytest.approx(expected, rel=3e-3)
+    assert found.rotation.frequencies_hz(0.0)[0][2] == pytest.approx(found.frequencies_hz[2])
+    # A free ring that is shifted goes straight on, which the ring sees as waves backwards.
+    assert 2.0 * np.pi * backward[1, :2] == pytest.approx([W, W], rel=1e-6)
+    assert np.isfinite(forward[2]).all()
+
+
+@pytest.mark.parametrize("name", ["even, held", "solid, held"])
+def test_rotating_sector_is_the_rotating_wheel(name):
+    """With modes enough of both."""
+    mesh, symmetry, fixed, options = CASES[name]
+    fixed = fixed if name == "even, held" else {"bottom": "xyz"}
+    sector = ElasticBody(mesh(), STEEL, fixed=fixed, **options)
+    wheel = ElasticBody(whole_wheel(sector.mesh, symmetry), STEEL, fixed=fixed, **options)
+    W = 0.3 * 2.0 * np.pi * eigenfrequencies_hz(wheel, 3)[-1]
+    rotation = Rotation(W)
+    found = sector_modes(sector, symmetry, 24, rotation=rotation)
+    forward, backward = found.rotation.frequencies_hz(W)
+    ours = np.sort(np.concatenate([np.concatenate([backward[k]] if symmetry.is_real(k) else [
+        forward[k], backward[k]]) for k in found.diameters]))[:6]
+    basis = modal_basis(wheel, 24 * symmetry.sectors, contact=(), rotation=rotation)
+    assert ours == pytest.approx(complex_modes(basis).frequencies_hz[:6], rel=2e-4)
+    with pytest.raises(InputError, match="same axis and centre"):
+        sector_modes(sector, symmetry, 3, rotation=Rotation(W, (0.1, 0.0)))
 
 
 def test_axis_may_point_anywhere():

@@ -117,8 +117,9 @@ def diameters(
 ) -> None:
     """Frequencies of a wheel over its nodal diameters, from the sector of [body.symmetry].
 
-    Writes NAME-diameters.png and .csv, and draws the lowest elastic mode of each diameter over the
-    whole wheel to NAME-wheel.png.
+    Writes NAME-diameters.png and .csv with the frequencies at rest, and draws the lowest elastic
+    mode of each diameter over the whole wheel to NAME-wheel.png. With [body.rotation] it prints the
+    frequencies of waves that run forwards and backwards at this speed.
     """
     import numpy as np
 
@@ -139,10 +140,18 @@ def diameters(
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"), located(f"{described.title}: [body.symmetry]:",
                                                  "CyclicSymmetry"):
-            found = sector_modes(described.elastic_body(), described.body.symmetry, modes)
-        show(table("diameter", "frequencies [Hz]", left=2, rows=(
-            (str(k), ", ".join(f"{value:.5g}" for value in row))
-            for k, row in zip(found.diameters, found.frequencies_hz, strict=True))))
+            turning = described.body.rotation
+            found = sector_modes(described.elastic_body(), described.body.symmetry, modes,
+                                 rotation=turning)
+        seen = {"frequencies [Hz]": found.frequencies_hz}
+        if turning is not None and found.rotation is not None:
+            at_speed = found.rotation.frequencies_hz(turning.speed)
+            seen = dict(zip((f"{way} at {turning.speed:g} rad/s [Hz]" for way in (
+                "forwards", "backwards")), at_speed, strict=True))
+        show(table("diameter", *seen, left=1 + len(seen), rows=(
+            (str(k), *(", ".join(f"{value:.5g}" for value in values[row][np.isfinite(values[row])])
+                       for values in seen.values()))
+            for row, k in enumerate(found.diameters))))
         name = folder / described.name
         files = [name.with_name(f"{described.name}-{kind}") for kind in (
             "diameters.csv", "diameters.png", "wheel.png")]
