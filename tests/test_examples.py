@@ -56,6 +56,12 @@ EXAMPLES = {
                                  (r"^limit cycle at (\S+) Hz", 4550.0, 40.0)],
                       {f"out/{name}.png" for name in ("squeal_of_disc", "contact_of_pad",
                                                       "disc_and_pad")}),
+    # A stuck blade with the springs of both contacts, in closed form.
+    "bladed_wheel": (("out",), [(r"^1000.0 N: peak \S+ um at (\S+) Hz", 504.39, 0.02),
+                                (r"stuck (\S+) Hz", 504.39, 0.01),
+                                (r"^diameter 4 at .* (\S+) Hz backwards", 785.9, 0.5)],
+                     {f"out/{name}.png" for name in ("wheel_diameters", "wheel_modes",
+                                                     "blade_tips")}),
     "friction_damper": (("out",), [(r"^free: .* at (\S+) Hz", 92.80, 0.01),
                                    (r"^stuck: .* at (\S+) Hz", 113.18, 0.02),
                                    (r"^best load (\S+) N", 5.0, 0.5)], {"out/friction_damper.png"}),

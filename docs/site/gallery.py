@@ -20,7 +20,7 @@ GROUPS = {
         "line_contact", "two_bodies", "two_spheres", "pressed_sphere", "stacked_blocks",
         "contact_convergence"),
     "Joints and dampers": ("lap_joint", "bolted_plate", "clamped_layers", "friction_damper",
-                           "frequency_response", "blade_pair", "nonlinear_modes"),
+                           "frequency_response", "blade_pair", "bladed_wheel", "nonlinear_modes"),
     "Solids": ("sliding_box", "thrown_block", "dithered_friction", "tipping_pad"),
     "Own laws, other programs, many computers": (
         "own_law", "from_other_programs", "sweep_on_dask"),
