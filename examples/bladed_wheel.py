@@ -82,6 +82,7 @@ def stuck_hz() -> float:
 
 def main(folder: Path = Path(), quick: bool = False) -> None:
     """Prints frequencies and peaks; pictures in the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
     symmetry, diameters = CyclicSymmetry("low", "high", N), range(2, N // 2 + 1)
     wheel = sector_modes(sector(), symmetry, 3)
     print("first modes of 2 diameters and more:",
