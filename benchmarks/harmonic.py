@@ -34,7 +34,7 @@ from fecontact.bifurcation import (
     orbit_branch,
 )
 from fecontact.laws import (
-    BilateralCubic,
+    BilateralPolynomial,
     ConstantFriction,
     JenkinsFriction,
     PrescribedForce,
@@ -140,7 +140,7 @@ def duffing_system() -> fc.ContactSystem:
     rows[1, 0] = 1.0
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.05]])
-    return fc.ContactSystem(basis, normal=BilateralCubic(0.0, 0.1), drive=fc.Drive(
+    return fc.ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), drive=fc.Drive(
         stiffness_y=1.0, amplitude_y=0.18, angular_frequency=0.8))
 
 

@@ -31,7 +31,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "back-burdekin": {"nominal_area": 1e-4, "coefficient": 1e-9},
     "greenwood-williamson": {"asperities": 1e4, "asperity_radius": 1e-5,
                              "composite_modulus": 1e11, "height_deviation": 1e-6},
-    "bilateral-cubic": {"stiffness": 1e7, "cubic_stiffness": 1e17},
+    "bilateral-polynomial": {"stiffness": 1e7, "cubic_stiffness": 1e17},
     "bilateral-play": {"stiffness": 1e7, "clearance": 1e-6},
     "bilateral-piecewise": {"elongations": (-1e-6, 0.0, 1e-6), "forces": (-20.0, 0.0, 10.0)},
     "two-sided-stop": {"stiffness": 1e7, "clearance": 1e-3},

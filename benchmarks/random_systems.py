@@ -502,13 +502,16 @@ def random_normal(name: str, rng: np.random.Generator, n: int, force: float) -> 
         return (laws.TwoSidedStop(each(c), clearance, 1.0, chi), STOP, [c, clearance, chi], *empty)
     if name == "prescribed-force":
         return laws.PrescribedForce(each(force)), PRESCRIBED, [force], *empty
-    if name == "bilateral-cubic":
+    if name == "cubic spring":
         cubic = c / R**2 * 1e-2
-        return laws.BilateralCubic(each(c), each(cubic), each(0.1 * d)), CUBIC, [
+        return laws.BilateralPolynomial(each(c), each(cubic), each(0.1 * d)), CUBIC, [
             c, cubic, 0.1 * d], *empty
     if name == "bilateral-polynomial":
         terms = [c, 0.1 * c / R, 0.01 * c / R**2, 1e-5 * c / R**4, 0.1 * d, d, 10.0 * d]
-        return (laws.BilateralPolynomial(*map(each, terms)), POLYNOMIAL, terms, *empty)
+        names = ("stiffness", "quadratic_stiffness", "cubic_stiffness", "quintic_stiffness",
+                 "damping", "quadratic_damping", "cubic_damping")
+        law = laws.BilateralPolynomial(**dict(zip(names, map(each, terms), strict=True)))
+        return law, POLYNOMIAL, terms, *empty
     if name == "bilateral-play":
         return laws.BilateralPlay(each(c), R, each(d)), PLAY, [c, R, d], *empty
     assert name == "bilateral-piecewise"
@@ -572,12 +575,11 @@ def random_friction(name: str, rng: np.random.Generator, n: int) -> tuple[Any, i
 def normal_name(number: int) -> str:
     """Name of the normal law of a number: the next, so that tests keep the systems they name.
 
-    The polynomial spring takes every other turn of the cubic one.
+    The polynomial spring has its cubic term alone in every other turn.
     """
-    known = [name for name in NORMAL if name != "bilateral-polynomial"]
-    turn, place = divmod(number, len(known))
-    name = known[place]
-    return "bilateral-polynomial" if name == "bilateral-cubic" and turn % 2 else name
+    turn, place = divmod(number, len(NORMAL))
+    name = NORMAL[place]
+    return "cubic spring" if name == "bilateral-polynomial" and turn % 2 == 0 else name
 
 
 def random_case(number: int) -> Case:

@@ -124,7 +124,7 @@ def plot(system: fc.ContactSystem, run: fc.Trajectory, frictions: np.ndarray, pa
         map_.legend(entries.values(), entries, loc="upper left")
         map_.set(xlabel="friction coefficient", ylabel="growth of modes near 8 kHz [1/s]")
         steady = initial_state(system, "sliding", 0.0)[: system.basis.modes]
-        along = system.basis.T[system.basis.point_index("pad1.back"), 1]
+        along = system.basis.point_row("pad1.back", "y")
         y = 1e6 * (run.modal_coordinates - steady) @ along
         whole.plot(1e3 * run.time, y, color=COLOURS[0], lw=0.6)
         envelope = np.abs(y[run.time < period]).max() * np.exp(rate * run.time)

@@ -61,7 +61,7 @@ def amplitudes(load: float, frequencies: np.ndarray, periods: int) -> np.ndarray
     found = strobe(systems, transient_periods=KEPT * periods, keep=KEPT,
                    period=1.0 / (KEPT * np.asarray(frequencies)))
     basis = systems[0].basis
-    end = found.states[:, :, : basis.modes] @ basis.T[basis.point_index("beam.end"), 1]
+    end = found.states[:, :, : basis.modes] @ basis.point_row("beam.end", "y")
     return 2.0 / KEPT * np.abs(end @ np.exp(-2j * np.pi * np.arange(KEPT) / KEPT))
 
 

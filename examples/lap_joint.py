@@ -70,7 +70,7 @@ def struck(system: fc.ContactSystem, amplitude: float) -> tuple[float, float]:
     rest = bolted(system)
     modes = fc.analysis.prestressed_modes(system, rest)
     m, basis = system.basis.modes, system.basis
-    row = basis.T[basis.point_index("upper.end"), 1]
+    row = basis.point_row("upper.end", "y")
     shape = modes.right[m : 2 * m, 0].real
     state = initial_state(system, rest, 0.0)
     state[m : 2 * m] = shape * 2.0 * np.pi * modes.frequencies_hz[0] * amplitude / (row @ shape)
@@ -91,7 +91,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     for force in (100.0, 200.0, 300.0, 500.0):
         history = pulled(along, force)
         loop = history.loop(1, 3)
-        slipping = (history.contact_state[history.row(1)] == 2).sum()
+        slipping = (history.contact_state[history.row(1)] == fc.ContactState.SLIP).sum()
         print(f"{force:.0f} N: {slipping} of {along.basis.contact_nodes} nodes slip, "
               f"{1e6 * loop.loss:.3f} uJ in a cycle")
     plot_loop(history, path=folder / "lap_joint_loop.png")

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecontact import (
+    ContactState,
     ContactSystem,
     ElasticBody,
     Load,
@@ -128,7 +129,7 @@ def pressed(poisson_ratio: float, elements: int = 12, size: float = 60.0) -> Lin
     area = basis.tributary
     first, last = history.normal_force[[0, -1]] / area
     return LineContact(basis.contact_x, first, last, history.friction_force[-1] / area,
-                       history.contact_state[-1] == 1, b, peak)
+                       history.contact_state[-1] == ContactState.STICK, b, peak)
 
 
 def figure(contact: LineContact, path: Path | None = None) -> "Figure":

@@ -27,7 +27,7 @@ from fecontact.bifurcation import (
     resonance_curve,
 )
 from fecontact.plot import COLOURS, new_figure
-from fecontact.reduction import CubicSpring, point_masses
+from fecontact.reduction import PolynomialSpring, point_masses
 
 LENGTH, HEIGHT = 0.3, 0.01
 STIFFNESS, COEFFICIENT, LOAD, RATIO = 2000.0, 0.4, 0.5, 5e-4  # N/m, -, N, modal damping
@@ -58,9 +58,9 @@ def two_masses() -> fc.ContactSystem:
     up = (0.0, 1.0)
     return fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0}), "b": point_masses({"p": 1.0})},
-        links={"a": CubicSpring("a.p", None, 1.0, 0.5, direction=up),
-               "b": CubicSpring("b.p", None, 1.0, direction=up),
-               "ab": CubicSpring("a.p", "b.p", 1.0, direction=up)})
+        links={"a": PolynomialSpring("a.p", None, 1.0, 0.5, direction=up),
+               "b": PolynomialSpring("b.p", None, 1.0, direction=up),
+               "ab": PolynomialSpring("a.p", "b.p", 1.0, direction=up)})
 
 
 def decay(system: fc.ContactSystem, mode: NonlinearMode, periods: int) -> np.ndarray:

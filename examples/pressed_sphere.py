@@ -124,7 +124,7 @@ class PressedSphere:
         w, area = self.basis.angular_frequencies, self.basis.tributary
         elastic = w > 0.0
         mean = area / area.sum() @ self.basis.contact_T[:, axis]
-        moved = (mean - self.basis.T[1, axis])[elastic] / w[elastic]
+        moved = (mean - self.basis.point_row("C", "xyz"[axis]))[elastic] / w[elastic]
         scale = 16.0 / (3.0 * np.pi**2 * np.sqrt(area.sum() / np.pi) * MODULUS)
         half_space = scale * (1.0 - RATIO**2 if axis == 2
                               else 0.5 * (2.0 - RATIO) * (1.0 + RATIO))
@@ -133,13 +133,13 @@ class PressedSphere:
     @property
     def approach(self) -> float:
         """Of a half-space [m]."""
-        found = -float(self.basis.T[1, 2] @ self.history.modal_coordinates[0])
+        found = -float(self.basis.point_row("C", "z") @ self.history.modal_coordinates[0])
         return found - self.beyond(2) * self.exact.load
 
     @property
     def displacement(self) -> float:
         """Of a half-space under Q [m]."""
-        found = float(self.basis.T[1, 0] @ self.history.modal_coordinates[STEPS])
+        found = float(self.basis.point_row("C", "x") @ self.history.modal_coordinates[STEPS])
         return found - self.beyond(0) * self.part * MU * self.exact.load
 
     @property
@@ -147,7 +147,7 @@ class PressedSphere:
         """Q / (mu P) and displacement [m] of a half-space (2, n) of the first increments."""
         path, some = self.history.path, slice(1, STEPS + 1)
         force = path.at_points(path.forces[0])[some]
-        moved = self.history.modal_coordinates[some] @ self.basis.T[1, 0]
+        moved = self.history.modal_coordinates[some] @ self.basis.point_row("C", "x")
         return np.stack([force / (MU * self.exact.load), moved - self.beyond(0) * force])
 
     @property
@@ -270,7 +270,8 @@ def figure(found: PressedSphere, path: Path | None = None) -> "Figure":
         loop.plot(1e6 * first, q, color=COLOURS[0], label="closed form")
         path_of = found.history.path
         force = path_of.at_points(path_of.forces[0])
-        moved = found.history.modal_coordinates @ found.basis.T[1, 0] - found.beyond(0) * force
+        top = found.history.modal_coordinates @ found.basis.point_row("C", "x")
+        moved = top - found.beyond(0) * force
         loop.plot(1e6 * moved, force / (MU * exact.load), "o", color=COLOURS[1], markersize=3.5,
                   label="finite elements")
         loop.set(xlabel="displacement [µm]", ylabel="Q / (µ P)")

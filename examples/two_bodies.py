@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecontact import (
+    ContactState,
     ContactSystem,
     ElasticBody,
     Interface,
@@ -129,7 +130,7 @@ def bodies(cylinder: Material, block: Material, elements: int) -> dict[str, Elas
 
 def without_rotation(basis: ModalBasis) -> ModalBasis:
     """The basis of a cylinder that cannot roll, as the tangential force above would make it."""
-    turning = np.abs(basis.T[1, 2, : basis.rigid_modes])
+    turning = np.abs(basis.point_row("C", "phi")[: basis.rigid_modes])
     return basis.select([k for k in range(basis.modes) if k != int(np.argmax(turning))])
 
 
@@ -164,7 +165,7 @@ def sheared(elements: int = 12) -> ShearedContact:
     area = system.basis.tributary
     return ShearedContact(
         system.basis.contact_x, history.normal_force[-1] / area, *hertz(STEEL, STEEL),
-        history.friction_force[-1] / area, history.contact_state[-1] == 1)
+        history.friction_force[-1] / area, history.contact_state[-1] == ContactState.STICK)
 
 
 def figure(contact: ShearedContact, path: Path | None = None) -> "Figure":

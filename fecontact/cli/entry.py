@@ -5,11 +5,12 @@ import sys
 import warnings
 from typing import Any
 
-from cyclopts import CycloptsError, UnusedCliTokensError
+from cyclopts import CycloptsError, UnknownCommandError, UnusedCliTokensError
 
 from fecontact.cli.app import app
 from fecontact.cli.console import INTERRUPTED, ending_signals, fail, interrupted_code, note
 from fecontact.cli.environment import prepare
+from fecontact.cli.field_words import command_called
 from fecontact.core.errors import FecontactError, ModelWarning
 from fecontact.core.resources.memory import (
     available_memory,
@@ -88,6 +89,10 @@ def _execute(tokens: list[str]) -> int:
     except KeyboardInterrupt:
         return fail("interrupted.", INTERRUPTED)
     except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):
+            # Raised by Rich; as below.
+            sys.stdout = None
+            return 1
         return fail(f"code of a law or function of your own ended the program by "
                     f"sys.exit({error.code!r}); raise an exception there instead.", 1)
     except BrokenPipeError:
@@ -124,6 +129,10 @@ def _wrong_line(error: CycloptsError) -> str:
     message = str(error)
     if isinstance(error, UnusedCliTokensError):
         message = f"{command} takes no more arguments: {' '.join(error.unused_tokens or ())}."
+    if isinstance(error, UnknownCommandError) and not error.command_chain:
+        word = next(iter(error.unused_tokens or ()), "")
+        if (meant := command_called(word)) is not None:
+            return f"There is no command '{word}'; `fecontact {meant}` does this."
     return f"{message} `{command} --help` lists what there is."
 
 

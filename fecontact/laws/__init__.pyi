@@ -21,7 +21,6 @@ from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .ground.sliding import SlidingRotation, SlidingTranslation
 from .normal.bilateral import (
-    BilateralCubic,
     BilateralLaw,
     BilateralPiecewise,
     BilateralPlay,
@@ -49,7 +48,6 @@ from .wear import ArchardWear, EnergyWear, WearLaw
 __all__ = [
     "ArchardWear",
     "BackBurdekinContact",
-    "BilateralCubic",
     "BilateralLaw",
     "BilateralPiecewise",
     "BilateralPlay",

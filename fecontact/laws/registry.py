@@ -60,7 +60,6 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "two-sided-stop": linear.TwoSidedStop,
             "prescribed-force": linear.PrescribedForce,
             "friction-contact-3d": friction_contact.FrictionContact3D,
-            "bilateral-cubic": bilateral.BilateralCubic,
             "bilateral-polynomial": bilateral.BilateralPolynomial,
             "bilateral-play": bilateral.BilateralPlay,
             "bilateral-piecewise": bilateral.BilateralPiecewise,

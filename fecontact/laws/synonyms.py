@@ -40,7 +40,7 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
     "firestone": ("RoughSurface", "MeasuredSurface"), "bearingarea": ("RoughSurface",
                                                                      "MeasuredSurface"),
     "roughness": _ROUGH, "asperities": _ROUGH, "asperity": _ROUGH, "gw": ("GreenwoodWilliamson",),
-    "duffing": ("BilateralCubic",), "quintic": ("BilateralPolynomial",),
+    "duffing": ("BilateralPolynomial",), "quintic": ("BilateralPolynomial",),
     "quadraticdamping": ("BilateralPolynomial",), "backlash": ("BilateralPlay",),
     "clearance": ("BilateralPlay", "TwoSidedStop"),
     "freeplay": ("BilateralPlay",), "stop": ("TwoSidedStop",),

@@ -4,7 +4,6 @@ from .assembly.face_weld import FaceWeld
 from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, NonlinearSpring, Spring, Weld, linked
 from .assembly.nonlinear_springs import (
-    CubicSpring,
     PiecewiseSpring,
     PlaySpring,
     PolynomialSpring,
@@ -29,7 +28,6 @@ __all__ = [
     "BodiesConvergence",
     "BodyPart",
     "Bushing",
-    "CubicSpring",
     "FaceWeld",
     "Hinge",
     "InterfaceCompliance",

@@ -19,7 +19,6 @@ from fecontact.reduction.assembly.links import (
     Weld,
 )
 from fecontact.reduction.assembly.nonlinear_springs import (
-    CubicSpring,
     PiecewiseSpring,
     PlaySpring,
     PolynomialSpring,
@@ -54,9 +53,8 @@ LinkSettings = Spring | Bushing | Hinge | NonlinearSpring | FaceWeldSettings
 
 LINKS: Mapping[str, type] = {
     "spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld,
-    "face-weld": FaceWeldSettings, "cubic-spring": CubicSpring,
-    "polynomial-spring": PolynomialSpring, "play-spring": PlaySpring,
-    "piecewise-spring": PiecewiseSpring}
+    "face-weld": FaceWeldSettings, "polynomial-spring": PolynomialSpring,
+    "play-spring": PlaySpring, "piecewise-spring": PiecewiseSpring}
 
 
 def links_from_tables(tables: Any, title: str) -> dict[str, LinkSettings]:

@@ -17,7 +17,7 @@ from fecontact import (
 from fecontact.analysis import find_impacts, find_rests
 from fecontact.integrate import SetValued
 from fecontact.laws import (
-    BilateralCubic,
+    BilateralPolynomial,
     ExponentialFriction,
     LinearContact,
     PowerContact,
@@ -208,7 +208,7 @@ def test_systems_without_contact_have_no_impacts():
 
 
 def test_contacts_that_never_open_have_no_impacts():
-    run = simulate(ball(BilateralCubic(1e5, 1e9)), 0.05, initial=state(1e-4, 0.0), outputs=101)
+    run = simulate(ball(BilateralPolynomial(1e5, 1e9)), 0.05, initial=state(1e-4, 0.0), outputs=101)
     with pytest.raises(InputError, match="contact node 0 presses and pulls"):
         find_impacts(run)
 

@@ -12,7 +12,7 @@ from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
 from fecontact.bifurcation.harmonic.starts import problem_for
 from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.laws import (
-    BilateralCubic,
+    BilateralPolynomial,
     ConstantFriction,
     Harmonic,
     Harmonics,
@@ -165,8 +165,8 @@ def test_forces_at_rest_have_a_mean_only_where_a_load_is_constant(load, rests):
     rows[1, 0] = 1.0
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.05]])
-    system = fc.ContactSystem(basis, normal=BilateralCubic(0.0, 0.1), load=load, drive=fc.Drive(
-        stiffness_y=1.0, amplitude_y=0.18, angular_frequency=0.8))
+    drive = fc.Drive(stiffness_y=1.0, amplitude_y=0.18, angular_frequency=0.8)
+    system = fc.ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), load=load, drive=drive)
     field = field_between(system, ((FREQUENCY, (0.6, 1.8)),))
     problem = problem_for(field, np.array([0.8]), 0, HarmonicBalance(5), np.ones(4))
     e = problem.equations(0.8)

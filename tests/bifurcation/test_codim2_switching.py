@@ -103,7 +103,7 @@ def rolling(t, x, p, out):
     out[1], out[2] = g * x[1] - x[2], g * x[2] + x[1]
 
 
-@pytest.mark.parametrize("kind", ["fold", "Hopf"])
+@pytest.mark.parametrize("kind", [pytest.param("fold", marks=pytest.mark.slow), "Hopf"])
 def test_tori_from_a_zero_hopf_point(kind):
     field = vector_field(rolling, {"a": -0.5, "b": -0.9}, 3)
     curve, _ = through(field, [0.7, 0.0, 0.0], "a", kind, "b", BOX)

@@ -14,7 +14,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.core.errors import InputError
-from fecontact.laws import BilateralCubic, JenkinsFriction, PrescribedForce
+from fecontact.laws import BilateralPolynomial, JenkinsFriction, PrescribedForce
 
 TURN = 2.0 * np.pi
 
@@ -28,7 +28,7 @@ def cubic_system(force=0.18):
     rows[1, 0] = 1.0
     basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                 damping=[[0.05]])
-    return ContactSystem(basis, normal=BilateralCubic(0.0, 0.1), drive=Drive(
+    return ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), drive=Drive(
         stiffness_y=1.0, amplitude_y=force, angular_frequency=0.8))
 
 

@@ -20,7 +20,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
-from fecontact.laws import BilateralCubic, CubicFriction
+from fecontact.laws import BilateralPolynomial, CubicFriction
 
 
 @pytest.mark.parametrize(("largest", "within"), [(0.01, 1e-9), (0.05, 1e-8), (0.2, 1e-7)])
@@ -97,7 +97,7 @@ def wells():
     rows[0, 0, 0] = rows[1, 1, 0] = 1.0
     basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": rows}, damping=[[0.02]])
     system = ContactSystem(
-        basis, normal=BilateralCubic(stiffness=(0.0, -2.0), cubic_stiffness=(0.0, 1.0),
+        basis, normal=BilateralPolynomial(stiffness=(0.0, -2.0), cubic_stiffness=(0.0, 1.0),
                                      preload=(0.2, 0.0)),
         friction=CubicFriction(0.4, 0.2, minimum_velocity=1.0), ground=Ground(speed=1.0))
     field = contact_field(system, {"ground.speed": None, "basis.damping.0.0": None})

@@ -69,7 +69,8 @@ def test_errors_of_a_driven_mode(intervals, damping, most, turn):
 
 
 @pytest.mark.parametrize("intervals", [24, 40, 41])
-@pytest.mark.parametrize("damping", [0.0005, 0.001, 0.002, 0.005, 0.01, 0.05])
+@pytest.mark.parametrize("damping", [0.0005, 0.002, 0.01, *(
+    pytest.param(more, marks=pytest.mark.slow) for more in (0.001, 0.005, 0.05))])
 def test_vibrations_that_are_left_are_in_step_or_not(intervals, damping):
     """Hardly damped, with a wrong phase, they would look up to 50 times as large."""
     for turn in (0.5, 1.3, 2.0, 2.5, 3.3, 4.0, 5.0, 6.28, 7.0, 8.0):

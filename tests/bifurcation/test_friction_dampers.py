@@ -82,6 +82,7 @@ def test_plate_rests_between_blades_in_opposition_and_follows_equal_ones():
     assert np.ptp(plate) > 0.9 * np.ptp(first)
 
 
+@pytest.mark.slow
 def test_blades_a_quarter_out_of_phase_are_followed_with_few_samples():
     """The plate moves and tilts; from sample to sample its mean goes to and fro by corners."""
     field = blades(0.5 * np.pi, hz=380.0)

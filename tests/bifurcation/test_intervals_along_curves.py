@@ -121,6 +121,7 @@ def chain(t, x, p, out):
     out[3] = x[0] + 0.2 * x[1] - x[2] - 0.2 * x[3] + p[0] * (rest - two)
 
 
+@pytest.mark.slow
 def test_doublings_of_stick_slip_on_finer_meshes():
     """Over the slope of friction, beside orbits and a curve on 400 intervals."""
     field = vector_field(chain, {"B": 0.3, "slope": 100.0}, 4)

@@ -77,6 +77,7 @@ def test_coefficients_include_jumps_of_second_derivatives(function, intervals):
     assert error <= 1.5 * point.coefficient_error < 0.1 * EXPECTED[function]
 
 
+@pytest.mark.slow
 def test_points_of_codimension_two_include_jumps_and_their_forms_say_that_they_do_not():
     field = vector_field(bent_chenciner, {"lam": -0.2, "k": -0.4}, 3)
     t = np.linspace(0.0, np.pi, 800)

@@ -15,7 +15,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.core.errors import InputError
 from fecontact.io import read_response, write_response
-from fecontact.laws import BilateralCubic, Constant
+from fecontact.laws import BilateralPolynomial, Constant
 
 ODD = [1, 3, 5, 7]
 ROW = {"observe": ("B", "y")}
@@ -27,7 +27,7 @@ def hardening(damping=0.05, force=0.18):
     rows[1, 0] = 1.0
     return ContactSystem(
         basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows}),
-        normal=BilateralCubic(0.0, 0.1), drive=Drive(
+        normal=BilateralPolynomial(0.0, 0.1), drive=Drive(
             stiffness_y=1.0, damping_y=damping, amplitude_y=force, angular_frequency=0.8))
 
 
@@ -96,7 +96,7 @@ def test_harmonics_that_are_left_out_are_zero(orders):
 def test_truncation_error_counts_what_is_left_out(force):
     """Of a weakly nonlinear spring: the estimate is the mean that one harmonic more has."""
     # Its force is -.3 y^2 + .1 y^3.
-    spring = BilateralCubic(-0.3, 0.1, preload=0.2, shortening=1.0)
+    spring = BilateralPolynomial(-0.3, 0.1, preload=0.2, shortening=1.0)
     system = hardening(force=force).with_(normal=spring)
     one, two = (followed(system, orders, (0.5, 0.6)).branches[0].points[-1]
                 for orders in ([1, 2], [0, 1, 2]))

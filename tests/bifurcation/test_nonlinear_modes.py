@@ -28,7 +28,7 @@ from fecontact.bifurcation.nonlinear_modes.linear_start import (
 )
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import FourParameterIwanFriction, Harmonic, JenkinsFriction, PrescribedForce
-from fecontact.reduction import CubicSpring, point_masses
+from fecontact.reduction import PolynomialSpring, point_masses
 from fecontact.system.forcing_period import common_period
 
 UP = (0.0, 1.0)
@@ -43,9 +43,9 @@ def masses(first=0.0, second=0.0, between=0.0, damping=0.0, **parts):
     """Two masses of 1 kg; springs of 1 N/m to the base and between them, with cubic terms."""
     return fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0}), "b": point_masses({"p": 1.0})},
-        links={"a": CubicSpring("a.p", None, 1.0, first, damping, UP),
-               "b": CubicSpring("b.p", None, 1.0, second, damping, UP),
-               "ab": CubicSpring("a.p", "b.p", 1.0, between, damping, UP)}, **parts)
+        links={"a": PolynomialSpring("a.p", None, 1.0, first, damping, UP),
+               "b": PolynomialSpring("b.p", None, 1.0, second, damping, UP),
+               "ab": PolynomialSpring("a.p", "b.p", 1.0, between, damping, UP)}, **parts)
 
 
 def duffing_frequency(linear, cubic, amplitude):
@@ -218,7 +218,7 @@ def test_static_loads_stay_and_loads_in_time_go():
               fc.PointLoad("a.p", "y", signal=Harmonic(5.0, 0.7)))
     system = fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0})},
-        links={"a": CubicSpring("a.p", None, 1.0, 0.5, direction=UP)},
+        links={"a": PolynomialSpring("a.p", None, 1.0, 0.5, direction=UP)},
         load=fc.Load(forces=forces))
     mode = nonlinear_mode(system, (1e-4, 1.0), observe=("a.p", "y"))
     x = np.roots([0.5, 0.0, 1.0, -3.0])
@@ -266,7 +266,7 @@ def test_free_bodies_vibrate_about_where_they_are():
     """Nothing holds their mean; without losses the mode is that of half the spring each."""
     system = fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0}), "b": point_masses({"p": 1.0})},
-        links={"ab": CubicSpring("a.p", "b.p", 1.0, 0.5, direction=UP)})
+        links={"ab": PolynomialSpring("a.p", "b.p", 1.0, 0.5, direction=UP)})
     mode = nonlinear_mode(system, (1e-2, 2.0), observe=("a.p", "y"), method=HarmonicBalance(15))
     assert mode.angular_frequency == pytest.approx(
         duffing_frequency(2.0, 4.0, mode.amplitude), rel=2e-8)
@@ -463,7 +463,7 @@ def test_bad_arguments(changes, told):
 def test_overdamped_mode_is_told():
     system = fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0})},
-        links={"a": CubicSpring("a.p", None, 1.0, 0.5, 3.0, UP)})
+        links={"a": PolynomialSpring("a.p", None, 1.0, 0.5, 3.0, UP)})
     with pytest.raises((InputError, AnalysisError), match="none"):
         nonlinear_mode(system, (1e-3, 1.0), observe=("a.p", "y"))
 

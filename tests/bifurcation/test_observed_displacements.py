@@ -18,7 +18,7 @@ from fecontact.bifurcation import (
     frequency_response,
 )
 from fecontact.core.errors import InputError
-from fecontact.laws import BilateralCubic
+from fecontact.laws import BilateralPolynomial
 
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
 FEW = ContinuationOptions(points=8, largest_step=0.2, locate=False)
@@ -32,7 +32,7 @@ def two_masses(cubic):
     basis = basis_from_matrices(
         np.eye(2), links, {"contact": second[None], "B": first, "C": second},
         damping=0.1 * links)
-    return ContactSystem(basis, normal=BilateralCubic(0.0, cubic), drive=Drive(
+    return ContactSystem(basis, normal=BilateralPolynomial(0.0, cubic), drive=Drive(
         stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, angular_frequency=1.0))
 
 

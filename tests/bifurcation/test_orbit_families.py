@@ -181,7 +181,7 @@ def mass_on_a_spring():
     rows[1, 0] = 1.0
     return contact_field(fc.ContactSystem(
         fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows}),
-        normal=fc.laws.BilateralCubic(0.0, 0.1), drive=fc.Drive(stiffness_y=1.0)),
+        normal=fc.laws.BilateralPolynomial(0.0, 0.1), drive=fc.Drive(stiffness_y=1.0)),
         {"xi": (0.0, with_mass_damping)})
 
 

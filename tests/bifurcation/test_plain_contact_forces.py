@@ -21,7 +21,7 @@ from fecontact.bifurcation.harmonic.compiled.arrays import PLAIN
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
 from fecontact.bifurcation.harmonic.starts import problem_for, restored
 from fecontact.core.errors import InputError
-from fecontact.laws import BilateralCubic, ConstantFriction, RoughSurface
+from fecontact.laws import BilateralPolynomial, ConstantFriction, RoughSurface
 
 
 def duffing_in_y():
@@ -30,7 +30,7 @@ def duffing_in_y():
     rows[1, 0] = 1.0
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.05]])
-    return fc.ContactSystem(basis, normal=BilateralCubic(0.0, 0.1), drive=fc.Drive(
+    return fc.ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), drive=fc.Drive(
         stiffness_y=1.0, amplitude_y=0.18, angular_frequency=0.8))
 
 

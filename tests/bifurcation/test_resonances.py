@@ -23,7 +23,7 @@ from fecontact.bifurcation.harmonic.starts import problem_for
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import Harmonic
-from fecontact.reduction import CubicSpring, point_masses
+from fecontact.reduction import PolynomialSpring, point_masses
 
 UP = (0.0, 1.0)
 FREQUENCY = "load.forces.0.signal.angular_frequency"
@@ -34,7 +34,7 @@ def hardening(damping=0.05, force=0.5):
     """x'' + damping x' + x + .1 x^3 = force sin w t as a contact system."""
     return fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0})},
-        links={"a": CubicSpring("a.p", None, 1.0, 0.1, damping, UP)},
+        links={"a": PolynomialSpring("a.p", None, 1.0, 0.1, damping, UP)},
         load=fc.Load(forces=(fc.PointLoad("a.p", "y", signal=Harmonic(force, 1.0)),)))
 
 
@@ -216,7 +216,7 @@ def test_optimal_load_of_a_friction_damper(damper):
         assert amplitude == pytest.approx(response.amplitude(level).max(), rel=1e-4)
 
 
-@pytest.mark.parametrize("samples", [128, 512])
+@pytest.mark.parametrize("samples", [128, pytest.param(512, marks=pytest.mark.slow)])
 def test_peak_with_memory_is_that_of_responses(damper, samples):
     """The closed form of the best load, and the largest amplitude of responses on its way."""
     system, _ = damper
@@ -312,6 +312,6 @@ def test_what_has_no_peak_is_told():
     with pytest.raises(InputError, match="1 modal coordinates, but the system 2"):
         mode_response(mode, fc.ContactSystem(
             bodies={"a": point_masses({"p": 1.0}), "b": point_masses({"p": 1.0})},
-            links={"a": CubicSpring("a.p", "b.p", 1.0, 0.1, direction=UP)}))
+            links={"a": PolynomialSpring("a.p", "b.p", 1.0, 0.1, direction=UP)}))
     with pytest.raises(InputError, match="Nothing excites"):
         mode_response(mode, hardening(force=0.0), frequency=FREQUENCY)

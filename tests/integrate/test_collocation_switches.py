@@ -17,9 +17,9 @@ from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.state import WORST_NODE
 from fecontact.integrate.step_loop import REJECTIONS
 from fecontact.laws import (
-    BilateralCubic,
     BilateralPiecewise,
     BilateralPlay,
+    BilateralPolynomial,
     ConstantFriction,
     ExponentialFriction,
     Frictionless,
@@ -109,7 +109,7 @@ def test_steps_have_a_least_length():
 # Switches ----------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("law", [
-    BilateralCubic(1e4, 1e10, 1.0, 3.0, 0.0), BilateralPiecewise((-1e-3, 1e-3), (-20.0, 20.0)),
+    BilateralPolynomial(1e4, 1e10, 1.0, 3.0, 0.0), BilateralPiecewise((-1e-3, 1e-3), (-20.0, 20.0)),
     BilateralPiecewise((-1e-4, -1e-5, 0.0, 2e-5, 1e-4), (-50.0, -3.0, 0.0, 1.0, 30.0)),
 ])
 def test_bilateral_laws(law):

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 import fecontact as fc
 from fecontact.laws import (
-    BilateralCubic,
+    BilateralPolynomial,
     FourParameterIwanFriction,
     Harmonic,
     IwanFriction,
@@ -181,7 +181,7 @@ def bouncing(normal):
 
 
 @pytest.mark.parametrize("normal", [LinearContact(20.0, 0.0), PowerContact(20.0, 2.0),
-                                    BilateralCubic(5.0, 1.0, 0.0)])
+                                    BilateralPolynomial(5.0, 1.0, 0.0)])
 def test_elements_turn_where_the_normal_force_vanishes(normal):
     """Deflections in space are those of the disc that follows the motion, where F passes zero."""
     system = bouncing(normal)
@@ -281,7 +281,7 @@ def test_derivatives_where_the_normal_force_passes_zero():
     c, k, mu, T = 1e5, 1e4, 0.3, 3e-3
     rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
     basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows[None], "B": rows})
-    system = fc.ContactSystem(basis, normal=BilateralCubic(c, 0.0, 0.0),
+    system = fc.ContactSystem(basis, normal=BilateralPolynomial(c, 0.0, 0.0),
                               friction=JenkinsFriction(k, mu), ground=fc.Ground(speed=0.1))
 
     def end(x, y, vx, vy, belt):

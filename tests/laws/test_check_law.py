@@ -12,7 +12,6 @@ import fecontact as fc
 from fecontact.cli import execute
 from fecontact.laws import (
     BackBurdekinContact,
-    BilateralCubic,
     BilateralPiecewise,
     BilateralPlay,
     BilateralPolynomial,
@@ -50,8 +49,7 @@ NEEDED = {
     LinearContact: (1e6, 3.0), PowerContact: (1e9, 1.5, 2.0),
     RestitutionContact: (1e9, 0.5, 1.0), ExponentialContact: (10.0, 1e-6),
     BackBurdekinContact: (1e-4, 1e-9), TwoSidedStop: (1e6, 1e-4, 1.5), PrescribedForce: (3.0,),
-    BilateralCubic: (1e6, 1e15, 3.0),
-    BilateralPolynomial: (1e6, 1e10, 1e15, 1e24, 3.0, 1.0, 1.0), BilateralPlay: (1e6, 1e-5, 3.0),
+    BilateralPolynomial: (1e6, 1e15, 3.0), BilateralPlay: (1e6, 1e-5, 3.0),
     BilateralPiecewise: ((-1e-3, 0.0, 1e-3), (-1e3, 0.0, 2e3), 3.0),
     GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6), FrictionContact3D: (1e6, 8e5, 0.4),
 }
@@ -206,7 +204,7 @@ def test_force_on_untouched_nodes_is_found():
 # None where the force ends nowhere, or where this is not known.
 UNTOUCHED = {
     ExponentialContact: -50e-6, GreenwoodWilliamson: None, PrescribedForce: None,
-    TwoSidedStop: None, BilateralCubic: None, BilateralPolynomial: None, BilateralPlay: None,
+    TwoSidedStop: None, BilateralPolynomial: None, BilateralPlay: None,
     BilateralPiecewise: None}
 
 

@@ -102,7 +102,7 @@ def test_every_law_is_documented(kind, name):
         assert "References" in text or name in (
             "linear", "prescribed-force", "two-sided-stop", "constant", "frictionless",
             "parabolic-surface", "cosine-surface", "gaussian-surface", "measured-surface",
-            "hyperbolic", "cubic", "bilateral-cubic", "bilateral-polynomial", "bilateral-play",
+            "hyperbolic", "cubic", "bilateral-polynomial", "bilateral-play",
             "bilateral-piecewise")
 
 

@@ -14,7 +14,6 @@ from scipy.integrate import quad
 from fecontact import InputError
 from fecontact.laws import (
     BackBurdekinContact,
-    BilateralCubic,
     BilateralPiecewise,
     BilateralPlay,
     BilateralPolynomial,
@@ -94,9 +93,10 @@ LAWS = {
     "prescribed": (PrescribedForce(14.0), MICRO),
     "stop": (TwoSidedStop(1e6, 3e-5, 1.0, 0.4), (-1e-4, 6e-5)),
     "stop 1.5": (TwoSidedStop(1e9, 3e-5, 1.5, 0.4), (-1e-4, 6e-5)),
-    "cubic spring": (BilateralCubic(1e6, 1e14, 40.0, 3.0, 1e-5), (-1e-4, 6e-5)),
-    "polynomial spring": (BilateralPolynomial(1e6, 2e9, 1e14, 1e22, 4.0, 3.0, 0.5, 3.0, 1e-5),
-                          (-1e-4, 6e-5)),
+    "cubic spring": (BilateralPolynomial(1e6, 1e14, 40.0, 3.0, 1e-5), (-1e-4, 6e-5)),
+    "polynomial spring": (BilateralPolynomial(
+        1e6, 1e14, 4.0, 3.0, 1e-5, quadratic_stiffness=2e9, quintic_stiffness=1e22,
+        quadratic_damping=3.0, cubic_damping=0.5), (-1e-4, 6e-5)),
     "play": (BilateralPlay(1e6, 3e-5, 40.0), (-1e-4, 6e-5)),
     "preloaded play": (BilateralPlay(1e6, 3e-5, 40.0, 4.0, 1e-5), (-1e-4, 6e-5)),
     "table": (BilateralPiecewise((-2e-5, 0.0, 1e-5, 3e-5), (-30.0, 0.0, 1.0, 9.0), 40.0, 2.0, 5e-6),

@@ -13,7 +13,6 @@ from fecontact.core.lanes.functions import select
 from fecontact.core.lanes.vectors import read, write
 from fecontact.core.records import Matrix, Vector
 from fecontact.laws import (
-    BilateralCubic,
     BilateralPiecewise,
     BilateralPlay,
     BilateralPolynomial,
@@ -78,9 +77,11 @@ NORMAL = [
     TwoSidedStop(varied(1e6), varied(1e-5)),
     TwoSidedStop(varied(1e8), varied(1e-5), (1.0, 1.5, 1.3, 2.0) * 2, varied(0.4)),
     ExponentialContact(varied(10.0), varied(1e-5), 0.4),
-    BilateralCubic(varied(1e6), 1e16, varied(30.0), 2.0),
+    BilateralPolynomial(varied(1e6), 1e16, varied(30.0), 2.0),
     BilateralPlay(varied(1e6), 1e-6, varied(30.0), 2.0),
-    BilateralPolynomial(varied(1e6), 1e11, varied(1e16), 1e26, varied(3.0), 2.0, varied(0.1)),
+    BilateralPolynomial(varied(1e6), varied(1e16), varied(3.0), quadratic_stiffness=1e11,
+                        quintic_stiffness=1e26, quadratic_damping=2.0,
+                        cubic_damping=varied(0.1)),
     # Those with branches.
     CosineSurface(varied(1e6), varied(1e-5), varied(30.0)),
     GaussianSurface(varied(1e6), varied(1e-5), varied(30.0)),

@@ -13,10 +13,10 @@ from fecontact.cli.templates import template
 from fecontact.fem.pairing import pair_faces
 from fecontact.laws import ConstantFriction, RoughSurface, SlidingTranslation
 from fecontact.reduction import (
-    CubicSpring,
     FaceWeld,
     PiecewiseSpring,
     PlaySpring,
+    PolynomialSpring,
     Spring,
     assembled_basis,
     reduce_bodies,
@@ -398,7 +398,7 @@ def test_changes_of_unknown_interfaces_name_the_nearest(study):
 
 
 @pytest.mark.parametrize(("kind", "keys"), [
-    ("cubic-spring", {"stiffness": 1e4, "cubic_stiffness": 1e12, "preload": 30.0}),
+    ("polynomial-spring", {"stiffness": 1e4, "cubic_stiffness": 1e12, "preload": 30.0}),
     ("play-spring", {"stiffness": 1e6, "clearance": 1e-4, "preload": 30.0}),
     ("piecewise-spring", {"elongations": [-1e-3, 0.0, 1e-3], "forces": [-10.0, 0.0, 90.0],
                           "preload": 30.0})])
@@ -407,7 +407,7 @@ def test_nonlinear_springs_join_points_of_bodies(study, kind, keys):
     point = {"bodies.pad.basis.points": {"P": [0.06, 0.06]}}
     bolt = {"kind": kind, "first": "pad.P", "direction": [0.0, 1.0], **keys}
     linked = study.with_(**point, **{"links.bolt": bolt})
-    made = {"cubic-spring": CubicSpring, "play-spring": PlaySpring,
+    made = {"polynomial-spring": PolynomialSpring, "play-spring": PlaySpring,
             "piecewise-spring": PiecewiseSpring}[kind]
     system = in_python({"P": (0.06, 0.06)},
                        {"bolt": made("pad.P", direction=(0.0, 1.0), **keys)})
@@ -426,7 +426,7 @@ def test_a_study_of_bodies_that_only_a_nonlinear_spring_joins(study):
     tables = study.tables(defaults=False)
     del tables["interfaces"], tables["bodies"]["block"]
     tables["bodies"]["pad"]["basis"]["points"] = {"P": [0.03, 0.04], "Q": [0.09, 0.04]}
-    spring = {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0],
+    spring = {"kind": "polynomial-spring", "first": "pad.P", "direction": [0.0, 1.0],
               "stiffness": 1e6, "cubic_stiffness": 1e14, "damping": 100.0}
     tables["links"] = {"mount": spring, "other": spring | {"first": "pad.Q"}}
     run = fc.Study.from_tables(tables).run()
@@ -437,7 +437,7 @@ def test_a_study_of_bodies_that_only_a_nonlinear_spring_joins(study):
     assert run.displacement("pad.P")[0, 1] == pytest.approx(e, rel=1e-6)
     with pytest.raises(fc.InputError, match=r"\[links\.mount\]: stiffness and cubic_stiffness"):
         fc.Study.from_tables({**tables, "links": {
-            "mount": {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0]}}})
+            "mount": {"kind": "polynomial-spring", "first": "pad.P", "direction": [0.0, 1.0]}}})
 
 
 def welded_study(study, **weld):
@@ -447,7 +447,7 @@ def welded_study(study, **weld):
     tables["bodies"]["pad"]["basis"]["points"] = {"P": [0.09, 0.06]}
     tables["links"] = {
         "seam": {"kind": "face-weld", "first": "pad.contact", "second": "block.top", **weld},
-        "mount": {"kind": "cubic-spring", "first": "pad.P", "direction": [0.0, 1.0],
+        "mount": {"kind": "polynomial-spring", "first": "pad.P", "direction": [0.0, 1.0],
                   "stiffness": 1e6, "cubic_stiffness": 1e14}}
     return tables
 

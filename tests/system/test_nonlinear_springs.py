@@ -18,7 +18,6 @@ from fecontact.integrate import PointStart, SetValued
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.reduction import (
-    CubicSpring,
     PiecewiseSpring,
     PlaySpring,
     PointPairing,
@@ -50,7 +49,7 @@ def height(system, q):
 def test_period_of_duffings_oscillator(cubic, solver):
     """T = 4 K(m) / w with w^2 = (k + k3 A^2) / M and m = k3 A^2 / (2 (k + k3 A^2))."""
     k, M, A = 50.0, 2.0, 0.1
-    system = oscillator(CubicSpring("a.p", None, k, cubic, direction=UP), M)
+    system = oscillator(PolynomialSpring("a.p", None, k, cubic, direction=UP), M)
     hard = k + cubic * A**2
     period = 4.0 * ellipk(cubic * A**2 / (2.0 * hard)) / np.sqrt(hard / M)
     options = {} if solver is None else {"solver": solver}
@@ -69,7 +68,7 @@ def test_period_of_duffings_oscillator(cubic, solver):
 def test_a_run_from_zero_elongation_feels_the_spring():
     """The force is exactly zero there, but not the stiffness."""
     k, M = 50.0, 2.0
-    system = oscillator(CubicSpring("a.p", None, k, direction=UP), M)
+    system = oscillator(PolynomialSpring("a.p", None, k, direction=UP), M)
     state = np.zeros(2)
     assert system.jacobian(0.0, state)[1, 0] == pytest.approx(-k / M, rel=1e-12)
     run = fc.simulate(system, 1.0, initial=released(system, 0.0, 0.3), rtol=1e-9, outputs=11)
@@ -113,7 +112,7 @@ def test_period_of_a_piecewise_linear_oscillator():
 
 
 @pytest.mark.parametrize(("spring", "tension"), [
-    (CubicSpring("a.p", None, 200.0, 5e5, 1.0, UP, 3.0, 2e-3),
+    (PolynomialSpring("a.p", None, 200.0, 5e5, 1.0, UP, 3.0, 2e-3),
      lambda e: 200.0 * (e + 2e-3) + 5e5 * (e + 2e-3) ** 3 + 3.0),
     (PlaySpring("a.p", None, 800.0, 0.01, 1.0, UP, 3.0, 2e-3),
      lambda e: np.sign(e + 2e-3) * 800.0 * max(abs(e + 2e-3) - 0.01, 0.0) + 3.0),
@@ -152,7 +151,7 @@ def test_momentum_of_two_free_masses():
     m = {"a": 1.0, "b": 3.0}
     system = fc.ContactSystem(
         bodies={name: point_masses({"p": mass}, components="xy") for name, mass in m.items()},
-        links={"rope": CubicSpring("a.p", "b.p", 10.0, 4e3, direction=(3.0, 4.0))})
+        links={"rope": PolynomialSpring("a.p", "b.p", 10.0, 4e3, direction=(3.0, 4.0))})
     run = fc.simulate(system, 2.0, rtol=1e-9, outputs=41, initial=PointStart(velocities={
         "a.p": (0.5, 0.2), "b.p": (0.0, 0.0)}))
     momentum = sum(mass * run.velocity(f"{name}.p")[:, :2] for name, mass in m.items())
@@ -170,7 +169,7 @@ def test_folds_of_a_spring_with_two_places_of_rest():
     bodies = {"a": fc.basis_from_matrices(np.diag([1.0, 2.0]), np.diag([1e3, 0.0]), {
         "p": [[1, 0], [0, 1], [0, 0]], "C": [[1, 0], [0, 1], [0, 0]]})}
     system = fc.ContactSystem(bodies=bodies, load=fc.Load(-2.0), links={
-        "arch": CubicSpring("a.p", None, -k, cubic, 1.0, UP)})
+        "arch": PolynomialSpring("a.p", None, -k, cubic, 1.0, UP)})
     rest = height(system, fc.equilibrium(system).modal_coordinates)
     assert -k * rest + cubic * rest**3 == pytest.approx(2.0, rel=1e-6)
     # Without load it leaves the crest between both places of rest.
@@ -188,7 +187,7 @@ def test_branch_over_a_parameter_of_a_spring():
     bodies = {"a": fc.basis_from_matrices(np.diag([1.0, 2.0]), np.diag([1e3, 0.0]), {
         "p": [[1, 0], [0, 1], [0, 0]], "C": [[1, 0], [0, 1], [0, 0]]})}
     system = fc.ContactSystem(bodies=bodies, load=fc.Load(-5.0), links={
-        "mount": CubicSpring("a.p", None, 100.0, 1e5, 1.0, UP)})
+        "mount": PolynomialSpring("a.p", None, 100.0, 1e5, 1.0, UP)})
     name = "links.mount.cubic_stiffness"
     branch = equilibrium_branch(contact_field(system, [name]), parameter=name, bounds=(1e5, 1e6))
     e = height(system, branch.points[-1].u[:2])
@@ -215,7 +214,8 @@ def bolted(bolt):
 def test_a_bolt_without_cubic_term_is_the_linear_one():
     """Normal forces at rest under its preload, and its own tension, with a mesh between."""
     linear = bolted(Spring("pad.head", "base.foot", 1e7, preload=500.0, shortening=1e-5))
-    cubic = bolted(CubicSpring("pad.head", "base.foot", 1e7, 0.0, preload=500.0, shortening=1e-5))
+    cubic = bolted(PolynomialSpring("pad.head", "base.foot", 1e7, preload=500.0,
+                                    shortening=1e-5))
     runs = [fc.simulate(system, 1e-6, outputs=2, initial="rest") for system in (linear, cubic)]
     contact = runs[0].normal_force[0]
     assert contact.sum() > 400.0
@@ -256,13 +256,13 @@ def test_springs_are_no_contact_in_what_is_shown(tmp_path):
     assert again.system.parameters() == system.parameters()
     assert (again.normal_force == run.normal_force).all()
     with redirect_stdout(io.StringIO()):
-        alone = oscillator(CubicSpring("a.p", None, 50.0, direction=UP))
+        alone = oscillator(PolynomialSpring("a.p", None, 50.0, direction=UP))
     with pytest.raises(fc.AnalysisError, match="There is no contact map: nonlinear springs join"):
         plot.plot_contact_map(fc.simulate(alone, 0.1, outputs=3, initial=released(alone, 0.1)))
 
 
 def test_parameters_of_springs_go_by_the_name_of_the_link():
-    system = oscillator(CubicSpring("a.p", None, 50.0, 1e3, 2.0, UP))
+    system = oscillator(PolynomialSpring("a.p", None, 50.0, 1e3, 2.0, UP))
     assert system.parameters()["links.mount.cubic_stiffness"] == 1e3
     assert not [name for name in system.parameters() if "friction" in name]
     other = system.with_(**{"links.mount.cubic_stiffness": 4e3})
@@ -273,28 +273,32 @@ def test_parameters_of_springs_go_by_the_name_of_the_link():
     with pytest.raises(fc.InputError, match=r"'links\.mount\.cubic'.*did you mean"):
         system.with_(**{"links.mount.cubic": 1.0})
     numbered = fc.ContactSystem(bodies={"a": point_masses({"p": 1.0})},
-                                links=[CubicSpring("a.p", None, 50.0, direction=UP)])
+                                links=[PolynomialSpring("a.p", None, 50.0, direction=UP)])
     assert numbered.basis.springs == ("spring_1",)
 
 
 def test_a_spring_to_the_base_does_not_feel_the_ground():
     """Waves pass below, the belt runs: neither is a matter of the spring."""
-    system = oscillator(CubicSpring("a.p", None, 50.0, direction=UP),
+    system = oscillator(PolynomialSpring("a.p", None, 50.0, direction=UP),
                         ground=fc.Ground(speed=1.0, amplitude=0.05, wavelength=0.1))
     run = fc.simulate(system, 0.5, initial=released(system, 0.0), outputs=6)
     assert np.abs(run.displacement("a.p")).max() < 1e-290
 
 
 @pytest.mark.parametrize(("make", "message"), [
-    (lambda: CubicSpring("a.p", stiffness=1.0), "CubicSpring: a spring to the base needs"),
-    (lambda: CubicSpring("a.p", "a.p", 1.0), "CubicSpring: first and second are the same point"),
-    (lambda: CubicSpring("a.p", "b.p"), "CubicSpring: stiffness and cubic_stiffness are both zero"),
-    (lambda: CubicSpring("a.p", "b.p", 1.0, damping=-1.0),
-     r"CubicSpring: damping = -1\.0 must be zero or above"),
-    (lambda: CubicSpring("a.p", "b.p", np.nan), "CubicSpring: stiffness = nan must be"),
-    (lambda: CubicSpring("a.p", "b.p", (1.0, 2.0)), "CubicSpring: stiffness = .* must be"),
-    (lambda: CubicSpring(3, "b.p", 1.0), "CubicSpring: first"),
-    (lambda: CubicSpring("a.p", "b.p", 1.0, direction=(0, 0)), "CubicSpring: direction"),
+    (lambda: PolynomialSpring("a.p", stiffness=1.0),
+     "PolynomialSpring: a spring to the base needs"),
+    (lambda: PolynomialSpring("a.p", "a.p", 1.0),
+     "PolynomialSpring: first and second are the same point"),
+    (lambda: PolynomialSpring("a.p", "b.p"),
+     "PolynomialSpring: all stiffnesses and dampings are zero"),
+    (lambda: PolynomialSpring("a.p", "b.p", 1.0, damping=-1.0),
+     r"PolynomialSpring: damping = -1\.0 must be zero or above"),
+    (lambda: PolynomialSpring("a.p", "b.p", np.nan), "PolynomialSpring: stiffness = nan must be"),
+    (lambda: PolynomialSpring("a.p", "b.p", (1.0, 2.0)),
+     "PolynomialSpring: stiffness = .* must be"),
+    (lambda: PolynomialSpring(3, "b.p", 1.0), "PolynomialSpring: first"),
+    (lambda: PolynomialSpring("a.p", "b.p", 1.0, direction=(0, 0)), "PolynomialSpring: direction"),
     (lambda: PlaySpring("a.p", "b.p", 0.0, 1.0), r"PlaySpring: stiffness = 0\.0 must be above"),
     (lambda: PlaySpring("a.p", "b.p", 1.0, -1.0), r"PlaySpring: clearance = -1\.0 must be zero"),
     (lambda: PiecewiseSpring("a.p", "b.p", (0.0, 1.0), (0.0,)),
@@ -309,12 +313,14 @@ def test_springs_out_of_range_are_explained(make, message):
 
 
 @pytest.mark.parametrize(("links", "message"), [
-    ({"mount": CubicSpring("a.q", None, 1.0, direction=UP)}, "Link 'mount': .*q"),
-    ({"mount": CubicSpring("c.p", None, 1.0, direction=UP)},
+    ({"mount": PolynomialSpring("a.q", None, 1.0, direction=UP)}, "Link 'mount': .*q"),
+    ({"mount": PolynomialSpring("c.p", None, 1.0, direction=UP)},
      "Link 'mount': 'c.p' is a point of no body"),
-    ({"mount": CubicSpring("a.p", "b.p", 1.0)}, "Link 'mount': .* has length zero; give its"),
-    ({"mo.unt": CubicSpring("a.p", "b.p", 1.0, direction=UP)}, "name 'mo.unt' of a link must be"),
-    ({"touch": CubicSpring("a.p", "b.p", 1.0, direction=UP)}, "'touch' of a nonlinear spring is"),
+    ({"mount": PolynomialSpring("a.p", "b.p", 1.0)}, "Link 'mount': .* has length zero; give its"),
+    ({"mo.unt": PolynomialSpring("a.p", "b.p", 1.0, direction=UP)},
+     "name 'mo.unt' of a link must be"),
+    ({"touch": PolynomialSpring("a.p", "b.p", 1.0, direction=UP)},
+     "'touch' of a nonlinear spring is"),
 ])
 def test_bad_places_of_springs_are_explained(links, message):
     with pytest.raises(fc.InputError, match=message):
@@ -325,7 +331,7 @@ def test_bad_places_of_springs_are_explained(links, message):
 
 
 def test_rigid_stops_beside_a_nonlinear_spring_are_refused():
-    system = oscillator(CubicSpring("a.p", None, 50.0, direction=UP))
+    system = oscillator(PolynomialSpring("a.p", None, 50.0, direction=UP))
     with pytest.raises(fc.InputError, match="nonlinear springs, 'mount'; leave restitution out"):
         fc.simulate(system, 1.0, solver=SetValued(restitution=0.5),
                     initial=released(system, 0.1))
@@ -335,7 +341,7 @@ def test_rigid_stops_beside_a_nonlinear_spring_are_refused():
     (-50.0, 0.0, 0.0), (-50.0, 0.0, 3.0), (-50.0, -3e4, 0.0), (50.0, -3e4, 20.0)])
 def test_springs_without_a_place_of_rest(stiffness, cubic, preload):
     """Equilibrium ends in a sentence, a run with a status."""
-    system = oscillator(CubicSpring("a.p", None, stiffness, cubic, 0.0, UP, preload))
+    system = oscillator(PolynomialSpring("a.p", None, stiffness, cubic, 0.0, UP, preload))
     with pytest.raises(fc.AnalysisError, match="force of the spring mount falls with its elong"):
         fc.equilibrium(system)
     assert complex_modes(system).summary()
@@ -347,7 +353,7 @@ def test_springs_without_a_place_of_rest(stiffness, cubic, preload):
 @pytest.mark.parametrize("preload", [0.0, 0.1])
 def test_a_softening_spring_rests_beside_zero_elongation(preload):
     """At the root of N = 0 at which the spring still holds."""
-    system = oscillator(CubicSpring("a.p", None, 50.0, -3e4, 0.0, UP, preload))
+    system = oscillator(PolynomialSpring("a.p", None, 50.0, -3e4, 0.0, UP, preload))
     rest = abs(height(system, fc.equilibrium(system).modal_coordinates))
     assert 50.0 * rest - 3e4 * rest**3 == pytest.approx(preload, abs=1e-9)
     assert 3.0 * 3e4 * rest**2 < 50.0
@@ -356,7 +362,8 @@ def test_a_softening_spring_rests_beside_zero_elongation(preload):
 def test_period_of_a_polynomial_spring():
     """x'' + x + .3 x^2 + .2 x^3 + .5 x^5 = 0 against the integral of dx / v over the energy."""
     A, steps = 0.8, np.linspace(0.0, np.pi, 20001)
-    spring = PolynomialSpring("a.p", None, 1.0, 0.3, 0.2, 0.5, direction=UP)
+    spring = PolynomialSpring("a.p", None, 1.0, 0.2, direction=UP, quadratic_stiffness=0.3,
+                              quintic_stiffness=0.5)
     run = fc.simulate(oscillator(spring, 1.0), 40.0, initial=released(oscillator(spring, 1.0), A),
                       rtol=1e-10, outputs=4001)
 

@@ -27,7 +27,7 @@ def branch(
     output: Folder = None,
     all_: All = False,
 ) -> int:
-    """Follow steady sliding or periodic orbits over a parameter: folds, Hopf points, doublings.
+    """Follow steady sliding or periodic orbits over a parameter: a bifurcation diagram.
 
     The section [branch] of the study selects the solutions; without it, steady sliding is
     followed. Writes all branches (NAME-branch.h5, NAME-branch.csv), a page whose diagram shows

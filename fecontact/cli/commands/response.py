@@ -49,7 +49,7 @@ def response(
     resume: Annotated[bool, Parameter(
         negative=(), help="Go on with an interrupted response.")] = False,
 ) -> int:
-    """Steady vibration over the frequency of the excitation.
+    """Nonlinear frequency response: steady vibration over the frequency of the excitation.
 
     The section [response] of the study gives range, levels and harmonics. Writes the responses
     (NAME-response.h5, NAME-response.csv), a picture of amplitude and phase, and a page whose

@@ -144,10 +144,10 @@ def modes(
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
     Of several bodies those of each, and how much of the compliance of their interfaces they
-    resolve; --complex, --movie and --nonlinear are for all bodies together, with modes that are
-    counted through. With --nonlinear, frequency and damping over the amplitude are written
-    (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page whose points play the motion (.html);
-    harmonics, the observed displacement and preload are those of [response]. It is stored as it
+    resolve; --complex (complex eigenvalue analysis), --movie and --nonlinear are for all bodies
+    together, with modes that are counted through. With --nonlinear, the backbone, frequency and
+    damping over the amplitude, is written (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page
+    whose points play the motion (.html); harmonics, the observed displacement and preload are those of [response]. It is stored as it
     grows; Ctrl-C stops it, --resume goes on where it was. With a tolerance it is stored at the
     end only, and followed anew.
     """

@@ -5,7 +5,7 @@ together. The kernels leave nodes out whose force is exactly zero, as contact th
 spring has stiffness but no force, the laws return a force that is too small to matter.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -50,70 +50,12 @@ class BilateralLaw(NormalLaw):
 
 
 @normal_law
-def _cubic(u, v, p):
-    e = p[4] - u
-    tension = e * (p[0] + p[1] * e * e) + p[3] - p[2] * v
-    return _felt(tension, p[0] + 3.0 * p[1] * e * e, p[2])
-
-
-@dataclass(frozen=True)
-class BilateralCubic(BilateralLaw):
-    r"""Spring with a cubic term and a parallel dashpot, for links.
-
-    .. math:: N = c\,(e + s) + c_3\,(e + s)^3 + b\,\dot e + N_0, \qquad F = -N,\quad e = -u
-
-    N is the tension [N], e the elongation [m]. The force never ends: it pushes and pulls.
-
-    Parameters
-    ----------
-    stiffness : float or (n,) sequence
-        c [N/m]; below zero for a spring with two places of rest.
-    cubic_stiffness : float or (n,) sequence
-        c_3 [N/m^3]; above zero for a spring that hardens, below for one that softens.
-    damping : float or (n,) sequence
-        b, zero or above [N s/m].
-    preload : float or (n,) sequence
-        N_0 [N].
-    shortening : float or (n,) sequence
-        s: prescribed shortening [m].
-    """
-
-    kernel: ClassVar = _cubic
-    extensive: ClassVar = frozenset({"stiffness", "cubic_stiffness", "damping", "preload"})
-
-    stiffness: Annotated[PerNode, Unit("N/m")]
-    cubic_stiffness: Annotated[PerNode, Unit("N/m^3")]
-    damping: Annotated[NotNegative, Unit("N s/m")] = 0.0
-    preload: Annotated[PerNode, Unit("N")] = 0.0
-    shortening: Annotated[PerNode, Unit("m")] = 0.0
-
-    @property
-    def penetration_scale(self) -> float:
-        """Elongation under about 1 N [m], the smallest of all nodes."""
-        c, cubic = np.abs(np.asarray(self.stiffness)), np.abs(np.asarray(self.cubic_stiffness))
-        stiffest = float(np.max(np.maximum(c, np.cbrt(cubic))))
-        return 1.0 / stiffest if stiffest > 0.0 else 1.0
-
-    def onsets(self, nodes: int) -> Array:
-        """None: a place (1, n) that no spring reaches [m]."""
-        return np.full((1, nodes), _NOWHERE)
-
-    def _shortening(self, table: Array) -> Array:
-        return np.asarray(table[:, 4])
-
-    def _potential(self, elongation: Array, table: Array) -> Array:
-        c, cubic, _, preload, _ = table.T
-        square = elongation**2
-        return np.asarray(square * (0.5 * c + 0.25 * cubic * square) + preload * elongation)
-
-
-@normal_law
 def _polynomial(u, v, p):
-    e, w = p[8] - u, -v
-    tension = (e * (p[0] + e * (p[1] + e * (p[2] + e * e * p[3]))) + p[7]
-               + w * (p[4] + p[5] * abs(w) + p[6] * w * w))
-    slope = p[0] + e * (2.0 * p[1] + e * (3.0 * p[2] + 5.0 * e * e * p[3]))
-    return _felt(tension, slope, p[4] + 2.0 * p[5] * abs(w) + 3.0 * p[6] * w * w)
+    e, w = p[4] - u, -v
+    tension = (e * (p[0] + e * (p[5] + e * (p[1] + e * e * p[6]))) + p[3]
+               + w * (p[2] + p[7] * abs(w) + p[8] * w * w))
+    slope = p[0] + e * (2.0 * p[5] + e * (3.0 * p[1] + 5.0 * e * e * p[6]))
+    return _felt(tension, slope, p[2] + 2.0 * p[7] * abs(w) + 3.0 * p[8] * w * w)
 
 
 @dataclass(frozen=True)
@@ -130,14 +72,19 @@ class BilateralPolynomial(BilateralLaw):
 
     Parameters
     ----------
-    stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness : float or (n,) sequence
-        c, c_2, c_3, c_5 [N/m], [N/m^2], [N/m^3], [N/m^5], of any sign.
-    damping, quadratic_damping, cubic_damping : float or (n,) sequence
-        b, b_2, b_3, zero or above [N s/m], [N s^2/m^2], [N s^3/m^3].
+    stiffness, cubic_stiffness : float or (n,) sequence
+        c, c_3 [N/m], [N/m^3]; c is below zero for a spring with two places of rest, c_3 above zero
+        for one that hardens, below for one that softens.
+    damping : float or (n,) sequence
+        b, zero or above [N s/m].
     preload : float or (n,) sequence
         N_0 [N].
     shortening : float or (n,) sequence
         s: prescribed shortening [m].
+    quadratic_stiffness, quintic_stiffness : float or (n,) sequence
+        c_2, c_5 [N/m^2], [N/m^5], of any sign.
+    quadratic_damping, cubic_damping : float or (n,) sequence
+        b_2, b_3, zero or above [N s^2/m^2], [N s^3/m^3].
     """
 
     kernel: ClassVar = _polynomial
@@ -146,14 +93,15 @@ class BilateralPolynomial(BilateralLaw):
         "quadratic_damping", "cubic_damping", "preload"})
 
     stiffness: Annotated[PerNode, Unit("N/m")]
-    quadratic_stiffness: Annotated[PerNode, Unit("N/m^2")] = 0.0
     cubic_stiffness: Annotated[PerNode, Unit("N/m^3")] = 0.0
-    quintic_stiffness: Annotated[PerNode, Unit("N/m^5")] = 0.0
     damping: Annotated[NotNegative, Unit("N s/m")] = 0.0
-    quadratic_damping: Annotated[NotNegative, Unit("N s^2/m^2")] = 0.0
-    cubic_damping: Annotated[NotNegative, Unit("N s^3/m^3")] = 0.0
     preload: Annotated[PerNode, Unit("N")] = 0.0
     shortening: Annotated[PerNode, Unit("m")] = 0.0
+    quadratic_stiffness: Annotated[PerNode, Unit("N/m^2")] = field(default=0.0, kw_only=True)
+    quintic_stiffness: Annotated[PerNode, Unit("N/m^5")] = field(default=0.0, kw_only=True)
+    quadratic_damping: Annotated[NotNegative, Unit("N s^2/m^2")] = field(
+        default=0.0, kw_only=True)
+    cubic_damping: Annotated[NotNegative, Unit("N s^3/m^3")] = field(default=0.0, kw_only=True)
 
     @property
     def penetration_scale(self) -> float:
@@ -168,13 +116,13 @@ class BilateralPolynomial(BilateralLaw):
         return np.full((1, nodes), _NOWHERE)
 
     def _shortening(self, table: Array) -> Array:
-        return np.asarray(table[:, 8])
+        return np.asarray(table[:, 4])
 
     def _potential(self, elongation: Array, table: Array) -> Array:
-        c, quadratic, cubic, quintic = table[:, :4].T
+        c, cubic, _, preload, _, quadratic, quintic, *_ = table.T
         e, square = elongation, elongation**2
         return np.asarray(square * (0.5 * c + e * quadratic / 3.0 + 0.25 * cubic * square
-                                    + quintic * square**2 / 6.0) + table[:, 7] * e)
+                                    + quintic * square**2 / 6.0) + preload * e)
 
 
 @normal_law

@@ -5,7 +5,7 @@ the elongation along its direction, with a law that pulls as well as pushes.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -15,7 +15,6 @@ from fecontact.core.tables import located
 from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.laws.normal.bilateral import (
-    BilateralCubic,
     BilateralLaw,
     BilateralPiecewise,
     BilateralPlay,
@@ -47,59 +46,6 @@ class _LawSpring(NonlinearSpring):
 
 
 @dataclass(frozen=True)
-class CubicSpring(_LawSpring):
-    r"""Spring with a cubic term and dashpot between two points, or a point and the base.
-
-    .. math:: N = c\,(e + s) + c_3\,(e + s)^3 + b\,\dot e + N_0, \qquad e = d \cdot (u_1 - u_2)
-
-    is the tension [N], which pulls both points together. d points from the second to the first
-    place, which stay in line with it: displacements are small.
-
-    Parameters
-    ----------
-    first : str
-        ``body.point``.
-    second : str, optional
-        Another point; by default the base, which does not move.
-    stiffness : float
-        c [N/m]; below zero for a spring with two places of rest.
-    cubic_stiffness : float
-        c_3 [N/m^3]; above zero for a spring that hardens, below for one that softens.
-    damping : float
-        b, zero or above [N s/m].
-    direction : (x, y) or (x, y, z), optional
-        d, of any length; by default along the line between the points.
-    preload : float
-        N_0 [N].
-    shortening : float
-        s: prescribed shortening, or how much longer the spring is between the points than when it
-        is free [m].
-
-    Raises
-    ------
-    InputError
-        For values out of range, a spring to the base without direction, or without any stiffness.
-    """
-
-    first: str
-    second: str | None = None
-    stiffness: Annotated[float, Unit("N/m")] = 0.0
-    cubic_stiffness: Annotated[float, Unit("N/m^3")] = 0.0
-    damping: Annotated[float, Unit("N s/m")] = 0.0
-    direction: Coordinates | None = None
-    preload: Annotated[float, Unit("N")] = 0.0
-    shortening: Annotated[float, Unit("m")] = 0.0
-
-    made_of: ClassVar = BilateralCubic
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.stiffness == 0.0 and self.cubic_stiffness == 0.0:
-            raise InputError("CubicSpring: stiffness and cubic_stiffness are both zero; give at "
-                             "least one of them.")
-
-
-@dataclass(frozen=True)
 class PolynomialSpring(_LawSpring):
     r"""Spring and dashpot with polynomial forces between two points, or a point and the base.
 
@@ -118,10 +64,11 @@ class PolynomialSpring(_LawSpring):
         ``body.point``.
     second : str, optional
         Another point; by default the base, which does not move.
-    stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness : float
-        c, c_2, c_3, c_5 [N/m], [N/m^2], [N/m^3], [N/m^5], of any sign.
-    damping, quadratic_damping, cubic_damping : float
-        b, b_2, b_3, zero or above [N s/m], [N s^2/m^2], [N s^3/m^3].
+    stiffness, cubic_stiffness : float
+        c, c_3 [N/m], [N/m^3]; c is below zero for a spring with two places of rest, c_3 above zero
+        for one that hardens, below for one that softens.
+    damping : float
+        b, zero or above [N s/m].
     direction : (x, y) or (x, y, z), optional
         d, of any length; by default along the line between the points.
     preload : float
@@ -129,6 +76,10 @@ class PolynomialSpring(_LawSpring):
     shortening : float
         s: prescribed shortening, or how much longer the spring is between the points than when it
         is free [m].
+    quadratic_stiffness, quintic_stiffness : float
+        c_2, c_5 [N/m^2], [N/m^5], of any sign.
+    quadratic_damping, cubic_damping : float
+        b_2, b_3, zero or above [N s^2/m^2], [N s^3/m^3].
 
     Raises
     ------
@@ -140,15 +91,15 @@ class PolynomialSpring(_LawSpring):
     first: str
     second: str | None = None
     stiffness: Annotated[float, Unit("N/m")] = 0.0
-    quadratic_stiffness: Annotated[float, Unit("N/m^2")] = 0.0
     cubic_stiffness: Annotated[float, Unit("N/m^3")] = 0.0
-    quintic_stiffness: Annotated[float, Unit("N/m^5")] = 0.0
     damping: Annotated[float, Unit("N s/m")] = 0.0
-    quadratic_damping: Annotated[float, Unit("N s^2/m^2")] = 0.0
-    cubic_damping: Annotated[float, Unit("N s^3/m^3")] = 0.0
     direction: Coordinates | None = None
     preload: Annotated[float, Unit("N")] = 0.0
     shortening: Annotated[float, Unit("m")] = 0.0
+    quadratic_stiffness: Annotated[float, Unit("N/m^2")] = field(default=0.0, kw_only=True)
+    quintic_stiffness: Annotated[float, Unit("N/m^5")] = field(default=0.0, kw_only=True)
+    quadratic_damping: Annotated[float, Unit("N s^2/m^2")] = field(default=0.0, kw_only=True)
+    cubic_damping: Annotated[float, Unit("N s^3/m^3")] = field(default=0.0, kw_only=True)
 
     made_of: ClassVar = BilateralPolynomial
 

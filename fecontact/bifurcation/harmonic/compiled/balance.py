@@ -11,7 +11,7 @@ from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
 from fecontact.core.types import Array
-from fecontact.laws.normal.bilateral import BilateralCubic, BilateralPolynomial
+from fecontact.laws.normal.bilateral import BilateralPolynomial
 from fecontact.system.contact_system import needs_friction
 from fecontact.system.nodes import SystemArrays
 
@@ -160,7 +160,7 @@ class CompiledBalance:
         """
         system = self.contact_field.system()
         return needs_friction(system.basis) or not all(
-            isinstance(law, BilateralCubic | BilateralPolynomial)
+            isinstance(law, BilateralPolynomial)
             for _, _, law in system.law_groups("normal"))
 
 
