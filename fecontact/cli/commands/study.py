@@ -147,9 +147,9 @@ def modes(
     resolve; --complex (complex eigenvalue analysis), --movie and --nonlinear are for all bodies
     together, with modes that are counted through. With --nonlinear, the backbone, frequency and
     damping over the amplitude, is written (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page
-    whose points play the motion (.html); harmonics, the observed displacement and preload are those of [response]. It is stored as it
-    grows; Ctrl-C stops it, --resume goes on where it was. With a tolerance it is stored at the
-    end only, and followed anew.
+    whose points play the motion (.html); harmonics, the observed displacement and preload are those
+    of [response]. It is stored as it grows; Ctrl-C stops it, --resume goes on where it was. With a
+    tolerance it is stored at the end only, and followed anew.
     """
     import numpy as np
 
