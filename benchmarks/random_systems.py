@@ -41,7 +41,8 @@ CHANGE = 1e-7
 DEEPEST = 5.0
 # Steps after which the reference gives up.
 MOST_STEPS = 20_000_000
-NORMAL = list(law_names()[laws.NormalLaw])
+# The contact element is two other laws.
+NORMAL = [name for name in law_names()[laws.NormalLaw] if name != "friction-contact-3d"]
 FRICTION = list(law_names()[laws.FrictionLaw])
 # Time constant of memory that fades without force [s].
 FADING = 1e-7

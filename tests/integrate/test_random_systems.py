@@ -35,7 +35,8 @@ def test_equations_are_those_of_the_package(systems):
             found = case.system.rhs(t, y)
             size = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max())
             assert (np.abs(found - expected) / size).max() < 1e-8, (number, case.names)
-    assert met == {*law_names()[NormalLaw], *law_names()[FrictionLaw]}
+    assert met == {*systems.NORMAL, *law_names()[FrictionLaw], "cubic spring"}
+    assert len(systems.NORMAL) == len(law_names()[NormalLaw]) - 1
 
 
 def test_errors_at_the_default_tolerance(systems):

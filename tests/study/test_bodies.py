@@ -435,7 +435,7 @@ def test_a_study_of_bodies_that_only_a_nonlinear_spring_joins(study):
     e = brentq(lambda e: 1e6 * e + 1e14 * e**3 + 100.0, -1.0, 0.0, xtol=1e-16)
     assert run.normal_force[0] == pytest.approx([100.0, 100.0], rel=1e-6)
     assert run.displacement("pad.P")[0, 1] == pytest.approx(e, rel=1e-6)
-    with pytest.raises(fc.InputError, match=r"\[links\.mount\]: stiffness and cubic_stiffness"):
+    with pytest.raises(fc.InputError, match=r"\[links\.mount\]: all stiffnesses and dampings"):
         fc.Study.from_tables({**tables, "links": {
             "mount": {"kind": "polynomial-spring", "first": "pad.P", "direction": [0.0, 1.0]}}})
 
