@@ -19,10 +19,13 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Coordinates, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.equations import facets_of_boundary
 from fecontact.fem.rotation import cross_matrix
 
 # Distance of nodes that match, and of a node on the axis, relative to that of neighbours.
 _MATCH, _ON_AXIS = 1e-3, 1e-6
+# Distance of tied faces, relative to the mean size of facets.
+_REACH = 0.05
 # Difference between what supports allow at two nodes that match.
 _SAME = 1e-9
 
@@ -35,13 +38,16 @@ class CyclicSymmetry:
     ----------
     low, high : str
         Boundaries of the mesh; ``high`` is ``low`` turned by 360 / N degrees, counter-clockwise
-        seen against the axis. Their nodes must match.
+        seen against the axis. Their nodes must match unless they are tied.
     sectors : int
         N, two or more.
     centre : (x, y) or (x, y, z)
         A point of the axis; two numbers in a solid have z = 0 [m].
     axis : (x, y, z)
         Direction of the axis, of any length above zero; of plane bodies z.
+    tied : bool
+        For faces of different meshes: the nodes of ``high`` follow the facets of ``low``, turned,
+        as in :class:`~fecontact.fem.Tie`. Give ``low`` the coarser mesh.
 
     Raises
     ------
@@ -54,10 +60,12 @@ class CyclicSymmetry:
     sectors: int
     centre: Annotated[Coordinates, Unit("m")] = (0.0, 0.0)
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    tied: bool = False
 
     def __post_init__(self) -> None:
         require_kind("CyclicSymmetry", str, low=self.low, high=self.high)
         require_kind("CyclicSymmetry", int, sectors=self.sectors)
+        require_kind("CyclicSymmetry", bool, tied=self.tied)
         if self.low == self.high:
             raise InputError(f"CyclicSymmetry: low and high are both '{self.low}'; name the two "
                              f"faces that meet the neighbours.")
@@ -108,11 +116,16 @@ class CyclicSymmetry:
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
 class SectorNodes:
-    """Nodes of a sector with neighbours: pairs ``low`` and ``high`` (p,), ``on_axis`` (a,)."""
+    """Nodes of a sector with neighbours: ``low``, ``high`` and ``on_axis``, without each other.
+
+    Low and high ones are pairs (p,). Where faces are tied, they are no pairs, and displacements of
+    ``high`` are those of all nodes by ``weights``, sparse (d h, d N), turned.
+    """
 
     low: Integers
     high: Integers
     on_axis: Integers
+    weights: Any = None
 
 
 def sector_nodes(body: ElasticBody, symmetry: CyclicSymmetry) -> SectorNodes:
@@ -143,12 +156,52 @@ def sector_nodes(body: ElasticBody, symmetry: CyclicSymmetry) -> SectorNodes:
     if not len(low) or not len(high):
         raise MeshError(f"CyclicSymmetry: all nodes of '{symmetry.low}' or '{symmetry.high}' lie "
                         f"on the axis; name the faces that meet the neighbours.")
+    if symmetry.tied:
+        return _tied(body, symmetry, SectorNodes(low, high, on_axis))
     distance, which = _nearest(turned, body.nodes[high])
     if len(low) != len(high) or distance.max() > _MATCH * step or (
             len(np.unique(which)) != len(which)):
         raise MeshError(_mismatch(body, symmetry, low, high, distance))
     _require_same_supports(body, symmetry, low[which], high)
     return SectorNodes(low[which], high, on_axis)
+
+
+def _tied(body: ElasticBody, symmetry: CyclicSymmetry, nodes: SectorNodes) -> SectorNodes:
+    """Nodes of the high face with weights on those of the low one.
+
+    Raises
+    ------
+    MeshError
+        For a node that is not near the other face.
+    InputError
+        For supports that differ on the two faces.
+    """
+    import scipy.sparse as sp
+
+    d, high = body.dimension, nodes.high
+    face = facets_of_boundary(body, symmetry.low)
+    back = symmetry.turned(body.nodes[high], -1.0)
+    facet, local, distance = face.closest(back)
+    reach = _REACH * float((face.shape_integrals.sum(axis=1) ** (1.0 / (d - 1))).mean())
+    if distance.max() > reach:
+        raise MeshError(_mismatch(body, symmetry, nodes.low, high, distance))
+    each = face.following(back, facet, local)
+    count, k = each.shape[:2]
+    columns = d * face.nodes[facet][:, None, :, None] + np.arange(d)
+    rows = np.repeat(np.arange(count * d), k * d)
+    weights = sp.csr_array(sp.coo_array(
+        (np.swapaxes(each, 1, 2).ravel(),
+         (rows, np.broadcast_to(columns, (count, d, k, d)).ravel())),
+        shape=(count * d, body.unknowns)))
+    found = SectorNodes(nodes.low, high, nodes.on_axis, weights)
+    B, _ = cyclic_expansion(body, symmetry, found, 0)
+    held = np.zeros(body.unknowns, dtype=bool)
+    held[body.fixed_dofs] = True
+    moves = np.asarray(abs(B).sum(axis=1)).ravel() > _SAME
+    differs = (moves == held).reshape(-1, d)[high].any(axis=1)
+    if differs.any():
+        raise InputError(_other_supports(body, symmetry, high[int(np.argmax(differs))]))
+    return found
 
 
 def _spacing(body: ElasticBody, boundary: str) -> float:
@@ -173,7 +226,7 @@ def _mismatch(
     what = (f"CyclicSymmetry: '{symmetry.low}' turned by 360 / {symmetry.sectors} degrees does not "
             f"match '{symmetry.high}': ")
     what += (f"they have {len(low)} and {len(high)} nodes off the axis, and t"
-             if len(low) != len(high) else "t")
+             if len(low) != len(high) and not symmetry.tied else "t")
     what += f"he node at ({where}) is {distance[worst]:.3g} m from its partner; "
     close = _MATCH * _spacing(body, symmetry.low)
     for turns, remedy in ((-1.0, "exchange low and high"), *(
@@ -182,7 +235,8 @@ def _mismatch(
         found, _ = _nearest(symmetry.turned(body.nodes[low], turns), body.nodes[high])
         if len(low) == len(high) and found.max() <= close:
             return f"{what}{remedy}."
-    return (f"{what}check axis, centre and sectors, and give both faces the same mesh.")
+    same = "" if symmetry.tied else ", and give both faces the same mesh, or tied = True"
+    return f"{what}check axis, centre and sectors{same}."
 
 
 def _possible(
@@ -210,10 +264,13 @@ def _require_same_supports(
     turned = np.einsum("ij,nj,kj->nik", R, free[low], R)
     differs = np.abs(turned - free[high][:, :, None] * np.eye(d)).max(axis=(1, 2)) > _SAME
     if differs.any():
-        x = ", ".join(f"{value:g}" for value in body.nodes[high[int(np.argmax(differs))]])
-        raise InputError(f"CyclicSymmetry: supports hold other directions on '{symmetry.high}' at "
-                         f"({x}) than on '{symmetry.low}', turned; hold all directions there, or "
-                         f"that along the axis.")
+        raise InputError(_other_supports(body, symmetry, high[int(np.argmax(differs))]))
+
+
+def _other_supports(body: ElasticBody, symmetry: CyclicSymmetry, node: int) -> str:
+    x = ", ".join(f"{value:g}" for value in body.nodes[node])
+    return (f"CyclicSymmetry: supports hold other directions on '{symmetry.high}' at ({x}) than on "
+            f"'{symmetry.low}', turned; hold all directions there, or that along the axis.")
 
 
 def cyclic_expansion(
@@ -241,12 +298,6 @@ def cyclic_expansion(
     column[rows] = np.arange(len(rows))
     parts = [(rows, column[rows], np.ones(len(rows), dtype=turn.dtype))]
     inverse = [(column[rows], rows, np.ones(len(rows), dtype=turn.dtype))]
-    for i in range(d):
-        for j in range(d):
-            source = column[d * nodes.low + j]
-            used = source >= 0
-            parts.append((d * nodes.high[used] + i, source[used],
-                          np.full(np.count_nonzero(used), turn[i, j])))
     count = len(rows)
     for node in nodes.on_axis:
         allowed = _allowed(turn, free[d * node : d * node + d])
@@ -260,7 +311,14 @@ def cyclic_expansion(
         where, columns, values = (np.concatenate(one) for one in zip(*entries, strict=True))
         return sp.csc_array(sp.coo_array((values, (where, columns)), shape=shape))
 
-    return matrix(parts, (size, count)), matrix(inverse, (count, size))
+    own_motions = matrix(parts, (size, count))
+    places = (d * nodes.high[:, None] + np.arange(d)).ravel()
+    seen = own_motions[(d * nodes.low[:, None] + np.arange(d)).ravel()] if (
+        nodes.weights is None) else nodes.weights @ own_motions
+    follow = sp.coo_array(sp.kron(sp.eye_array(len(nodes.high)), turn) @ seen)
+    following = sp.csc_array(sp.coo_array(
+        (follow.data, (places[follow.row], follow.col)), shape=own_motions.shape))
+    return own_motions + following, matrix(inverse, (count, size))
 
 
 def _allowed(turn: Array, free: Array) -> Array:

@@ -272,13 +272,14 @@ def _weighted_nodes(body: _Body, name: str) -> tuple[Integers, Array]:
     nodes = body.group_nodes(name)
     if name not in body.mesh.boundaries:
         return nodes, np.ones(len(nodes))
-    face = _face(body, name)
+    face = facets_of_boundary(body, name)
     weights = np.zeros(len(body.nodes))
     np.add.at(weights, face.nodes, face.shape_integrals)
     return nodes, weights[nodes]
 
 
-def _face(body: _Body, boundary: str) -> Facets:
+def facets_of_boundary(body: _Body, boundary: str) -> Facets:
+    """Facets of a named boundary of a body."""
     facets = body.facet_nodes(body.mesh.boundaries[boundary])
     if body.nodes.shape[1] == 2:
         # Ends before the middle.
@@ -288,7 +289,7 @@ def _face(body: _Body, boundary: str) -> Facets:
 
 def _tied(unknowns: Unknowns, one: Tie, name: str) -> Equations:
     d, body = unknowns.d, unknowns.body
-    face = _face(body, one.independent)
+    face = facets_of_boundary(body, one.independent)
     facets = face.nodes
     nodes = np.setdiff1d(body.group_nodes(one.dependent), facets)
     reach = one.tolerance or _REACH * float((face.shape_integrals.sum(axis=1) ** (1 / (d - 1))

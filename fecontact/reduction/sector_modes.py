@@ -111,7 +111,8 @@ class SectorModes(Summarised):
         nodes = np.concatenate([symmetry.turned(self.nodes, s) for s in sectors])
         # A node between two sectors is one of the next, a node on the axis one of the first.
         owner = np.arange(N * count).reshape(N, count)
-        owner[:, self.joined.high] = np.roll(owner, -1, axis=0)[:, self.joined.low]
+        if self.joined.weights is None:
+            owner[:, self.joined.high] = np.roll(owner, -1, axis=0)[:, self.joined.low]
         owner[:, self.joined.on_axis] = owner[0, self.joined.on_axis]
         kept, number = np.unique(owner, return_inverse=True)
         number = number.reshape(N, count)

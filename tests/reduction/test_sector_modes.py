@@ -122,6 +122,37 @@ def test_rotating_sector_is_the_rotating_wheel(name):
         sector_modes(sector, symmetry, 3, rotation=Rotation(W, (0.1, 0.0)))
 
 
+def uneven_sector(sectors, radial=4):
+    """A sector whose nodes stand elsewhere on the two faces, which lie on each other turned."""
+    alpha = 2.0 * np.pi / sectors
+
+    def warp(at):
+        r = at[:, 0] + 0.25 * (at[:, 0] - 0.6) * (1.0 - at[:, 0]) * at[:, 1] / alpha
+        return np.column_stack([r * np.cos(at[:, 1]), r * np.sin(at[:, 1])])
+
+    return grid(np.linspace(0.6, 1.0, radial + 1), np.linspace(0.0, alpha, 7), warp=warp)
+
+
+@pytest.mark.parametrize("fixed", [{}, {"left": "xy"}])
+def test_tied_faces_of_other_meshes(fixed):
+    """They agree with matching ones, the better the finer; without tied they are refused."""
+    N = 6
+    matching = ElasticBody(ring_sector(N, 4, 6, wavy=0.0), STEEL, fixed=fixed)
+    expected = sector_modes(matching, ring_symmetry(N), 4)
+    symmetry = CyclicSymmetry("bottom", "top", N, tied=True)
+    uneven = ElasticBody(uneven_sector(N), STEEL, fixed=fixed)
+    found = sector_modes(uneven, symmetry, 4)
+    assert found.frequencies_hz == pytest.approx(expected.frequencies_hz, rel=2e-3)
+    assert (found.frequencies_hz == 0.0).sum() == (0 if fixed else 2)
+    same = sector_modes(matching, symmetry, 4)
+    assert same.frequencies_hz == pytest.approx(expected.frequencies_hz, rel=1e-8)
+    assert len(found.on_wheel(2, 0).nodes) == N * len(uneven.nodes)
+    with pytest.raises(MeshError, match="or tied = True"):
+        sector_modes(uneven, ring_symmetry(N), 4)
+    with pytest.raises(MeshError, match=r"is 0\.[0-9]+ m from its partner; check axis"):
+        sector_modes(uneven, CyclicSymmetry("bottom", "top", 7, tied=True), 4)
+
+
 def test_axis_may_point_anywhere():
     mesh = hexagon_sector(2, 0.3)
     turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
