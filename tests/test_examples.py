@@ -17,6 +17,8 @@ EXAMPLES = {
     "own_law": ((), [(r"^LogarithmicFriction .* (\d+)% of the time", 0.0, 0.5)], set()),
     "from_other_programs": ((), [(r"^universal file .* frequencies differ by (\S+),", 0.0, 2e-5),
                                  (r"^Abaqus.* shapes by (\S+)$", 0.0, 1e-9)], set()),
+    # The deck is not part of the package.
+    "brake_reuss_beam": ((), [], set()),
     "impact_calibration": ((), [(r"4 mm: (\S+) kg", 0.092, 1e-5), (r"kg, (\S+) Hz", 230.0, 0.02),
                                 (r"Hz, (\S+)$", 0.6, 1e-4)], set()),
     # The middle fifth carries most of 5 kN; both tables as in docs/convergence.md.
@@ -182,6 +184,12 @@ def test_example(name, tmp_path, monkeypatch, capsys):
     printed, left = run_script(f"examples/{name}.py", arguments, tmp_path, monkeypatch, capsys)
     check_numbers(printed, numbers)
     assert left == files
+
+
+def test_an_example_without_its_deck_asks_for_it(tmp_path, monkeypatch, capsys):
+    printed, _ = run_script("examples/brake_reuss_beam.py", (), tmp_path, monkeypatch, capsys)
+    assert printed.startswith("Give the deck of the Brake-Reuss beam")
+    assert printed.count("\n") == 1
 
 
 @pytest.mark.parametrize("study", sorted((ROOT / "examples").glob("*.toml")), ids=lambda x: x.stem)
