@@ -1,4 +1,4 @@
-"""What commands are called elsewhere, for command lines that name none."""
+"""Words of the field for commands, for command lines that name none."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""What a run keeps of its steps between the outputs, so that pictures need not integrate again."""
+"""Motion between the outputs of a run, kept so that pictures need not integrate again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -157,7 +157,7 @@ def read_case(path: str | Path, *, trust: bool | Iterable[Path] = False) -> Case
         except UntrustedError as error:
             if of_laws is None:
                 raise
-            # What these laws give between the outputs is not recorded.
+            # Forces of these laws between the outputs are not recorded.
             state.pop("kept", None)
             from fecontact.output.files.recorded_laws import recorded_system
 
@@ -196,7 +196,7 @@ def _read_state(stored: Any, basis: ModalBasis) -> dict[str, Any]:
 
 
 def _read_kept(stored: Any, state: dict[str, Any], m: int, n: int) -> KeptSteps:
-    """What a run has kept between its outputs; ``state`` has the arrays at these."""
+    """Motion kept between the outputs of a run; ``state`` has the arrays at these."""
     time = array(stored, "time", (None,))
     count, outputs = len(time), state["time"]
     if not ((np.diff(time) > 0.0).all() and (time > outputs[0]).all() and (

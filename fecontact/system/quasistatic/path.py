@@ -115,7 +115,7 @@ class LoadPath:
         return given + [(f"forces[{k}]", value) for k, value in enumerate(forces)]
 
     def constant_part(self, value: float) -> Values:
-        """What takes the constant part of a load at the vertices: the value times the scale."""
+        """Constant part of a load at the vertices: the value times the scale."""
         if isinstance(self.load_scale, tuple):
             return tuple(value * scale for scale in self.load_scale)
         return value * self.load_scale
