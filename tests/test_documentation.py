@@ -259,6 +259,30 @@ def check_rotation(names, printed, folder):
     unit = np.sqrt(2.1e11 * 0.02**2 / (12.0 * 7850.0)) / (2.0 * np.pi)
     assert first[0] == pytest.approx(3.516 * unit, rel=2e-3)
     assert first[1] == pytest.approx(5.049 * unit, rel=2e-2)
+    # The stress in the modes changes little where there are enough of them.
+    assert first[4] == pytest.approx(first[3], rel=1e-5)
+    assert names["diagram"].frequencies_hz.shape == (61, 6)
+    assert (folder / "campbell.png").stat().st_size > 10000
+
+
+def check_stressed_bodies(names, printed, folder):
+    first = [float(re.search(r"\[ *([\d.]+)", line).group(1)) for line in printed.splitlines()]
+    # The square falls by the part of Euler's load, 10 MPa of 17.27.
+    assert (first[2] / first[0]) ** 2 == pytest.approx(1.0 - 10.0 / 17.27, abs=0.03)
+    assert first[1] > first[0]
+    assert first[4] == pytest.approx(17.27, rel=1e-3)
+    assert (folder / "buckling.png").stat().st_size > 10000
+
+
+def check_cyclic_symmetry(names, printed, folder):
+    lines = printed.splitlines()
+    # A ring of 24 masses with Jenkins elements, above 6.711291 of one harmonic at W = 1.1.
+    assert float(lines[-1]) == pytest.approx(6.712, abs=2e-2)
+    wheel = names["found"].wheel_frequencies_hz
+    assert (wheel[:3] == 0.0).all()
+    assert wheel[3] == pytest.approx(wheel[4], rel=1e-9)
+    for name in ("diameters", "wheel"):
+        assert (folder / f"{name}.png").stat().st_size > 10000
 
 
 def check_bodies(names, printed, folder):
@@ -352,7 +376,9 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,
           "set-valued.md": check_set_valued, "loads.md": check_loads,
-          "preload.md": check_preload, "rotation.md": check_rotation, "bodies.md": check_bodies,
+          "preload.md": check_preload, "rotation.md": check_rotation,
+          "stressed-bodies.md": check_stressed_bodies,
+          "cyclic-symmetry.md": check_cyclic_symmetry, "bodies.md": check_bodies,
           "solids.md": check_solids,
           "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,
           "results.md": check_results}
