@@ -75,13 +75,13 @@ def _resolved(run: Trajectory) -> Resolved:
     if len(run.time) < 2 or not np.isfinite(run.states).all():
         return Resolved(run, 0.0, "")
     flags, kept = _coarse(run, _ERROR), run.kept
-    reason = "this run has kept nothing between them"
+    reason = "this run has kept nothing between them; give it more outputs"
     if flags.any() and kept is not None:
         between = np.searchsorted(run.time, kept.time) - 1
         rows = flags[np.clip(between, 0, len(flags) - 1)]
         if rows.any():
             run = _joined(run, kept.part(rows))
-        reason = "it was too long to keep more between them"
+        reason = "it was too long to keep more between them; give it more outputs"
     if flags.any():
         flags = _coarse(run, _TOLD_ERROR)
     lost = float(np.diff(run.time)[flags].sum())

@@ -150,6 +150,9 @@ def test_pictures_say_where_they_are_too_coarse(tmp_path):
     assert "has kept nothing" in found.note
     figure = plot_phase(by_hand, 2)
     assert [" ".join(text.get_text().split()) for text in figure.texts] == [found.note]
+    wide = plot_history(by_hand, ["B"])
+    wide.savefig(tmp_path / "wide.png")
+    assert " ".join(wide.texts[0].get_text().split()) == found.note
     assert not plot_phase(hit(7), component="y").texts
     assert "has kept nothing" in resolved(hit(7, keep_steps=False)).note
     # As after a run that was too long: two of the rows are left.

@@ -97,7 +97,8 @@ def add_note(figure: "Figure", drawn: Resolved | Sampled) -> None:
     if not drawn.note:
         return
     width, height = figure.get_size_inches()
-    lines = wrap(drawn.note, int(15.0 * width))
+    # Longer lines would be cut as names are.
+    lines = wrap(drawn.note, min(int(15.0 * width), 88))
     figure.text(0.995, 0.05 / height, "\n".join(lines), ha="right", va="bottom", fontsize=8.0,
                 color="#a03000")
     below = (0.05 + 0.16 * len(lines)) / height
