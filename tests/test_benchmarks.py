@@ -1,6 +1,7 @@
 """Every benchmark runs in its short form, and the answers whose times it takes are right."""
 
 import re
+import shutil
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ from scripts_for_tests import ROOT, check_numbers, run_script
 # Arguments, and patterns, numbers and tolerances of what does not depend on the machine.
 BENCHMARKS = {
     "bodies": ((), [(r"^ (2) bodies of 20 modes", 2.0, 0.0)]),
+    "calculix": ((), []),
     "contact_kernels": ((), [(r"^ +400 +(\d+)", 40.0, 0.0)]),
     "continuation": ((), [(r"^ +50 fecontact .* (\S+) +\S+$", 0.0, 1e-9),
                           (r"^ +50 fecontact .* \S+ +(\S+)$", 0.0, 1e-6),
@@ -52,6 +54,16 @@ def test_two_checkouts_in_turn():
     ratios = [float(row.split()[4]) for row in rows]
     assert ratios
     assert all(0.01 < ratio < 100.0 for ratio in ratios)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_decks_are_solved_as_by_calculix(tmp_path, monkeypatch, capsys):
+    printed, _ = run_script("benchmarks/calculix.py", (), tmp_path, monkeypatch, capsys)
+    rows = re.findall(r"^(.{24}) +(\S+) +(\S+)$", printed, re.MULTILINE)[1:]
+    assert len(rows) == 7
+    for name, displacement, frequencies in rows:
+        assert float(displacement) < 1e-6, name
+        assert float(frequencies) < (1e-2 if "C3D8I" in name else 5e-4), name
 
 
 def test_every_benchmark_is_here():

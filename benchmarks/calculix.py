@@ -1,0 +1,141 @@
+"""Decks of our own, read by this package and solved by CalculiX: displacements and frequencies.
+
+Each deck is solved twice by ``ccx`` (Debian: calculix-ccx) in a temporary folder, a static step and
+frequencies; ``read_mesh`` reads it too. Ten-node tetrahedra and eight-node bricks, also those with
+incompatible modes, have equal stiffness in both. CalculiX integrates the mass of tetrahedra at
+fewer points, and gives bricks with incompatible modes another mass.
+
+Usage: python benchmarks/calculix.py [--quick]
+"""
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import fecontact as fc
+from fecontact.fem import SolidBlock
+from fecontact.reduction import eigenfrequencies_hz
+
+# Nodes of the sides S1, S2, ... of tetrahedra and of hexahedra.
+SIDES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+         8: ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6), (2, 3, 6, 7), (0, 3, 4, 7))}
+MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"
+HUB = "*NODE, NSET=HUB\n90001, 0.15, 0.03, 0.01\n*NODE, NSET=TURN\n90002, 0.15, 0.03, 0.01\n"
+RIGID = f"{HUB}*RIGID BODY, NSET=A_right_N, REF NODE=90001, ROT NODE=90002\n"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A deck, its forces and moments at the node set whose displacement is compared.
+
+    ``force`` are pairs of the node's component and the value; those of rotations act on TURN.
+    """
+
+    name: str
+    deck: str
+    point: str
+    force: tuple[tuple[str, float], ...]
+    degree: int = 2
+
+
+def part(name: str, at: float, size: float, element: str, first: int) -> str:
+    """A block of 0.1 x 0.04 x 0.03 m from x = ``at`` on, with its sides as surfaces and sets."""
+    kind = "hexahedron" if element.startswith("C3D8") else "tetrahedron"
+    mesh = fc.generate(SolidBlock(0.1, 0.04, 0.03, element_size=size, element=kind)).placed(
+        (at, 0.0, 0.0))
+    body = fc.ElasticBody(mesh, degree=1 if kind == "hexahedron" else 2)
+    cells = body.basis.element_dofs.T if kind == "tetrahedron" else mesh.cells
+    text = f"*NODE, NSET={name}\n" + "".join(
+        f"{first + k}, {', '.join(map(repr, place))}\n" for k, place in enumerate(
+            body.nodes.tolist()))
+    text += f"*ELEMENT, TYPE={element}, ELSET=E{name}\n" + "".join(
+        f"{first + k}, {', '.join(map(str, row))}\n" for k, row in enumerate(
+            (cells + first).tolist()))
+    for boundary in ("left", "right"):
+        facets = mesh.boundaries[boundary]
+        wanted = {frozenset(facet) for facet in facets.tolist()}
+        text += f"*SURFACE, NAME={name}_{boundary}\n" + "".join(
+            f"{first + k}, S{side}\n" for k, row in enumerate(cells)
+            for side, corners in enumerate(SIDES[mesh.cells.shape[1]], start=1)
+            if frozenset(row[list(corners)].tolist()) in wanted)
+        nodes = first + np.unique(body.facet_nodes(facets))
+        text += f"*NSET, NSET={name}_{boundary}_N\n" + "".join(f"{node},\n" for node in nodes)
+    tip = first + int(np.linalg.norm(body.nodes - [at + 0.1, 0.04, 0.03], axis=1).argmin())
+    return (f"{text}*NSET, NSET={name}_tip\n{tip},\n*SOLID SECTION, ELSET=E{name}, "
+            "MATERIAL=STEEL\n")
+
+
+def cases(size: float) -> Iterator[Case]:
+    """Decks of blocks with cells of a size [m]."""
+    force = (("x", 300.0), ("y", 100.0), ("z", -200.0))
+    for element in ("C3D10", "C3D8", "C3D8I"):
+        yield Case(f"block of {element}", part("A", 0.0, size, element, 1), "A_tip", force,
+                   2 if element == "C3D10" else 1)
+    one = part("A", 0.0, size, "C3D10", 1)
+    pair = one + part("B", 0.1, 0.8 * size, "C3D10", 30001)
+    yield Case("tied blocks", f"{pair}*TIE, NAME=T, POSITION TOLERANCE=1e-4\nB_left, A_right\n",
+               "B_tip", force)
+    turned = (*force, ("phi_x", 4.0), ("phi_y", -3.0), ("phi_z", 2.0))
+    yield Case("rigid end, moments", one + RIGID, "HUB", turned)
+    yield Case("mass at the end", f"{one}{RIGID}*ELEMENT, TYPE=MASS, ELSET=M\n99001, 90001\n"
+               "*MASS, ELSET=M\n2.5\n", "HUB", turned)
+    yield Case("spring at the end", f"{one}{RIGID}*ELEMENT, TYPE=SPRING1, ELSET=S\n99002, 90001\n"
+               "*SPRING, ELSET=S\n2\n3.e6\n", "HUB", turned)
+
+
+def calculix(folder: Path, text: str) -> str:
+    """Results of ccx in its .dat file; RuntimeError if it finds none."""
+    (folder / "deck.inp").write_text(text)
+    done = subprocess.run(["ccx", "-i", "deck"], cwd=folder, capture_output=True, text=True,
+                          check=False)
+    found = (folder / "deck.dat").read_text() if (folder / "deck.dat").is_file() else ""
+    if "ERROR" in done.stdout or not found.strip():
+        raise RuntimeError(f"ccx does not solve the deck: {done.stdout[-500:]}")
+    return found
+
+
+def compared(case: Case, folder: Path) -> tuple[float, float]:
+    """Largest differences of displacement and of three frequencies, relative to the largest."""
+    whole = f"{case.deck}{MATERIAL}*BOUNDARY\nA_left_N, 1, 3\n*STEP\n"
+    loads = "".join(
+        f"{'TURN' if len(way) > 1 else case.point}, {'xyz'.index(way[-1]) + 1}, {value}\n"
+        for way, value in case.force)
+    sets = [case.point, *(["TURN"] if len(case.force) > 3 else [])]
+    printed = "".join(f"*NODE PRINT, NSET={name}\nU\n" for name in sets)
+    rows = re.findall(r"^ +\d+((?: +\S+){3})$", calculix(
+        folder, f"{whole}*STATIC\n*CLOAD\n{loads}{printed}*END STEP\n"), re.MULTILINE)
+    expected = np.array([float(word) for row in rows for word in row.split()])
+    modes = re.findall(r"^ +\d+((?: +\S+){4})$", calculix(
+        folder, f"{whole}*FREQUENCY\n3\n*END STEP\n"), re.MULTILINE)
+    frequencies = np.array([float(row.split()[2]) for row in modes[:3]])
+    (folder / "deck.inp").write_text(case.deck + MATERIAL)
+    body = fc.ElasticBody(fc.read_mesh(folder / "deck.inp"), degree=case.degree,
+                          fixed={"A_left_N": "xyz"})
+    moved = fc.static_solution(body, fc.Load(forces=tuple(
+        fc.PointLoad(case.point, way, signal=value) for way, value in case.force)))
+    own = (body.motion_rows(case.point) @ moved.displacement.ravel())[: len(expected)]
+    return (float(np.abs(own / expected - 1.0).max()),
+            float(np.abs(eigenfrequencies_hz(body, 3) / frequencies - 1.0).max()))
+
+
+def main(quick: bool) -> None:
+    """Prints a table."""
+    if shutil.which("ccx") is None:
+        print("CalculiX is not installed: there is no program ccx to compare with.")
+        return
+    print(f"{'deck':24} {'displacement':>12} {'frequencies':>12}")
+    with tempfile.TemporaryDirectory() as folder:
+        for case in cases(0.02 if quick else 0.01):
+            displacement, frequencies = compared(case, Path(folder))
+            print(f"{case.name:24} {displacement:12.1e} {frequencies:12.1e}")
+
+
+if __name__ == "__main__":
+    main("--quick" in sys.argv)
