@@ -88,6 +88,8 @@ class BodyBasisSettings(BasisSettings):
     ----------
     contact, contact_nodes : str, int
         Not for several bodies, of which interfaces name the faces.
+    prestress : bool
+        Not for several bodies, which press each other.
     B, C : place, optional
         Excitation and load point, which one body alone can have: name of a point or boundary,
         [x, y], of solids [x, y, z], or a patch ``{at = name or place, radius = r}``. By default
@@ -105,6 +107,9 @@ class BodyBasisSettings(BasisSettings):
             if getattr(self, key) != getattr(usual, key):
                 raise InputError(f"BodyBasisSettings: {key} is for a single body; name the face in "
                                  f"[interfaces.NAME] instead.")
+        if self.prestress:
+            raise InputError("BodyBasisSettings: prestress = true is for a single body; in Python "
+                             "give modal_basis the state of each body, basis.fields(q, body).")
 
 
 inherit_documentation(BodyBasisSettings)

@@ -11,6 +11,7 @@ from fecontact.core.tables import located
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing, TwoPassPairing
+from fecontact.laws.excitation import Load
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.report import usable_hz
 from fecontact.study.bodies_section import (
@@ -39,6 +40,7 @@ _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
         name: one.pairing_keys for name, one in study.interfaces.items()}),
     "_bases": lambda study: (study.bodies, study.links, _MADE_FROM["_pairings"](study)),
     "_reduced": lambda study: (study.geometry, study.body, study.basis,
+                               study.load if study.basis.prestress else None,
                                _MADE_FROM["_bases"](study)),
 }
 
@@ -52,6 +54,7 @@ class StudyModels:
     bodies: Mapping[str, BodySections]
     interfaces: Mapping[str, InterfaceSettings]
     links: Mapping[str, LinkSettings]
+    load: Load
     path: Path | None
 
     @property
@@ -202,4 +205,4 @@ class StudyModels:
                              f"whose modes `fecontact diameters` computes; leave it out to take "
                              f"the sector alone.")
         with located(f"{self.title}: [basis]:"):
-            return Reduced(self.basis.modal_basis(body, self.body.rotation))
+            return Reduced(self.basis.modal_basis(body, self.body.rotation, self.load))

@@ -25,11 +25,13 @@ from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import PointStart, RigidStart
 from fecontact.integrate.solvers import SOLVERS, Solver, solver_by_name
 from fecontact.laws.base import PerNode
+from fecontact.laws.excitation import Load
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.study.materials_section import MaterialSettings
+from fecontact.system.statics.static_solution import static_solution
 
 _MATERIAL_KEYS = ("material", "youngs_modulus", "poisson_ratio", "density")
 Place = str | Coordinates | Patch
@@ -190,6 +192,9 @@ class BasisSettings:
         Indices of the modes to keep, counted from 0; all by default.
     eigensolver : 'auto', 'direct' or 'iterative'
         Solver for the modes of solids; 'auto' takes the iterative one for large, compact bodies.
+    prestress : bool
+        Whether modes are those about the static state under ``[load]``, whose stress stiffens the
+        body, which its supports have to hold.
     """
 
     modes: int = 20
@@ -207,6 +212,7 @@ class BasisSettings:
         default_factory=dict)
     select: tuple[int, ...] | None = None
     eigensolver: Literal["auto", "direct", "iterative"] = "auto"
+    prestress: bool = False
 
     def __post_init__(self) -> None:
         convert_fields(self)
@@ -229,11 +235,23 @@ class BasisSettings:
         names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads", "eigensolver")
         return {name: getattr(self, name) for name in names}
 
-    def modal_basis(self, body: ElasticBody, rotation: Rotation | None = None) -> ModalBasis:
-        """The modal basis of a body."""
+    def modal_basis(
+        self, body: ElasticBody, rotation: Rotation | None = None, load: Load | None = None
+    ) -> ModalBasis:
+        """The modal basis of a body, with ``prestress`` about its state under a load."""
+        state = None
+        if self.prestress and load is not None:
+            with located("prestress = true:"):
+                state = static_solution(body, load, points=self.load_points)
         return self.finished(modal_basis(
             body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes,
-            rotation=rotation, **self.options))
+            rotation=rotation, prestress=state, **self.options))
+
+    @property
+    def load_points(self) -> dict[str, Place]:
+        """Points of the section at which loads may act, by name."""
+        ends = {name: place for name, place in (("B", self.B), ("C", self.C)) if place}
+        return {**self.points, **ends}
 
     def finished(self, basis: ModalBasis) -> ModalBasis:
         """A basis with the dashpots of these settings and the modes that they select."""

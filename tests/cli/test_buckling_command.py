@@ -3,7 +3,9 @@
 import re
 
 import numpy as np
+import pytest
 
+from fecontact import AnalysisError, Study
 from fecontact.cli import execute
 
 STRUT = """
@@ -36,3 +38,20 @@ def test_loads_that_pull_and_bad_studies(tmp_path, capsys):
     path.write_text(STRUT.replace('fixed = { left = "xy" }', ""))
     assert execute(["buckling", str(path), "-o", str(tmp_path)]) != 0
     assert "hold" in capsys.readouterr().err
+
+
+def test_modes_about_the_load_of_a_study():
+    """The square of the lowest frequency falls by the part of the buckling load."""
+    study = Study.from_toml(STRUT.replace("basis = { contact = [] }", "basis = { contact = [], "
+                                          "modes = 4, prestress = true }"))
+    pressed = study.with_({"load.boundaries.0.pressure": 8e6})
+    free = study.with_({"basis.prestress": False})
+    first = [one.modal_basis().frequencies_hz[0] for one in (free, study, pressed)]
+    euler = np.pi**2 * 2.1e11 * 0.02**2 / 48.0
+    assert (first[1] / first[0]) ** 2 == pytest.approx(1.0 - 1e6 / euler, abs=5e-3)
+    assert (first[2] / first[0]) ** 2 == pytest.approx(1.0 - 8e6 / euler, abs=3e-2)
+    assert Study.from_toml(study.to_toml()) == study
+    with pytest.raises(AnalysisError, match=r"\[basis\]: .*beyond the buckling load"):
+        study.with_({"load.boundaries.0.pressure": 2e7}).modal_basis()
+    with pytest.raises(AnalysisError, match=r"\[basis\]: prestress = true: There is no static"):
+        study.with_({"body.fixed": {}}).modal_basis()

@@ -34,11 +34,10 @@ def buckling(
     if described.bodies:
         raise InputError(f"{described.title}: buckling is that of a single body; describe it in "
                          f"[geometry] and [body].")
-    body, basis = described.elastic_body(), described.basis
-    places = {name: place for name, place in (("B", basis.B), ("C", basis.C)) if place}
+    body, places = described.elastic_body(), described.basis.load_points
     with output_folder(output or described.results) as folder:
         with waiting("Computing load factors"), located(f"{described.title}:"):
-            found = buckling_loads(body, described.load, count, points={**basis.points, **places})
+            found = buckling_loads(body, described.load, count, points=places)
         show(table("", "load factor", rows=(
             (str(number), f"{factor:.6g}") for number, factor in enumerate(found.load_factors))))
         if not len(found.load_factors):
