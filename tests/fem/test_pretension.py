@@ -26,7 +26,13 @@ from fecontact import (
 )
 from fecontact.fem import PretensionSection, Ring, Tie, pair_faces, with_pretension
 from fecontact.laws import ConstantFriction, LinearContact
-from fecontact.reduction import assembled_basis, eigenfrequencies_hz, reduce_bodies, tightened
+from fecontact.reduction import (
+    assembled_basis,
+    eigenfrequencies_hz,
+    point_masses,
+    reduce_bodies,
+    tightened,
+)
 
 L, A, E = 0.4, 0.02, 2.0e11
 BAR = Material(E, 0.0, 7800.0)
@@ -158,12 +164,35 @@ def test_a_bolted_joint_is_that_of_calculix(clamp):
     assert bolts.stiffness["clamp.bolt"] > 1e12
 
 
+def test_a_pair_of_forces_between_two_points():
+    """Masses on springs k: s = 2 F / k; held, a load P on the first leaves F - P / 2 in the bolt.
+
+    So do both together as the joint carries half of the load.
+    """
+    k, force, load = 1e6, 300.0, 80.0
+    basis = point_masses({"a": 1.0, "b": 2.0}, {("a", None): k, ("b", None): k}, components="yz")
+    rows = {name: basis.point_row(name, "z") for name in "ab"}
+    w = basis.angular_frequencies
+    q = force * (rows["a"] - rows["b"]) / w**2
+    bolt = ("a", "b", "z")
+    bolts = tightened(basis, q, {bolt: force})
+    assert bolts.shortening[bolt] == pytest.approx(2.0 * force / k, rel=1e-12)
+    held = bolts.basis
+    for push in (0.0, load):
+        rest = (held.link_load + push * held.point_row("a", "z")) / held.angular_frequencies**2
+        assert bolts.forces(rest)[bolt] == pytest.approx(force - 0.5 * push, rel=1e-4)
+        assert held.point_row("b", "z") @ rest == pytest.approx((0.5 * push - force) / k, rel=1e-4)
+    for wrong in (("a", "b"), ("a", "b", "phi_x"), ("a", "b", 3), 5):
+        with pytest.raises(InputError, match=r"the bolt .* must be the name of a control p"):
+            tightened(basis, q, {wrong: 1.0})
+
+
 def test_bolts_that_cannot_be_tightened(clamp):
     _, basis = clamp
     q = np.zeros(basis.modes)
     for arguments, message in (
             (({"clamp.bult": 1.0},), r"There is no point 'clamp\.bult' \(did you mean"),
-            (({"B": 1.0},), r"'B' moves in no elastic mode in x; name the control point"),
+            (({"B": 1.0},), r"'B' moves in no elastic mode along the bolt; name the contr"),
             (({"clamp.bolt": np.nan},), r"forces of clamp\.bolt = nan must be finite")):
         with pytest.raises(InputError, match=message):
             tightened(basis, q, *arguments)
