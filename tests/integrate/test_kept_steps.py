@@ -20,6 +20,7 @@ from fecontact.integrate import (
     TimeStepping,
     kept_steps,
 )
+from fecontact.integrate.step_loop import COUNTS, HALVED, KEPT, PASSED
 from fecontact.laws import JenkinsFriction
 
 SOLVERS = [
@@ -83,6 +84,16 @@ def test_rows_without_room_are_halved(solver, monkeypatch):
     np.testing.assert_array_equal(whole.states[places], few.states)
     np.testing.assert_array_equal(whole.work[places], few.work)
     assert np.diff(places).max() <= 2 * np.median(np.diff(places))
+
+
+def test_an_odd_last_row_goes_too():
+    """Every place is kept; after the seventh every second one is, and the eighth is the next."""
+    counts = np.zeros(COUNTS, dtype=np.int64)
+    counts[KEPT] = 7
+    times = np.arange(1.0, 10.0)
+    kept_steps.halve((times,), counts)
+    assert times[: counts[KEPT]].tolist() == [2.0, 4.0, 6.0]
+    assert (counts[PASSED], counts[HALVED]) == (1, 1)
 
 
 def test_halved_rows_do_not_depend_on_the_pieces_of_a_run(monkeypatch):
@@ -151,10 +162,13 @@ def test_energies_balance_between_the_outputs_too(solver):
 
     elastic = friction_oscillator(2, friction=JenkinsFriction(1e4, 0.4))
     found = fc.simulate(elastic, 1.0, outputs=6, solver=solver,
-                        initial=np.array([0.02, 0.01, 0.0, 0.0, 0.0]))
+                        initial=np.array([0.02, -2e-5, 0.0, 0.0, 1e-4]))
     fine = resolved(found).trajectory
     assert len(fine.time) > 100
     assert fine.energies.imbalance < 1e-4
+    # Nothing has been put in or lost at the start, where the element is stretched.
+    assert not found.work[0].any()
+    assert found.energies.bristles[0] > 0.0
 
 
 def test_what_is_no_choice_is_named():
