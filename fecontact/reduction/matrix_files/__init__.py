@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path, require_regular_file
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError
 from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
 from fecontact.core.read_only import read_only_arrays
 from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
+from fecontact.reduction.matrix_files.names import chosen_name
 from fecontact.reduction.matrix_files.nastran import read_dmig
 from fecontact.reduction.matrix_files.substructure import HEADING, read_substructure
 
@@ -181,16 +182,8 @@ def _chosen(variables: Mapping[str, Any], name: str | None) -> Any:
     """The variable of that name, or the only matrix among them."""
     matrices = {key: value for key, value in variables.items()
                 if getattr(value, "ndim", 0) == 2 and value.dtype.kind in "biufc"}
-    if name is None:
-        large = {key: value for key, value in matrices.items() if min(value.shape) > 1} or matrices
-        if len(large) != 1:
-            raise InputError(f"Say which matrix to read by its name; the file holds: "
-                             f"{choices(large)}.")
-        return next(iter(large.values()))
-    if name not in matrices:
-        raise InputError(f"There is no matrix '{name}'{nearest(name, matrices)}; the file holds: "
-                         f"{choices(matrices)}.")
-    return matrices[name]
+    large = {key: value for key, value in matrices.items() if min(value.shape) > 1} or matrices
+    return matrices[chosen_name(matrices, name, large)]
 
 
 def _require_no_name(name: str | None) -> None:

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError
 from fecontact.core.files.stored import LARGEST
 from fecontact.core.types import Array, Integers
+from fecontact.reduction.matrix_files.names import chosen_name
 
 Ints = Integers
 
@@ -107,17 +108,11 @@ def _chosen(blocks: list[_Block], name: str | None) -> _Block:
             raise InputError(f"The file refers to '{block.options['INPUT']}' (INPUT=); read that "
                              f"one.")
     named = {block.options.get("NAME", ""): block for block in blocks}
-    if name is not None:
-        if name not in named:
-            raise InputError(f"There is no matrix '{name}'{nearest(name, named)}; the file holds: "
-                             f"{choices(filter(None, named))}.")
-        return named[name]
-    if len(blocks) > 1:
-        raise InputError(f"Say which matrix to read by its name; the file holds: "
-                         f"{choices(filter(None, named))}.")
+    if name is None and len(blocks) == 1:
+        return blocks[0]
     if not blocks:
         raise InputError("The file holds no numbers.")
-    return blocks[0]
+    return named[chosen_name([block.options.get("NAME", "") for block in blocks], name)]
 
 
 def _table(block: _Block) -> Array:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError
 from fecontact.core.types import Integers
+from fecontact.reduction.matrix_files.names import chosen_name
 
 _SYMMETRIC, _SQUARE = "6", "1"
 _COMPLEX = ("3", "4")
@@ -43,13 +44,7 @@ def read_dmig(path: Path, name: str | None) -> tuple[Any, Integers]:
     if not headings:
         raise InputError("The file holds no DMIG; write the matrices with EXTSEOUT(DMIGPCH) or "
                          "PARAM,EXTOUT,DMIGPCH.")
-    if name is None and len(headings) > 1:
-        raise InputError(f"Say which matrix to read by its name; the file holds: "
-                         f"{choices(headings)}.")
-    chosen = next(iter(headings)) if name is None else name.upper()
-    if chosen not in headings:
-        raise InputError(f"There is no matrix '{name}'{nearest(chosen, headings)}; the file holds: "
-                         f"{choices(headings)}.")
+    chosen = chosen_name(headings, None if name is None else name.upper())
     form, kind = (*headings[chosen][1:3], "", "")[:2]
     if form not in (_SQUARE, _SYMMETRIC) or kind in _COMPLEX:
         what = "complex" if kind in _COMPLEX else f"of the form {form!r}"

@@ -10,8 +10,9 @@ import re
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
+from fecontact.reduction.matrix_files.names import chosen_name
 
 HEADING = "USER ELEMENT"
 
@@ -31,13 +32,7 @@ def read_substructure(text: str, name: str | None) -> tuple[Array, Integers]:
     if not matrices:
         raise InputError("The file of a substructure holds no *MATRIX; add MASS=YES, STIFFNESS=YES "
                          "to *SUBSTRUCTURE MATRIX OUTPUT.")
-    if name is None and len(matrices) > 1:
-        raise InputError(f"Say which matrix to read by its name; the file holds: "
-                         f"{choices(matrices)}.")
-    chosen = next(iter(matrices)) if name is None else name.upper()
-    if chosen not in matrices:
-        raise InputError(f"There is no matrix '{name}'{nearest(chosen, matrices)}; the file holds: "
-                         f"{choices(matrices)}.")
+    chosen = chosen_name(matrices, None if name is None else name.upper())
     try:
         values = np.array([float(word) for line in matrices[chosen]
                            for word in line.replace(",", " ").split()])
