@@ -13,7 +13,7 @@ from fecontact.bifurcation import (
     orbit_branch,
 )
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
-from fecontact.reduction import CubicSpring, PointPairing, Spring
+from fecontact.reduction import PointPairing, PolynomialSpring, Spring
 
 N = 24
 ROW = np.array([[1.0], [0.0], [0.0]])
@@ -36,7 +36,7 @@ def force(name, shift, w=1.1):
 
 
 def spring(first, second):
-    return CubicSpring(f"{first}.P", f"{second}.P", direction=(1, 0), stiffness=0.05)
+    return PolynomialSpring(f"{first}.P", f"{second}.P", direction=(1, 0), stiffness=0.05)
 
 
 def ring(order, elastic=False):

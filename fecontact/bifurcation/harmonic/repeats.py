@@ -119,7 +119,7 @@ def ties_of(repeats: Repeats, field: VectorField) -> Ties:
         if not parts[name][1]:
             raise InputError(f"Repeats: links have made common modes of body '{name}' and "
                              f"others; give elastic links between sectors as "
-                             f"PolynomialSpring or CubicSpring, which keep the modes apart.")
+                             f"PolynomialSpring, which keeps the modes apart.")
         if parts[name][1] != parts[repeats.body][1]:
             raise InputError(f"Repeats: body '{name}' has {parts[name][1]} modes and "
                              f"'{repeats.body}' {parts[repeats.body][1]}; give them the same "
