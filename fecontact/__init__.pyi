@@ -45,7 +45,6 @@ from .sweeps.sweep import sweep
 from .system.assembly import Assembly
 from .system.contact_quantities import ContactState
 from .system.contact_system import ContactSystem
-from .system.forcing_period import forcing_period
 from .system.gap import Crown
 from .system.interfaces import Interface
 from .system.quasistatic.loading import load_history
@@ -96,7 +95,6 @@ __all__ = [
     "equilibrium",
     "event",
     "fem",
-    "forcing_period",
     "generate",
     "integrate",
     "io",

@@ -2,6 +2,7 @@ from .ensembles import Ensemble, strobe
 from .events import ContactEvents, Crossing, Events
 from .field_runs.field_run import FieldRun
 from .initial_state import PointStart, initial_state
+from .kept_steps import KeptSteps
 from .sensitivities import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
 from .solvers import (
@@ -30,6 +31,7 @@ __all__ = [
     "EventDriven",
     "Events",
     "FieldRun",
+    "KeptSteps",
     "PointStart",
     "PowerSeries",
     "Radau",

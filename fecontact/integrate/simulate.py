@@ -96,9 +96,7 @@ def simulate(
     events : ContactEvents, Crossing, Event or sequence of them, optional
         Located within the steps and stored in :attr:`Trajectory.events`.
     keep_steps : bool
-        Whether a run keeps the motion between the outputs too, in :attr:`Trajectory.kept`: two to
-        eight states a step, as the method needs, and of long runs at most 20,000 or 16 MB, evenly
-        spread. Plots are drawn from these. Runs of fields keep none.
+        Whether a run keeps motion between the outputs for plots; see :attr:`Trajectory.kept`.
     progress : bool or callable, optional
         True for a progress bar; a function is called with the time reached [s].
 

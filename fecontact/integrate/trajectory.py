@@ -229,7 +229,9 @@ class Trajectory(ContactWorks, Summarised):
     events : Events or None
         Located events in chronological order; None if none were requested.
     kept : KeptSteps or None
-        Motion between the outputs, from which plots are drawn where these are far apart.
+        Motion between the outputs, from which plots are drawn where these are far apart: one to
+        twelve states of each step, as the method needs, of long runs at most 20,000 or 16 MB,
+        evenly spread.
     """
 
     system: ContactSystem

@@ -1,3 +1,4 @@
+from .forcing_period import forcing_period
 from .instant import Instant
 from .interfaces import PrescribedMotion
 from .nodes import SystemArrays
@@ -15,4 +16,5 @@ __all__ = [
     "RestState",
     "Sliders",
     "SystemArrays",
+    "forcing_period",
 ]

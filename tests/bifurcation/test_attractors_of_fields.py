@@ -187,7 +187,7 @@ def test_strobed_states_of_several_fields():
     both = strobe(fields, transient_periods=3, keep=2, initial=np.array([[1.0, 0.0], [1.0, 0.0]]))
     alone = strobe(fields[1], transient_periods=3, keep=2, initial=[1.0, 0.0])
     assert (both.states[1] == alone.states[0]).all()
-    assert fc.forcing_period(DUFFING) == 2.0 * np.pi
+    assert fc.system.forcing_period(DUFFING) == 2.0 * np.pi
 
 
 @pytest.mark.parametrize(("call", "told"), [

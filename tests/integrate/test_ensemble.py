@@ -5,10 +5,11 @@ import pytest
 from systems import impact_oscillator
 from test_near_nodes import beam
 
-from fecontact import InputError, Status, ensemble, forcing_period, simulate
+from fecontact import InputError, Status, ensemble, simulate
 from fecontact.integrate import ContactEvents, strobe
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.blocks import FEW
+from fecontact.system import forcing_period
 
 W = 64.32
 PERIOD = 2.0 * np.pi / W
