@@ -321,7 +321,7 @@ MISTAKES = [
     ({"body.thickness": -1}, r"s.toml: \[body\]: thickness = -1\.0 must be a finite number above"),
     ({"body.plane": "stres"}, r'\[body\]: plane = "stres" must be "stress" or "strain"\.$'),
     ({"body.degree": 3}, r"\[body\]: degree = 3 must be 1 or 2\.$"),
-    ({"body.fixed.left": "w"}, r'\[body\.fixed\]: left = "w" must be "x", "y", "xy", "z", '),
+    ({"body.fixed.left": "w"}, r"\[body\]: fixed\['left'\] = 'w' must be one of 'hinge', 'x', "),
     ({"body.fixed.left": "z"}, r"\[body\]: fixed\['left'\] = 'z' must be one of 'hinge', 'x', "),
     ({"body.fixed.lft": "x"}, r"\[body\]: The mesh has no boundary or point 'lft'.*'left'"),
     ({"basis.modes": 0}, r"\[basis\]: modes = 0 must be at least 1"),
