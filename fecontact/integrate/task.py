@@ -27,7 +27,7 @@ class Task:
     events : sequence of ContactEvents, Crossing and Event
         Events to locate; empty unless that is among its ``abilities``.
     keep_steps : bool
-        Whether to keep what is between the outputs, see :class:`KeptSteps`.
+        Whether to keep what is between the outputs, see :class:`fecontact.integrate.KeptSteps`.
     progress : callable or None
         Called occasionally with the time reached [s].
     """

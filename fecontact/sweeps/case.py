@@ -9,9 +9,14 @@ from fecontact.study.bodies_section import PAIRING_KEYS
 _BASIS_SECTIONS = ("geometry", "body", "basis", "bodies", "links")
 
 
-def of_basis(name: str) -> bool:
-    """Whether the modal basis may depend on a dotted key of the study."""
+def of_basis(name: str, *, prestress: bool = False) -> bool:
+    """Return True if the modal basis may depend on a dotted key of the study.
+
+    It depends on the load if it is ``[basis] prestress``, about the static state under it.
+    """
     first, _, rest = name.partition(".")
+    if first == "load":
+        return prestress
     if first != "interfaces":
         return first in _BASIS_SECTIONS
     key = rest.partition(".")[2].partition(".")[0]
@@ -40,4 +45,4 @@ class SweepCase:
     def basis_changes(self) -> dict[str, Any]:
         """Changes that affect the modal basis."""
         return {name: value for name, value in self.changes.items()
-                if of_basis(name)}
+                if of_basis(name, prestress=True)}

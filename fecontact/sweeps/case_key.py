@@ -48,8 +48,9 @@ def case_keys(
             except InputError:
                 # This case will fail; hash the values as given.
                 resolved = base | dict(zip(names, row, strict=True))
+        prestress = bool(resolved.get("basis.prestress"))
         body = {name: value for name, value in resolved.items()
-                if of_basis(name)}
+                if of_basis(name, prestress=prestress)}
         text = json.dumps(body, sort_keys=True)
         if text not in seen:
             seen[text] = digest({"basis": body})

@@ -208,14 +208,24 @@ def test_files_of_cases_are_those_of_single_runs(study, tmp_path):
         assert "VTKHDF" not in file
 
 
+def test_bases_about_a_loaded_state_depend_on_the_load(study):
+    from fecontact.sweeps.case_key import case_keys
+
+    for prestress in (False, True):
+        bases = case_keys(study.with_(**{"basis.prestress": prestress}), ["load.normal"],
+                          [[1.0], [2.0], [1.0]], {})[1]
+        assert bases[0] == bases[2]
+        assert (bases[0] == bases[1]) is not prestress
+
+
 def test_bodies_that_change_are_computed_once_each(study, tmp_path, monkeypatch):
     from fecontact.study import BasisSettings
 
     made = []
     original = BasisSettings.modal_basis
     monkeypatch.setattr(BasisSettings, "modal_basis",
-                        lambda self, body, rotation: (made.append(body.thickness)
-                                                      or original(self, body, rotation)))
+                        lambda self, body, *given: (made.append(body.thickness)
+                                                    or original(self, body, *given)))
     axes = {"ground.speed": [1e-3, 2e-3, 3e-3], "body.thickness": [0.1, 0.11]}
     table = sweep(study, axes, Serial(), folder=tmp_path / "f", batch=2)
     assert sorted(made) == [0.1, 0.11]

@@ -95,7 +95,7 @@ def test_loss_between_clamped_layers_is_that_of_slip_theory(layers, part):
     history = clamped_layers.cycle(layers, part * clamped_layers.END_LOAD, 40)
     wanted = clamped_layers.slip_theory(part * clamped_layers.END_LOAD)
     assert clamped_layers.loss(history) == pytest.approx(wanted, rel=3e-3)
-    areas = sum(history.loop(1, -1, f"forces.{k}").area for k in range(2))
+    areas = sum(history.loop(1, -1, f"{name}.end.y").area for name in ("upper", "lower"))
     assert areas == pytest.approx(wanted, rel=5e-3)
 
 
@@ -135,7 +135,8 @@ def test_stiff_normal_law_between_slender_layers(part):
     system = replace(clamped_layers.layers(), normal={"joint": LinearContact(1e10 * L * W)})
     half = [0.0, 0.5 * clamped_layers.END_LOAD, -0.5 * clamped_layers.END_LOAD,
             0.5 * clamped_layers.END_LOAD]
-    history = load_history(system, LoadPath(load_scale=pressure, forces=[half, half], steps=10),
+    ends = {"upper.end.y": half, "lower.end.y": half}
+    history = load_history(system, LoadPath(load_scale=pressure, forces=ends, steps=10),
                            tangential_stiffness=1e12 * L * W, rtol=1e-4)
     assert history.status == "finished"
     assert history.statistics["jumps"] == 0
