@@ -90,7 +90,7 @@ def solved(shape: str, solver: str, unknowns: int) -> None:
     ready = time.perf_counter()
     if solver == "scipy":
         # Well below the lowest elastic mode.
-        waves = body.elasticity[2] / body.material.density
+        waves = float(np.max(body.elasticity[2])) / body.material.density
         sigma = -1e-3 * waves * (np.pi / body.mesh.extent) ** 2
         squares = eigsh(K, k=MODES + 6, M=M, sigma=sigma, return_eigenvectors=True)[0]
         w = np.sqrt(np.sort(squares)[6:])

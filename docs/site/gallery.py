@@ -25,6 +25,8 @@ GROUPS = {
     "Own laws, other programs, many computers": (
         "own_law", "from_other_programs", "sweep_on_dask"),
 }
+# These need files that are no part of the package.
+LEFT_OUT = ("brake_reuss_beam",)
 # Pictures of the long form, of what the short one shows too little.
 WHOLE = {"beam_stick_slip": "beam_stick_slip.png", "impact_orbits": "impact_orbits.png",
          "two_mass_friction": "two_masses_over_B.png",
