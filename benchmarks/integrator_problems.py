@@ -113,20 +113,12 @@ def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Pro
     return Problem(name, system, np.zeros(2 * basis.modes), times, _observed(basis, entries))
 
 
-def _beam_mesh(columns: int, rows: int = 4, length: float = 0.2, height: float = 0.02) -> Mesh:
-    x, y = np.meshgrid(np.linspace(0.0, length, columns + 1), np.linspace(0.0, height, rows + 1))
-    number = np.arange(x.size).reshape(rows + 1, columns + 1)
-    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
-                     axis=-1).reshape(-1, 4)
-    bottom = np.column_stack([number[0, :-1], number[0, 1:]])
-    return Mesh(np.column_stack([x.ravel(), y.ravel()]), cells, {"contact": bottom})
-
-
 def beam(name: str, nodes: int, modes: int, columns: int, speed: float = 0.01) -> Problem:
     """(d), (e): a free steel beam on a belt, pulled by a spring at its left end."""
-    body = ElasticBody(_beam_mesh(columns), Material.named("steel"), 0.01)
-    basis = modal_basis(body, modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
-                        points={"right": (0.2, 0.01)}, damping=0.01)
+    mesh = Mesh.grid(np.linspace(0.0, 0.2, columns + 1), np.linspace(0.0, 0.02, 5))
+    body = ElasticBody(mesh, Material.named("steel"), 0.01)
+    basis = modal_basis(body, modes, contact="bottom", contact_nodes=nodes, B=(0.0, 0.01),
+                        C=(0.1, 0.02), points={"right": (0.2, 0.01)}, damping=0.01)
     pull = 9.5
     system = ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0), friction=FRICTION,

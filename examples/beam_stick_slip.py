@@ -41,15 +41,10 @@ PULL = 9.5  # N, of the spring on the beam where it is not displaced
 
 def beam(speed: float = 0.05, nodes: int = 40, modes: int = 20) -> fc.ContactSystem:
     """A free steel beam, pulled by a spring at its left end."""
-    x, y = np.meshgrid(np.linspace(0.0, 0.2, nodes), np.linspace(0.0, 0.02, 5))
-    number = np.arange(x.size).reshape(x.shape)
-    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
-                     axis=-1).reshape(-1, 4)
-    mesh = fc.Mesh(np.column_stack([x.ravel(), y.ravel()]), cells,
-                   {"contact": np.column_stack([number[0, :-1], number[0, 1:]])})
+    mesh = fc.Mesh.grid(np.linspace(0.0, 0.2, nodes), np.linspace(0.0, 0.02, 5))
     body = fc.ElasticBody(mesh, fc.Material.named("steel"), 0.01)
-    basis = fc.modal_basis(body, modes, contact_nodes=nodes, B=(0.0, 0.01), C=(0.1, 0.02),
-                           damping=0.01)
+    basis = fc.modal_basis(body, modes, contact="bottom", contact_nodes=nodes, B=(0.0, 0.01),
+                           C=(0.1, 0.02), damping=0.01)
     return fc.ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
         friction=ExponentialFriction(0.8, 0.55, 1000.0, 1e6),

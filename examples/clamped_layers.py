@@ -56,14 +56,9 @@ def slip_theory(limit: np.ndarray | float) -> np.ndarray:
 
 def layer(y: float, columns: int, rows: int) -> ElasticBody:
     """A layer above y, clamped at x = 0."""
-    x, y_of = np.linspace(0.0, LENGTH, columns + 1), y + np.linspace(0.0, HEIGHT, rows + 1)
-    nodes = np.stack(np.meshgrid(x, y_of), axis=-1).reshape(-1, 2)
-    at = np.arange(len(nodes)).reshape(rows + 1, columns + 1)
-    cells = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
-    lines = {"bottom": at[0], "top": at[-1], "clamp": at[:, 0], "end": at[:, -1]}
-    mesh = Mesh(nodes, cells, {name: np.column_stack([line[:-1], line[1:]])
-                               for name, line in lines.items()})
-    return ElasticBody(mesh, STEEL, thickness=WIDTH, fixed={"clamp": "xy"})
+    mesh = Mesh.grid(np.linspace(0.0, LENGTH, columns + 1),
+                     y + np.linspace(0.0, HEIGHT, rows + 1))
+    return ElasticBody(mesh, STEEL, thickness=WIDTH, fixed={"left": "xy"})
 
 
 def layers(columns: int = 40, nodes: Literal["all"] | int = 20) -> ContactSystem:
@@ -71,7 +66,7 @@ def layers(columns: int = 40, nodes: Literal["all"] | int = 20) -> ContactSystem
     bodies = {"upper": layer(HEIGHT, columns, 2), "lower": layer(0.0, columns, 2)}
     pairing = pair_faces(bodies, "upper.bottom", "lower.top", nodes=nodes)
     bases = reduce_bodies(
-        bodies, [pairing], modes=4, tolerance=0.0, points={"end": "end"},
+        bodies, [pairing], modes=4, tolerance=0.0, points={"end": "right"},
         each={"upper": {"loads": ["top", "end"]}, "lower": {"loads": ["bottom", "end"]}})
     return ContactSystem(
         bodies=bases,

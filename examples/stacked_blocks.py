@@ -55,13 +55,8 @@ class Patch:
 
 def block(y: float, columns: int, rows: int, **support: str) -> ElasticBody:
     """A block above y that may spread over x, of so many elements."""
-    x, y_of = np.linspace(0.0, WIDTH, columns + 1), y + np.linspace(0.0, HEIGHT, rows + 1)
-    nodes = np.stack(np.meshgrid(x, y_of), axis=-1).reshape(-1, 2)
-    at = np.arange(len(nodes)).reshape(rows + 1, columns + 1)
-    cells = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
-    lines = {"bottom": at[0], "top": at[-1], "left": at[:, 0]}
-    mesh = Mesh(nodes, cells, {name: np.column_stack([line[:-1], line[1:]])
-                               for name, line in lines.items()})
+    mesh = Mesh.grid(np.linspace(0.0, WIDTH, columns + 1),
+                     y + np.linspace(0.0, HEIGHT, rows + 1))
     return ElasticBody(mesh, STEEL, thickness=0.02, fixed={"left": "x", **support})
 
 

@@ -100,15 +100,14 @@ def between(x: np.ndarray, low: np.ndarray, high: np.ndarray, parts: np.ndarray,
 
     ``parts`` (k,) from 0 to 1 are the places of the lines between the curves.
     """
-    nodes = np.stack([np.broadcast_to(x, (len(parts), len(x))),
-                      low + parts[:, None] * (high - low)], axis=-1).reshape(-1, 2)
-    at = np.arange(len(nodes)).reshape(len(parts), len(x))
-    cells = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
-    inner = np.abs(x[1:] + x[:-1]) < 2.0 * near
-    lines = {name: np.column_stack([row[:-1], row[1:]])
-             for name, row in (("bottom", at[0]), ("top", at[-1]))}
-    lines |= {f"{name} near": edges[inner] for name, edges in tuple(lines.items())}
-    return Mesh(nodes, cells, lines)
+    flat = Mesh.grid(x, parts)
+    nodes = flat.nodes.copy()
+    nodes[:, 1] = np.interp(nodes[:, 0], x, low) + nodes[:, 1] * np.interp(
+        nodes[:, 0], x, high - low)
+    lines = {name: flat.boundary(name) for name in ("bottom", "top")}
+    lines |= {f"{name} near": edges[np.abs(nodes[edges, 0].mean(axis=1)) < near]
+              for name, edges in tuple(lines.items())}
+    return Mesh(nodes, flat.cells, lines)
 
 
 def bodies(cylinder: Material, block: Material, elements: int) -> dict[str, ElasticBody]:

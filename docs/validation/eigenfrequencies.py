@@ -18,7 +18,7 @@ def section() -> str:
     free = eigenfrequencies_hz(ElasticBody(generate(Beam(1.0, 0.01, 0.0033)), STEEL), 6)[3:]
     near = np.concatenate([[0.0], 0.005 * 0.5 ** np.arange(7)[::-1]])
     clamped = eigenfrequencies_hz(ElasticBody(
-        structured(np.concatenate([near, np.linspace(0.005, 0.05, 8)[1:],
+        Mesh.grid(np.concatenate([near, np.linspace(0.005, 0.05, 8)[1:],
                                    np.linspace(0.05, 1.0, 201)[1:]]),
                    np.concatenate([near, 0.01 - near[-2::-1]])),
         STEEL, fixed={"left": "xy"}), 3)
@@ -41,23 +41,13 @@ tapered membrane of NAFEMS FV32 against converged values; the published ones are
 """
 
 
-def structured(xs: np.ndarray, ys: np.ndarray) -> Mesh:
-    """Quadrilaterals between lines, with the boundary ``left``."""
-    x, y = np.meshgrid(xs, ys)
-    number = np.arange(x.size).reshape(x.shape)
-    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1)
-    left = number[:, 0]
-    return Mesh(np.column_stack([x.ravel(), y.ravel()]), cells.reshape(-1, 4),
-                {"left": np.column_stack([left[:-1], left[1:]])}, {})
-
-
 def tapered() -> Mesh:
     """10 m long, 5 m high at the left and 1 m at the right, graded into the clamped corners."""
     near = np.concatenate([[0.0], 0.5 ** np.arange(6)[::-1]])
     xs = np.concatenate([near / 4.0, np.linspace(0.25, 10.0, 40)[1:]])
     parts = np.concatenate([near / 20.0, np.linspace(0.05, 0.95, 19)[1:-1],
                             1.0 - near[::-1] / 20.0])
-    mesh = structured(xs, parts)
+    mesh = Mesh.grid(xs, parts)
     x, part = mesh.nodes.T
     return Mesh(np.column_stack([x, (part - 0.5) * (5.0 - 0.4 * x)]), mesh.cells,
                 dict(mesh.boundaries), {})

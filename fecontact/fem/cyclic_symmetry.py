@@ -220,7 +220,7 @@ def _nearest(places: Array, wanted: Array) -> tuple[Array, Integers]:
 def _mismatch(
     body: ElasticBody, symmetry: CyclicSymmetry, low: Integers, high: Integers, distance: Array
 ) -> str:
-    """What keeps the faces from matching: the numbers of nodes, N, their order, or the mesh."""
+    """Reason why the faces do not match: the numbers of nodes, N, their order, or the mesh."""
     worst = int(np.argmax(distance))
     where = ", ".join(f"{x:g}" for x in body.nodes[high[worst]])
     what = (f"CyclicSymmetry: '{symmetry.low}' turned by 360 / {symmetry.sectors} degrees does not "

@@ -164,14 +164,10 @@ def test_maps_over_numbers_of_the_basis():
 
 def beam(mu=0.55):
     """A free steel beam on a belt, with the contact of section 4's friction oscillator."""
-    x, y = np.meshgrid(np.linspace(0.0, 0.2, 40), np.linspace(0.0, 0.02, 5))
-    number = np.arange(x.size).reshape(5, 40)
-    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
-                     axis=-1).reshape(-1, 4)
-    mesh = Mesh(np.column_stack([x.ravel(), y.ravel()]), cells,
-                {"contact": np.column_stack([number[0, :-1], number[0, 1:]])})
+    mesh = Mesh.grid(np.linspace(0.0, 0.2, 40), np.linspace(0.0, 0.02, 5))
     body = ElasticBody(mesh, Material.named("steel"), 0.01)
-    basis = modal_basis(body, 20, contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
+    basis = modal_basis(body, 20, contact="bottom", contact_nodes=40, B=(0.0, 0.01), C=(0.1, 0.02),
+                        damping=0.01)
     return ContactSystem(
         basis, normal=RoughSurface(10e6, 10e-6, 40.0), friction=ConstantFriction(mu, 1e6),
         ground=Ground(speed=0.01), load=Load(14.0),

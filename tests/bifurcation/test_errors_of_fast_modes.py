@@ -98,14 +98,10 @@ def on_halves(problem, u):
 @cache
 def beam_branch():
     """A steel beam on a belt, 10 nodes and 6 modes, friction of slope 1e4 s/m."""
-    x, y = np.meshgrid(np.linspace(0.0, 0.2, 10), np.linspace(0.0, 0.02, 5))
-    number = np.arange(x.size).reshape(x.shape)
-    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
-                     axis=-1).reshape(-1, 4)
-    mesh = fc.Mesh(np.column_stack([x.ravel(), y.ravel()]), cells,
-                   {"contact": np.column_stack([number[0, :-1], number[0, 1:]])})
+    mesh = fc.Mesh.grid(np.linspace(0.0, 0.2, 10), np.linspace(0.0, 0.02, 5))
     basis = fc.modal_basis(fc.ElasticBody(mesh, fc.Material.named("steel"), 0.01), 6,
-                           contact_nodes=10, B=(0.0, 0.01), C=(0.1, 0.02), damping=0.01)
+                           contact="bottom", contact_nodes=10, B=(0.0, 0.01), C=(0.1, 0.02),
+                           damping=0.01)
     system = fc.ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
         friction=ExponentialFriction(0.8, 0.55, 1000.0, 1e4), ground=fc.Ground(speed=0.5),

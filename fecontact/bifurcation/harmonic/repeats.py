@@ -60,7 +60,7 @@ class Repeats:
         return type(self), (self.body, dict(self.shifts))
 
     def attributes(self) -> dict[str, Any]:
-        """What a branch stores of it."""
+        """Values by name, for branches to store."""
         return {"repeats_of": self.body, "repeated": list(self.shifts),
                 "repeat_shifts": np.array(list(self.shifts.values()))}
 
