@@ -218,6 +218,21 @@ def test_plane_reference_points():
     assert np.count_nonzero(eigenfrequencies_hz(held, 3) == 0.0) == 1
 
 
+def test_plane_masses_move_and_turn_with_their_point():
+    """Twice the energy of unit motions: m of shifts, J + m r^2 of a turn about a place r away."""
+    mesh = Mesh(PLATE.nodes, PLATE.cells, PLATE.boundaries,
+                constraints=[Coupling("right", "hub", (0.13, 0.05))])
+    bare, heavy = (ElasticBody(mesh, attachments=masses)
+                   for masses in ((), [PointMass("hub", 3.0, inertia=0.02)]))
+    x, y = bare.nodes.T
+    for motion, energy in ((np.stack([np.ones_like(x), 0.0 * x], 1), 3.0),
+                           (np.stack([0.05 - y, x - 0.13], 1), 0.02),
+                           (np.stack([-y, x], 1), 0.02 + 3.0 * (0.13**2 + 0.05**2))):
+        moved = motion.ravel()
+        assert moved @ (heavy.mass @ moved) - moved @ (bare.mass @ moved) == pytest.approx(
+            energy, rel=1e-9)
+
+
 def test_a_refined_mesh_keeps_its_attachments():
     mesh = block_mesh((2, 1, 1))
     edge = tuple(int(node) for node in mesh.outline[0][:2])
