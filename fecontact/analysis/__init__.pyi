@@ -2,6 +2,7 @@ from .buckling import BucklingLoads, buckling_loads
 from .campbell import CampbellDiagram, campbell
 from .comparison import Comparison, compare_runs
 from .complex_modes import ComplexModes, complex_modes, prestressed_modes
+from .deflections import DeflectionPath, DeflectionSteps, deflection_path
 from .histories import History, history
 from .impacts import Impacts, Rest, find_impacts, find_rests
 from .key_numbers import KeyNumbers, key_numbers
@@ -30,6 +31,8 @@ __all__ = [
     "CampbellDiagram",
     "Comparison",
     "ComplexModes",
+    "DeflectionPath",
+    "DeflectionSteps",
     "History",
     "Impacts",
     "KeyNumbers",
@@ -47,6 +50,7 @@ __all__ = [
     "compare_runs",
     "complex_modes",
     "count_periods",
+    "deflection_path",
     "find_impacts",
     "find_rests",
     "history",

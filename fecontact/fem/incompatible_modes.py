@@ -46,6 +46,11 @@ def mode_gradients(body: Any, cells: Integers, shapes: Array, local: Array) -> A
     return np.asarray(np.einsum("eqbj,ebim->eqijm", bubbles, factors))
 
 
+def bubble_gradients(body: Any, cells: Integers) -> Array:
+    """Gradients (e, q, 3, 3), by bubble, then axis, at the points of quadrature of cells."""
+    return _slopes(body, cells, np.ascontiguousarray(body.basis.X.T))[1]
+
+
 def _matrices(body: Any, cells: Integers) -> tuple[Array, Array]:
     """K_aa (e, 9, 9) and K_au (e, 9, 24); a and u by bubble or node, then component."""
     gradients, bubbles, volume = _slopes(body, cells, np.ascontiguousarray(body.basis.X.T))

@@ -22,7 +22,7 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.incompatible_modes import in_parts, mode_gradients
 
 # Numbers of the components of a strain among xx, yy, zz, xy, yz, xz, by dimension.
-_USED = {2: [0, 1, 3], 3: [0, 1, 2, 3, 4, 5]}
+USED = {2: [0, 1, 3], 3: [0, 1, 2, 3, 4, 5]}
 
 
 def stress_stiffness(body: ElasticBody, displacement: Array) -> Any:
@@ -57,7 +57,7 @@ def cell_stress(
         slopes += mode_gradients(body, cells, displacement, local)[..., 0]
     strain = np.stack([slopes[..., i, j] if i == j else slopes[..., i, j] + slopes[..., j, i]
                        for i, j in PAIRS[d]], axis=-1)
-    of_strain = body.cell_stiffness(cells)[:, _USED[d]][:, :, _USED[d]]
+    of_strain = body.cell_stiffness(cells)[:, USED[d]][:, :, USED[d]]
     values = np.einsum("ers,eqs->eqr", of_strain, strain)
     stress = np.empty(slopes.shape)
     for component, (i, j) in enumerate(PAIRS[d]):

@@ -2,37 +2,11 @@
 
 import numpy as np
 import pytest
-from meshes_for_tests import rectangle
+from bodies_of_all_cells import BODIES, MATERIAL, plane
 from skfem import Functional
 from solid_blocks import block_body
 
-from fecontact import ElasticBody, Material, generate
-from fecontact.fem import Ring
 from fecontact.fem.stress_stiffness import stress_stiffness
-
-MATERIAL = Material(2.0e3, 0.3, 1.0)
-
-
-def plane(triangles, degree, kind="stress"):
-    mesh = rectangle(1.2, 0.7, 3, 2, triangles=triangles, warp=lambda at: at + 0.05 * np.sin(
-        5.0 * at[:, ::-1]))
-    return ElasticBody(mesh, MATERIAL, thickness=0.3, degree=degree, plane=kind)
-
-
-def ring(element):
-    return ElasticBody(generate(Ring(0.5, 0.2, 0.1, element_size=0.3, layers=1, element=element)),
-                       MATERIAL)
-
-
-BODIES = {
-    "triangles": lambda: plane(True, 1), "triangles, quadratic": lambda: plane(True, 2),
-    "quadrilaterals": lambda: plane(False, 1, "strain"),
-    "quadrilaterals, quadratic": lambda: plane(False, 2),
-    "tetrahedra": lambda: block_body((2, 1, 1), tetrahedra=True, material=MATERIAL, degree=1),
-    "tetrahedra, curved": lambda: ring("tetrahedron"),
-    "hexahedra": lambda: block_body((2, 1, 1), material=MATERIAL, degree=1),
-    "hexahedra, curved": lambda: ring("hexahedron"),
-}
 
 
 def energy(body, stressing, moved):

@@ -1,0 +1,245 @@
+r"""Static equilibrium paths of bodies with large deflections, by load steps or arc length.
+
+Internal forces f(q) balance the loads, ``f(q) = lambda p(q)``. Newton's method solves this with one
+more equation for a step from a known point: in load steps lambda is given, with the arc length the
+next point lies in a plane normal to the tangent (Riks, J. Appl. Mech. 39, 1972), so that the path
+passes limit points. Each iteration solves two systems with one factorised tangent (Crisfield,
+Comput. Struct. 13, 1981).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from fecontact.core.errors import InputError, require_choice, require_finite, require_positive
+from fecontact.core.types import Array
+from fecontact.fem.finite_strain import FiniteStrainModel, StrainState
+
+Steps = Literal["load", "arc"]
+# Iterations of Newton's method that a step should take, and bounds of the change of its length.
+_WANTED, _LEAST, _MOST = 5, 0.4, 1.6
+# Displacement of an iteration, relative to the whole, that is rounding.
+_ROUNDING = 1e-11
+Loads = Callable[[Array], tuple[Array, Any]]
+
+
+@dataclass(frozen=True)
+class DeflectionSteps:
+    """Options of :func:`fecontact.analysis.deflection_path`.
+
+    Parameters
+    ----------
+    by : 'load' or 'arc'
+        Steps of the load factor, or of the arc length, which passes limit points: there the load
+        that a body carries has a maximum or minimum.
+    first, smallest, largest : float
+        Length of the first step, and bounds: parts of the load with ``by = 'load'``. An arc of
+        length 1 is as long as the linear response to the whole load.
+    most : int
+        Largest number of steps.
+    tolerance : float
+        Largest residual of the forces, relative to the whole load.
+    iterations : int
+        Most iterations of a step before it is halved.
+
+    Raises
+    ------
+    InputError
+        For values out of range.
+    """
+
+    by: Steps = "load"
+    first: float = 0.1
+    smallest: float = 1e-5
+    largest: float = 1.0
+    most: int = 200
+    tolerance: float = 1e-8
+    iterations: int = 15
+
+    def __post_init__(self) -> None:
+        owner = "DeflectionSteps"
+        require_choice(owner, "by", self.by, get_args(Steps))
+        require_positive(owner, first=self.first, smallest=self.smallest, largest=self.largest,
+                         tolerance=self.tolerance)
+        require_finite(owner, most=self.most, iterations=self.iterations)
+        if not self.smallest <= self.first <= self.largest:
+            raise InputError(f"{owner}: first = {self.first!r} must lie between smallest = "
+                             f"{self.smallest!r} and largest = {self.largest!r}.")
+        for name in ("most", "iterations"):
+            value = getattr(self, name)
+            if type(value) is not int or value < 1:
+                raise InputError(f"{owner}: {name} = {value!r} must be a whole number of at least "
+                                 f"1.")
+        if not self.tolerance < 0.1:
+            raise InputError(f"{owner}: tolerance = {self.tolerance!r} must be below 0.1.")
+
+
+@dataclass(frozen=True, eq=False)
+class PathPoint:
+    """A state of equilibrium: free unknowns q (f,), load factor, and what was found there.
+
+    ``unstable`` is the number of negative eigenvalues of the tangent.
+    """
+
+    q: Array
+    factor: float
+    state: StrainState
+    unstable: int
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedPath:
+    """Points of a path from the body without load, and whether the whole load was reached."""
+
+    points: list[PathPoint]
+    reached: bool
+    message: str
+
+
+def follow(model: FiniteStrainModel, loads: Loads, options: DeflectionSteps) -> FollowedPath:
+    """Follow the equilibria of a body from no load to the load factor 1.
+
+    Parameters
+    ----------
+    model : FiniteStrainModel
+        The body.
+    loads : callable
+        Forces p (f,) of the whole load at free unknowns q, and their derivative or None.
+    options : DeflectionSteps
+        Steps.
+    """
+    zero = np.zeros(model.expansion.shape[1])
+    newton = _Newton(model, loads, options)
+    here = newton.point(zero, 0.0)
+    points, message = [here], ""
+    if not newton.size:
+        return FollowedPath([here, newton.point(zero, 1.0)], True, "There is no load.")
+    length, heading = options.first, newton.linear
+    newton.scale = float(np.linalg.norm(newton.linear[:-1]))
+    while len(points) <= options.most:
+        tangent = newton.tangent(here, heading)
+        last = options.by == "load" and here.factor + length >= 1.0 - 1e-12
+        found = newton.step(here, tangent, (1.0 - here.factor) if last else length, options.by)
+        if found is not None and options.by == "arc" and found[0].factor > 1.0:
+            # The path passes the whole load within this step: end on it.
+            share = (1.0 - here.factor) / (found[0].factor - here.factor)
+            guess = here.q + share * (found[0].q - here.q)
+            found, last = newton.at_load(guess, 1.0), True
+        if found is None:
+            length *= 0.5
+            if length < options.smallest:
+                message = (f"The load factor {here.factor:.6g} could not be passed with steps of "
+                           f"{options.smallest:g}" + (
+                               "; at a limit point take steps of the arc length, by = 'arc'."
+                               if options.by == "load" else "."))
+                break
+            continue
+        there, iterations = found
+        heading = np.append(there.q - here.q, there.factor - here.factor)
+        points.append(there)
+        here = there
+        if last:
+            return FollowedPath(points, True, "The whole load is reached.")
+        length = min(options.largest, length * float(np.clip(
+            np.sqrt(_WANTED / max(iterations, 1)), _LEAST, _MOST)))
+    return FollowedPath(points, False, message or (
+        f"The load factor {here.factor:.6g} was reached in {options.most} steps; allow more by "
+        f"most."))
+
+
+class _Newton:
+    """Newton's method with the tangent of internal forces and loads.
+
+    Points are (q, factor); ``scale`` makes displacements comparable with the factor.
+    """
+
+    def __init__(self, model: FiniteStrainModel, loads: Loads, options: DeflectionSteps) -> None:
+        self.model, self.loads, self.options = model, loads, options
+        zero = np.zeros(model.expansion.shape[1])
+        self.scale = 1.0
+        self.size = float(np.linalg.norm(loads(zero)[0]))
+        if self.size:
+            state = model.state(zero)
+            response = _factors(state.tangent).solve(loads(zero)[0])
+            self.linear = np.append(response, 1.0)
+
+    def point(self, q: Array, factor: float) -> PathPoint:
+        """The equilibrium (q, factor) with its tangent."""
+        state = self.model.state(q)
+        K = self._matrix(state, factor, self.loads(q)[1])
+        return PathPoint(q, factor, state, _negative(_factors(K)))
+
+    def tangent(self, here: PathPoint, heading: Array) -> Array:
+        """Direction (f + 1,) of the path with unit length, on the side of ``heading``."""
+        force, slope = self.loads(here.q)
+        response = _factors(self._matrix(here.state, here.factor, slope)).solve(force)
+        found = np.append(response, 1.0)
+        found *= np.sign(self._product(found, heading)) or 1.0
+        return found / np.sqrt(self._product(found, found))
+
+    def step(
+        self, here: PathPoint, tangent: Array, length: float, by: Steps
+    ) -> tuple[PathPoint, int] | None:
+        """Next point and the number of iterations, or None."""
+        if by == "load":
+            # The tangent of the path in units of the load factor.
+            ahead = length * tangent[:-1] / tangent[-1] if tangent[-1] > 1e-3 else 0.0
+            return self.at_load(here.q + ahead, here.factor + length)
+        start = here.q + length * tangent[:-1], here.factor + length * tangent[-1]
+        return self._solve(*start, tangent)
+
+    def at_load(self, q: Array, factor: float) -> tuple[PathPoint, int] | None:
+        """Point at a load factor."""
+        return self._solve(q, factor, None)
+
+    def _solve(
+        self, q: Array, factor: float, normal: Array | None
+    ) -> tuple[PathPoint, int] | None:
+        largest = 1e3 * max(self.scale, float(np.linalg.norm(q)))
+        for iteration in range(1, self.options.iterations + 1):
+            state = self.model.state(q)
+            force, slope = self.loads(q)
+            residual = factor * force - state.force
+            error = float(np.linalg.norm(residual)) / self.size
+            factors = _factors(self._matrix(state, factor, slope))
+            if error <= self.options.tolerance:
+                return PathPoint(q, factor, state, _negative(factors)), iteration - 1
+            change, shift = factors.solve(residual), 0.0
+            if normal is not None:
+                response = factors.solve(force)
+                weights = normal[:-1] / self.scale**2
+                shift = -float(weights @ change) / float(weights @ response + normal[-1])
+                change = change + shift * response
+            size = float(np.linalg.norm(change))
+            if not np.isfinite(size) or size > largest:
+                return None
+            q, factor = q + change, factor + shift
+            if size <= _ROUNDING * float(np.linalg.norm(q)):
+                return self.point(q, factor), iteration
+        return None
+
+    def _product(self, a: Array, b: Array) -> float:
+        return float(a[:-1] @ b[:-1] / self.scale**2 + a[-1] * b[-1])
+
+    def _matrix(self, state: StrainState, factor: float, slope: Any) -> Any:
+        return state.tangent if slope is None else (state.tangent - factor * slope).tocsc()
+
+
+def _factors(matrix: Any) -> Any:
+    """Factors of a tangent, which may be indefinite."""
+    from scipy.sparse.linalg import splu
+
+    try:
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                    options={"SymmetricMode": True})
+    except RuntimeError:  # exactly singular: nothing holds the body
+        raise InputError(
+            "The tangent stiffness is singular, as nothing holds the body against a motion without "
+            "strain; support it by fixed.") from None
+
+
+def _negative(factors: Any) -> int:
+    """Number of negative pivots, which is that of negative eigenvalues of a symmetric matrix."""
+    return int(np.count_nonzero(factors.U.diagonal() < 0.0))

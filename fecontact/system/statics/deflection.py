@@ -1,0 +1,198 @@
+"""Statics of elastic bodies with large deflections, by their finite elements."""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError, ModelWarning, require_finite
+from fecontact.core.read_only import read_only_arrays
+from fecontact.core.types import Array, Integers
+from fecontact.core.units import Summarised, quantity
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.finite_strain import FiniteStrainModel
+from fecontact.fem.follower_pressure import follower_pressure
+from fecontact.fem.load_steps import DeflectionSteps, follow
+from fecontact.fem.points import Place, place_rows
+from fecontact.laws.excitation import Load
+from fecontact.laws.signals.base import Signal
+from fecontact.reduction.eigenmodes import rigid_modes
+from fecontact.system.statics.static_solution import nodal_forces
+
+# Strain up to which St. Venant and Kirchhoff's material stands for metals, and rotation [rad] up to
+# which hinges and couplings are linear.
+LARGE_STRAIN, SMALL_ANGLE = 0.01, 0.1
+
+
+@read_only_arrays
+@dataclass(frozen=True, eq=False, repr=False)
+class DeflectionPath(Summarised):
+    """States of equilibrium of a body under growing loads, the first without load.
+
+    Attributes
+    ----------
+    body : ElasticBody
+        The body.
+    load_factors : (s,) array
+        Parts of the load; 1 is the whole load.
+    displacements : (s, N, d) array
+        Displacements of the nodes [m].
+    energies : (s,) array
+        Strain energy [J].
+    strains : (s,) array
+        Largest component of Green and Lagrange's strain, without sign.
+    unstable : (s,) integer array
+        Number of negative eigenvalues of the tangent stiffness; zero in a stable state.
+    reached : bool
+        Whether the path ends with the whole load.
+    message : str
+        Why the path ends.
+    """
+
+    body: ElasticBody
+    load_factors: Array
+    displacements: Array
+    energies: Array
+    strains: Array
+    unstable: Integers
+    reached: bool
+    message: str
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Steps, load factors, displacement, strain and the end of the path."""
+        size = np.linalg.norm(self.displacements, axis=2).max()
+        return [
+            ("states", f"{len(self.load_factors)}"),
+            ("load factors", f"{self.load_factors.min():.5g} to {self.load_factors.max():.5g}"),
+            ("largest displacement", quantity(float(size), "m")),
+            ("largest strain", f"{self.strains.max():.3g}"),
+            ("unstable states", f"{np.count_nonzero(self.unstable)}"),
+            ("end", self.message),
+        ]
+
+    def displacement(self, place: Place) -> Array:
+        """Displacements (s, d) of a point of the mesh, a boundary's mean, or a place [m]."""
+        d = self.body.dimension
+        rows = place_rows(self.body, place, "displacement").matrix[:d]
+        return np.asarray((rows @ self.displacements.reshape(len(self.load_factors), -1).T).T)
+
+
+def deflection_path(
+    body: ElasticBody,
+    load: Load,
+    *,
+    points: Mapping[str, Place] | None = None,
+    time: float = 0.0,
+    follower: bool = False,
+    steps: DeflectionSteps | None = None,
+) -> DeflectionPath:
+    r"""Equilibria of a body with large deflections, from no load to the whole load.
+
+    .. math:: f(u) = \lambda\,p, \qquad f = \partial U / \partial u, \qquad
+        U = \tfrac12 \int E : C : E\,dV
+
+    with Green and Lagrange's strain E, linear elastic (St. Venant and Kirchhoff's material).
+    Displacements and rotations may be large, strains must be small. Supports, ties and constraints
+    are those of the body; hinges and couplings rotate by small angles.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        With supports against all rigid motions.
+    load : Load
+        As of :func:`~fecontact.static_solution`. Forces keep their directions.
+    points, time : mapping, float
+        As of :func:`~fecontact.static_solution`.
+    follower : bool
+        True if pressures on boundaries act normal to the deformed outline, on its deformed size.
+    steps : DeflectionSteps, optional
+        Load steps by default; steps of the arc length pass limit points.
+
+    Raises
+    ------
+    InputError, MeshError
+        As :func:`~fecontact.static_solution`; for a body that can move without strain.
+
+    Warns
+    -----
+    ModelWarning
+        If the whole load was not reached, for strains above 1 %, and for hinges and couplings that
+        turn by more than 0.1 rad.
+    """
+    require_kind("deflection_path", ElasticBody, body=body)
+    require_kind("deflection_path", Load, load=load)
+    require_kind("deflection_path", Mapping, points={} if points is None else points)
+    require_kind("deflection_path", bool, follower=follower)
+    require_kind("deflection_path", (DeflectionSteps, type(None)), steps=steps)
+    require_finite("deflection_path", time=time)
+    require_supported(body, "deflection_path")
+    model = FiniteStrainModel(body)
+    pressures: dict[str, float] = {}
+    if follower:
+        load, pressures = _without_pressures(load, time)
+    dead = model.free(nodal_forces(body, load, points or {}, time))
+
+    def loads(q: Array) -> tuple[Array, object]:
+        if not pressures:
+            return dead, None
+        force, slope = follower_pressure(body, pressures, model.displacement(q))
+        return dead + model.free(force), model.widened(slope)
+
+    path = follow(model, loads, steps or DeflectionSteps())
+    found = path.points
+    result = DeflectionPath(
+        body, np.array([one.factor for one in found]),
+        np.array([model.displacement(one.q) for one in found]),
+        np.array([one.state.energy for one in found]),
+        np.array([one.state.strain for one in found]),
+        np.array([one.unstable for one in found]), path.reached, path.message)
+    for sentence in _limits(result):
+        warnings.warn(f"deflection_path: {sentence}", ModelWarning, stacklevel=2)
+    return result
+
+
+def require_supported(body: ElasticBody, what: str) -> None:
+    """Raise InputError for a body that can move without strain."""
+    if rigid_modes(body).shape[1]:
+        raise InputError(f"{what} is for bodies that supports hold against all rigid motions; "
+                         f"support the body with fixed.")
+
+
+def _without_pressures(load: Load, time: float) -> tuple[Load, dict[str, float]]:
+    """The load without pressures on boundaries, and these [Pa]."""
+    pressures: dict[str, float] = {}
+    others = []
+    for one in load.boundaries:
+        given = one.pressure
+        value = float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
+        pressures[one.boundary] = pressures.get(one.boundary, 0.0) + value
+        if one.shear or one.shear_across:
+            others.append(replace(one, pressure=0.0))
+    return replace(load, boundaries=tuple(others)), pressures
+
+
+def _limits(path: DeflectionPath) -> list[str]:
+    """Sentences about states beyond the range of the model."""
+    found = [] if path.reached else [path.message]
+    if path.strains.max() > LARGE_STRAIN:
+        found.append(f"the strain reaches {path.strains.max():.2g}; above {LARGE_STRAIN:g} metals "
+                     f"yield and rubber has another law, so lower the load.")
+    turned = max(_rotations(path), default=0.0)
+    if turned > SMALL_ANGLE:
+        found.append(f"a hinge or the reference point of a coupling turns by {turned:.2g} rad; "
+                     f"their equations are those of small angles up to {SMALL_ANGLE:g} rad.")
+    return found
+
+
+def _rotations(path: DeflectionPath) -> list[float]:
+    """Largest rotations of hinges and reference points of couplings [rad]."""
+    body, d = path.body, path.body.dimension
+    flat = path.displacements.reshape(len(path.load_factors), -1).T
+    found = [float(np.abs(body.motion_rows(name)[d:] @ flat).max()) for name in body.references]
+    for hinge in body.hinges:
+        arms = np.linalg.norm(body.nodes[hinge.nodes] - hinge.centre, axis=1).max()
+        moved = np.linalg.norm(path.displacements[:, hinge.nodes], axis=2).max()
+        found.append(float(moved / arms))
+    return found
