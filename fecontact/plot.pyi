@@ -1,3 +1,4 @@
+from .output.plots.amplitude_curve import plot_amplitude_curve
 from .output.plots.analysis import (
     plot_friction_work,
     plot_poincare,
@@ -36,6 +37,7 @@ __all__ = [
     "new_figure",
     "phase_inset",
     "picture",
+    "plot_amplitude_curve",
     "plot_basins",
     "plot_branches",
     "plot_buckling",

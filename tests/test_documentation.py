@@ -371,6 +371,14 @@ def check_frequency_responses(names, printed, folder):
     assert found.amplitude(1) == pytest.approx(names["response"].amplitude(1), rel=1e-12)
 
 
+def check_measurements(names, printed, folder):
+    decay, computed = names["decay"], names["computed"]
+    frequency, ratio = decay.at(1e-3)
+    assert computed.at(1e-3)[0] == pytest.approx(frequency, rel=5e-3)
+    assert computed.at(1e-3)[1] == pytest.approx(ratio, rel=2e-2)
+    assert (folder / "curve.png").stat().st_size > 10000
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws, "frequency-responses.md": check_frequency_responses,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
@@ -381,7 +389,7 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
           "cyclic-symmetry.md": check_cyclic_symmetry, "bodies.md": check_bodies,
           "solids.md": check_solids,
           "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,
-          "results.md": check_results}
+          "results.md": check_results, "measurements.md": check_measurements}
 
 
 def test_every_page_with_code_is_known():

@@ -35,7 +35,8 @@ from fecontact.integrate import ContactEvents
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 
-SPACES = ("fem", "reduction", "integrate", "analysis", "bifurcation", "sweeps", "system", "io")
+SPACES = ("fem", "reduction", "integrate", "analysis", "bifurcation", "measured", "sweeps",
+          "system", "io")
 # What users make and hand over, and what makes its own copies read-only.
 GIVEN = {"Task", "Axis", "PointPairing", "ReportFrame"}
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from fecontact.bifurcation.continuation.branch import Branch
 
+_ROOM = 1e3  # largest ratio of the ends of a logarithmic axis with labels between decades
+
 _UNITS = {"period": "s", "time": "s", "frequency_hz": "Hz"}
 
 
@@ -27,6 +29,15 @@ class _InUnit(Formatter):
         return f"{x / self.factor:.10g}".replace("-", "\N{MINUS SIGN}")
 
 
+class _BetweenDecades(_InUnit):
+    """Minor ticks of a logarithmic axis in a prefixed unit: 2 and 5, where they have room."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        digit = round(x / 10.0 ** np.floor(np.log10(x) + 1e-9))
+        low, high = np.abs(self.axis.get_view_interval())  # type: ignore[union-attr]
+        return super().__call__(x, pos) if digit in (2, 5) and high < _ROOM * low else ""
+
+
 def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array) -> None:
     """Label an axis whose data are in SI units, with ticks in a unit that suits the values.
 
@@ -36,7 +47,10 @@ def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array)
     factor, label = in_unit(label, values)
     axes.set(**{f"{which}label": label})
     if factor != 1.0:
-        (axes.xaxis if which == "x" else axes.yaxis).set_major_formatter(_InUnit(factor))
+        axis = axes.xaxis if which == "x" else axes.yaxis
+        axis.set_major_formatter(_InUnit(factor))
+        if axis.get_scale() == "log":
+            axis.set_minor_formatter(_BetweenDecades(factor))
 
 
 def in_unit(label: str, values: Array) -> tuple[float, str]:

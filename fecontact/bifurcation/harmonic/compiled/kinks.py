@@ -228,6 +228,8 @@ def _onsets(field: ContactField, values: Array) -> Array:
 
 def _bent(s: SystemArrays, nodes: Integers, b: Array, scale: float) -> NDArray[np.bool_]:
     """True for nodes (k,) whose force or stiffness jumps at penetrations b (k,)."""
+    near = np.abs(b) < _NOWHERE
+    b = np.where(near, b, 0.0)  # polynomial forces overflow at places that stand for none
     off = _NEAR * scale + _ROUNDING * np.abs(b)
 
     def evaluated(u: Array, v: float) -> tuple[Array, Array]:
@@ -242,4 +244,4 @@ def _bent(s: SystemArrays, nodes: Integers, b: Array, scale: float) -> NDArray[n
         size = np.maximum(*(np.abs(evaluated(b + side * scale, v)[0]) for side in (-1.0, 1.0)))
         found |= ((np.abs(above - below) > _JUMP * size)
                   | (np.abs(above_u - below_u) * scale > _JUMP * size))
-    return found & (np.abs(b) < _NOWHERE)
+    return found & near
