@@ -1,3 +1,5 @@
+from .measured.read_measurements import read_measurement, read_measurements
+from .measured.uff_functions import write_uff
 from .output.files.branches import (
     read_branch,
     read_branches,
@@ -44,6 +46,8 @@ __all__ = [
     "read_branch",
     "read_branches",
     "read_matrix",
+    "read_measurement",
+    "read_measurements",
     "read_mode",
     "read_resonance_curve",
     "read_response",
@@ -70,5 +74,6 @@ __all__ = [
     "write_resonance_curve",
     "write_response",
     "write_run",
+    "write_uff",
     "write_wear",
 ]

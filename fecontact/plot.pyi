@@ -6,6 +6,7 @@ from .output.plots.analysis import (
     plot_spectrogram,
     plot_spectrum,
 )
+from .output.plots.assurance import plot_modal_assurance
 from .output.plots.bifurcation_diagram import plot_branches
 from .output.plots.campbell import plot_campbell
 from .output.plots.contact_map import plot_contact_map
@@ -50,6 +51,7 @@ __all__ = [
     "plot_friction_work",
     "plot_history",
     "plot_loop",
+    "plot_modal_assurance",
     "plot_modes",
     "plot_nonlinear_mode",
     "plot_phase",

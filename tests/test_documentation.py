@@ -376,7 +376,13 @@ def check_measurements(names, printed, folder):
     frequency, ratio = decay.at(1e-3)
     assert computed.at(1e-3)[0] == pytest.approx(frequency, rel=5e-3)
     assert computed.at(1e-3)[1] == pytest.approx(ratio, rel=2e-2)
-    assert (folder / "curve.png").stat().st_size > 10000
+    assert printed.splitlines()[0] == "('tip',) m ()"
+    assert [line.split()[:2] for line in printed.splitlines()[2:5]] == [
+        ["1", "2"], ["2", "1"], ["3", "3"]]
+    assert "in a unit that is 1000 times" in printed
+    assert names["pairs"].errors == pytest.approx(np.full(3, 1.0 / 1.02 - 1.0))
+    for name in ("curve", "assurance"):
+        assert (folder / f"{name}.png").stat().st_size > 10000
 
 
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,

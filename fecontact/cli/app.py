@@ -9,7 +9,17 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from fecontact.cli.commands import about, branch, compare, response, run, study, sweep, turning
+from fecontact.cli.commands import (
+    about,
+    branch,
+    compare,
+    data,
+    response,
+    run,
+    study,
+    sweep,
+    turning,
+)
 from fecontact.core.errors import InputError
 
 
@@ -42,6 +52,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     branch.branch,
     response.response,
     compare.compare,
+    data.data,
     run.report,
     run.render,
     run.plot,

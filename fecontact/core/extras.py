@@ -7,7 +7,8 @@ from typing import Any
 from fecontact.core.errors import MissingLibraryError
 
 # Extras by the modules that they bring.
-EXTRAS = {"gmsh": "mesh", "pyvista": "render", "imageio_ffmpeg": "render"}
+EXTRAS = {"gmsh": "mesh", "pyvista": "render", "imageio_ffmpeg": "render",
+          "pyuff": "data"}
 
 
 def installed(module: str) -> bool:

@@ -110,20 +110,20 @@ def read_columns(
     InputError
         For a file that cannot be read, with the faulty line.
     """
-    lines = _text(owner, file).splitlines()
+    lines = text_of(owner, file).splitlines()
     widths = {len(names), len(names) - first_optional}
     wanted = f"{' and '.join(names)}{f', or {names[-1]} alone' * first_optional}"
     rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        words = _words(line.partition("#")[0].strip())
-        values = [value for word in words if (value := _number(word)) is not None]
+    for place, line in enumerate(lines, start=1):
+        words = cells(line.partition("#")[0].strip())
+        values = [value for word in words if (value := number(word)) is not None]
         if not words or (not rows and (len(values) < len(words) or len(words) not in widths)):
             continue
         widths = {len(rows[0])} if rows else widths
         if len(words) not in widths or len(values) < len(words) or not np.isfinite(values).all():
             found = (f"has {len(words)} column{'s' * (len(words) != 1)}"
                      if len(words) not in widths else "has a value that is no finite number")
-            raise InputError(f"{owner}: file = '{file}', line {number}, {_short(line.strip())}, "
+            raise InputError(f"{owner}: file = '{file}', line {place}, {_short(line.strip())}, "
                              f"{found}; each line must hold {wanted}, like the first.")
         rows.append(values)
     if not rows:
@@ -134,7 +134,8 @@ def read_columns(
     return tuple(np.array(rows).T)
 
 
-def _text(owner: str, file: str | Path) -> str:
+def text_of(owner: str, file: str | Path) -> str:
+    """Text of a file, UTF-8 or else Latin-1; InputError if it cannot be read or is no text."""
     if not isinstance(file, str | Path):
         raise InputError(f"{owner}: file = {file!r} must be the name of a file.")
     require_regular_file(Path(file), "a table of numbers", f"{owner}: ")
@@ -151,7 +152,8 @@ def _text(owner: str, file: str | Path) -> str:
         return content.decode("latin-1")
 
 
-def _words(line: str) -> list[str]:
+def cells(line: str) -> list[str]:
+    """Cells of a line, parted by semicolons, tabs, commas or blanks, with decimal points."""
     line = re.sub(r'"([^"]*)"', lambda quoted: quoted[1].replace(",", "."), line)
     for separator in (";", "\t"):
         if separator in line:
@@ -160,7 +162,8 @@ def _words(line: str) -> list[str]:
     return [word for word in re.split(r"\s*,\s*|\s+", line) if word]
 
 
-def _number(word: str) -> float | None:
+def number(word: str) -> float | None:
+    """Number that a cell stands for; None for a text."""
     try:
         return None if "_" in word else float(word)
     except ValueError:

@@ -29,7 +29,8 @@ _CHUNK = 400_000  # samples fitted at a time
 def ring_down(
     source: Source, values: ArrayLike | None = None, *, frequency: float | None = None,
     window: float = 10.0, overlap: float = 0.5, t_start: float | None = None,
-    t_end: float | None = None, derivative: int | None = None, **channel: Any,
+    t_end: float | None = None, derivative: int | None = None, resample: bool = False,
+    **channel: Any,
 ) -> AmplitudeCurve:
     r"""Frequency and damping over amplitude from a free decay, by local fits of one mode.
 
@@ -57,8 +58,9 @@ def ring_down(
     t_start, t_end : float, optional
         Part of the record [s], such as without the blow at its beginning.
     derivative : 0, 1 or 2, optional
-        Whether values are displacements, velocities or accelerations, by default by their unit;
-        amplitudes returned are those of displacements.
+        Of the displacement that the values are, by default by their unit.
+    resample : bool
+        Whether to interpolate uneven times by splines.
     **channel
         ``quantity``, ``point`` and ``component`` of a run, as for
         :func:`fecontact.analysis.history`; ``channel`` of a measurement, by name or number.
@@ -78,7 +80,7 @@ def ring_down(
         raise InputError(f"ring_down: derivative = {derivative!r} must be 0 for displacements, 1 "
                          f"for velocities or 2 for accelerations.")
     order = series.derivative if derivative is None else derivative
-    t, x = evenly_sampled(series.time, series.values)
+    t, x = evenly_sampled(series.time, series.values, resample=resample)
     t, x = _part(t, x, t_start, t_end)
     if not (isinstance(overlap, Real) and 0.0 <= overlap < 1.0):
         raise InputError(f"ring_down: overlap = {overlap!r} must be from 0 to below 1.")

@@ -239,5 +239,5 @@ def test_damaged_files(tmp_path):
 
 def test_without_pyuff(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyuff", None)
-    with pytest.raises(MissingLibraryError, match="pip install pyuff"):
+    with pytest.raises(MissingLibraryError, match=r"fecontact\[data\]"):
         read_uff(BLOCK)

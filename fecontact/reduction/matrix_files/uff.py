@@ -5,7 +5,7 @@ Read by pyuff: data sets 55 (data at nodes), 15 and 2411 (nodes), 2412 (elements
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecontact.core.checks import as_path, require_regular_file
-from fecontact.core.errors import InputError, MissingLibraryError
+from fecontact.core.errors import InputError
+from fecontact.core.extras import optional
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.from_modes import basis_from_modes
@@ -206,32 +207,33 @@ def _modes(sets: list[dict[str, Any]], source: str) -> UffModes:
 _NORMAL_MODES, _COMPLEX_MODES = 2, (3, 7)
 _DISPLACEMENTS = (0, 1, 8)  # unknown, general, displacement
 _REAL_ENOUGH = 0.1
+_BORDER = re.compile(rb"^ {4}-1\s*?$", re.MULTILINE)
+_BINARY = re.compile(rb"^ {4}58b", re.MULTILINE)
+_OF_MODES = (15, 55, 164, 2411, 2412, 2420)
 
 
-def data_sets(path: Path) -> list[dict[str, Any]]:
-    """The data sets of modes, nodes, elements and units; InputError if damaged."""
-    try:
-        import pyuff
-    except ImportError:
-        raise MissingLibraryError("Universal files are read by pyuff, which is not installed: "
-                                  "pip install pyuff") from None
+def data_sets(path: Path, kinds: Collection[int] = _OF_MODES) -> list[dict[str, Any]]:
+    """Data sets of some kinds, by default of modes, nodes and units; InputError if damaged."""
+    pyuff = optional("pyuff", "Reading universal files")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
-    require_regular_file(path, "a matrix")
+    require_regular_file(path, "a universal file")
     try:
-        # Each data set lies between two such lines; pyuff skips one without end.
-        if len(re.findall(rb"^ {4}-1\s*?$", path.read_bytes(), re.MULTILINE)) % 2:
+        # Each data set lies between two such lines; pyuff skips one without end. Binary data need
+        # not end with a line.
+        content = path.read_bytes()
+        if not _BINARY.search(content) and len(_BORDER.findall(content)) % 2:
             raise InputError(f"{path}: the file ends within a data set; it is cut off.")
         file = pyuff.UFF(str(path))
-        kinds = file.get_set_types()
-        wanted = [k for k, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2412, 2420)]
+        present = file.get_set_types()
+        wanted = [k for k, kind in enumerate(present) if kind in kinds]
         # One at a time: pyuff's message for several does not say which one is damaged.
         sets = []
         for k in wanted:
             try:
                 sets.append(file.read_sets(k))
             except Exception:
-                raise InputError(f"{path}: data set {k + 1} of the file, of type {kinds[k]}, "
+                raise InputError(f"{path}: data set {k + 1} of the file, of type {present[k]}, "
                                  f"cannot be read; it is damaged or in a form that pyuff does not "
                                  f"know.") from None
     except InputError:

@@ -1,0 +1,302 @@
+"""Readers of measurements: CSV, MATLAB, HDF5 and universal files."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.checks import as_path, require_kind, require_regular_file
+from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.files.hdf5_check import open_hdf5
+from fecontact.core.files.stored import reading
+from fecontact.core.types import Array
+from fecontact.laws.data_columns import cells, number, text_of
+from fecontact.measured.measured_units import parted, si_unit
+from fecontact.measured.measurement import Axis, Channel, Measurement
+from fecontact.measured.uff_functions import read_functions
+
+# Names of the abscissa, in small letters.
+_AXES: Mapping[str, Axis] = {
+    **dict.fromkeys(("time", "t", "times"), "time"),
+    **dict.fromkeys(("frequency", "freq", "f", "frequencies", "hz", "frequency_hz"), "frequency")}
+_SUFFIXES = (".csv", ".txt", ".dat", ".mat", ".h5", ".hdf5", ".uff", ".unv")
+_MOST = 10_000  # columns of a two-dimensional array of channels
+
+
+def read_measurements(
+    path: str | Path, *, units: Mapping[str, str] | None = None
+) -> tuple[Measurement, ...]:
+    """Read all measurements of a file, one for each axis of times or frequencies.
+
+    - Text (.csv, .txt, .dat): a line of titles such as ``time [s], x [mm]``, columns below; the
+      first column is the axis. ``H re`` and ``H im`` are one complex channel, ``H coherence`` is
+      the coherence of H.
+    - MATLAB (.mat) and HDF5 (.h5): vectors, or columns of matrices, of the length of a vector
+      called ``time``, ``t``, ``frequency`` or ``f``, at the top or in one structure or group; units
+      from titles, from HDF5 attributes ``unit``, or from a structure ``units``.
+    - Universal files (.uff, .unv): data sets 58 with their nodes and directions, coherences beside
+      frequency responses, units of their labels or of data set 164.
+
+    Values become SI units where the unit is known. Values are as in the file, with a note, where it
+    is not.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    units : mapping of channel to unit, optional
+        Units in which the file gives channels, in place of its own: ``{"x": "mm"}``.
+
+    Raises
+    ------
+    InputError
+        If the file does not exist, is damaged, of another kind, or holds no measurement.
+    MissingLibraryError
+        For universal files without pyuff.
+    """
+    path = as_path(path, "a measurement")
+    require_kind("read_measurements", (Mapping, type(None)), units=units)
+    if path.suffix.lower() not in _SUFFIXES:
+        raise InputError(f"{path}: measurements are not read from files of this kind; the suffixes "
+                         f"that are: {', '.join(_SUFFIXES)}.")
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file.")
+    require_regular_file(path, "a measurement")
+    reader: Callable[[Path, Mapping[str, str]], Iterable[Measurement]] = {
+        ".mat": _read_mat, ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".uff": read_functions,
+        ".unv": read_functions}.get(path.suffix.lower(), _read_text)
+    with reading(path, "not readable as a measurement"):
+        found = tuple(reader(path, units or {}))
+    known = {name for one in found for name in one.names}
+    for name in units or ():
+        if name not in known:
+            raise InputError(f"{path}: units names the channel {name!r}{nearest(name, known)}; "
+                             f"there are: {choices(known)}.")
+    return found
+
+
+def read_measurement(
+    path: str | Path, *, axis: Axis | None = None, units: Mapping[str, str] | None = None
+) -> Measurement:
+    """Read the measurement of a file, as :func:`read_measurements`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    axis : 'time' or 'frequency', optional
+        Which measurement of a file with both.
+    units : mapping of channel to unit, optional
+        Units in which the file gives channels, in place of its own.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_measurements`, and if the file holds none or several over this axis.
+    """
+    if axis not in (None, "time", "frequency"):
+        raise InputError(f"read_measurement: axis = {axis!r} must be 'time' or 'frequency'.")
+    found = [one for one in read_measurements(path, units=units) if axis in (None, one.axis)]
+    if len(found) != 1:
+        what = f" over {axis}" if axis else ""
+        raise InputError(f"{path} holds {len(found)} measurements{what}; "
+                         + ("give axis, or take one of those of read_measurements." if found
+                            else "take the other axis."))
+    return found[0]
+
+
+def _read_text(path: Path, units: Mapping[str, str]) -> list[Measurement]:
+    lines = [line.partition("#")[0].strip() for line in text_of("A measurement", path).splitlines()]
+    titles: list[str] = []
+    rows: list[list[float]] = []
+    for place, line in enumerate(lines, start=1):
+        words = cells(line) if line else []
+        values = [_value(word) for word in words]
+        if not words or (not rows and None in values):
+            titles = _titles(line) if words else titles
+            continue
+        if None in values or (rows and len(values) != len(rows[0])):
+            raise InputError(f"line {place} has {len(values)} columns, or a text among its "
+                             f"numbers; each must have the {len(rows[0]) if rows else 0} numbers "
+                             f"of the first")
+        rows.append([float(value) for value in values if value is not None])
+    if len(rows) < 2 or len(rows[0]) < 2:
+        raise InputError("it has no two lines of two numbers or more")
+    table = np.array(rows)
+    if len(titles) != table.shape[1]:
+        raise InputError(f"its line of titles has {len(titles)} entries for {table.shape[1]} "
+                         f"columns; write one for each, such as: time [s], x [mm]")
+    if len({parted(title)[0] for title in titles}) < len(titles):
+        raise InputError("its line of titles has a name twice; give each column its own")
+    return [_measurement(str(path), dict(zip(titles, table.T, strict=True)), units)]
+
+
+def _titles(line: str) -> list[str]:
+    """Titles of a header; they may hold blanks, so that only commas and the like part them."""
+    for separator in (";", "\t", ","):
+        if separator in line:
+            return [word.strip().strip('"') for word in line.split(separator)]
+    return re.findall(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?", line)
+
+
+def _value(word: str) -> float | None:
+    """Number of a cell; NaN for an empty one."""
+    return float("nan") if not word else number(word)
+
+
+def _read_mat(path: Path, units: Mapping[str, str]) -> list[Measurement]:
+    with path.open("rb") as stream:
+        if stream.read(10) == b"MATLAB 7.3":
+            return _read_hdf5(path, units)
+    from scipy.io import loadmat
+
+    content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    return _from_tree({name: _plain(value) for name, value in content.items()
+                       if not name.startswith("__")}, str(path), units)
+
+
+def _plain(value: Any) -> Any:
+    """Structures of MATLAB as mappings."""
+    if hasattr(value, "_fieldnames"):
+        return {name: _plain(getattr(value, name)) for name in value._fieldnames}
+    return value
+
+
+def _read_hdf5(path: Path, units: Mapping[str, str]) -> list[Measurement]:
+    import h5py
+
+    def tree(group: Any) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, item in group.items():
+            if isinstance(item, h5py.Group):
+                if not name.startswith("#"):
+                    found[name] = tree(item)
+            elif item.dtype.kind in "fiuc" and item.ndim <= 2:
+                unit = item.attrs.get("unit", item.attrs.get("units", None))
+                title = name if unit is None else f"{name} [{_decoded(unit)}]"
+                found[title] = np.asarray(item[()])
+            elif item.dtype.kind == "V" and set(item.dtype.names or ()) == {"real", "imag"}:
+                both = item[()]
+                found[name] = both["real"] + 1j * both["imag"]
+        return found
+
+    with open_hdf5(path) as file:
+        return _from_tree(tree(file), str(path), units)
+
+
+def _decoded(text: Any) -> str:
+    return text.decode("utf-8", errors="replace") if isinstance(text, bytes) else str(text)
+
+
+def _from_tree(tree: Mapping[str, Any], source: str, units: Mapping[str, str]
+               ) -> list[Measurement]:
+    """Measurements at the top of a tree of arrays, and in each of its branches."""
+    found = []
+    arrays = {name: np.squeeze(value) for name, value in tree.items()
+              if isinstance(value, np.ndarray) and value.dtype.kind in "fiuc"}
+    own = tree.get("units")
+    named = {name: str(unit) for name, unit in own.items()} if isinstance(own, Mapping) else {}
+    for title, axis in arrays.items():
+        if axis.ndim != 1 or len(axis) < 2 or parted(title)[0].lower() not in _AXES:
+            continue
+        columns: dict[str, Array] = {_with_unit(title, named): axis}
+        for name, values in arrays.items():
+            if name == title or not values.ndim or len(axis) not in values.shape:
+                continue
+            name = _with_unit(name, named)
+            matrix = values.reshape(len(axis), -1) if values.shape[0] == len(axis) else values.T
+            if matrix.shape[1] > _MOST:
+                raise InputError(f"{name} has {matrix.shape[1]} columns; at most {_MOST} are "
+                                 f"possible")
+            text, unit = parted(name)
+            for k in range(matrix.shape[1]):
+                label = text if matrix.shape[1] == 1 else f"{text} {k + 1}"
+                columns[label if unit is None else f"{label} [{unit}]"] = matrix[:, k]
+        if len(columns) > 1:
+            found.append(_measurement(source, columns, units))
+    for name, branch in tree.items():
+        if isinstance(branch, Mapping):
+            try:
+                found += _from_tree(branch, f"{source}: {name}", units)
+            except InputError as error:
+                if "no vector called" not in str(error):
+                    raise
+    if not found:
+        raise InputError(f"it has no vector called {choices(('time', 't', 'frequency', 'f'))} "
+                         f"beside others of its length")
+    return found
+
+
+def _with_unit(title: str, named: Mapping[str, str]) -> str:
+    name, unit = parted(title)
+    return f"{name} [{named[name]}]" if unit is None and name in named else title
+
+
+def _measurement(source: str, columns: Mapping[str, Array], units: Mapping[str, str]
+                 ) -> Measurement:
+    """A measurement of columns by titles, the first of which is the axis."""
+    (first, abscissa), *others = columns.items()
+    name, unit = parted(first)
+    axis = _AXES.get(name.lower())
+    found = si_unit(unit) if unit else None
+    if axis is None and found is not None:
+        axis = {"s": "time", "Hz": "frequency"}.get(found[0])  # type: ignore[assignment]
+    if axis is None:
+        raise InputError(f"its first column is called '{first}'; call it time [s] or "
+                         f"frequency [Hz]")
+    notes: list[str] = []
+    wanted = "s" if axis == "time" else "Hz"
+    if found is None or found[0] != wanted:
+        if unit:
+            raise InputError(f"'{first}' must be in {wanted}, not in '{unit}'")
+        notes.append(f"'{name}' has no unit; it is taken in {wanted}")
+        found = (wanted, 1.0)
+    values, channels, coherence = joined(
+        [(*parted(title), data) for title, data in others], units, notes)
+    return Measurement(np.asarray(abscissa, dtype=float) * found[1], values, channels, axis,
+                       coherence, source, tuple(notes))
+
+
+def joined(
+    columns: list[tuple[str, str | None, Array]], units: Mapping[str, str], notes: list[str]
+) -> tuple[Array, tuple[Channel, ...], Array | None]:
+    """Values (N, C), channels and coherence of columns by name and unit; adds to the notes."""
+    parts = {name: (unit, data) for name, unit, data in columns}
+    values: list[Array] = []
+    channels: list[Channel] = []
+    coherent: dict[str, Array] = {}
+    for name, (unit, data) in parts.items():
+        stem, _, part = name.rpartition(" ")
+        if part.lower() in ("im", "imag") and any(f"{stem} {real}" in parts
+                                                  for real in ("re", "real", "Re", "Real")):
+            continue
+        if part.lower() == "coherence" and stem:
+            coherent[stem] = np.asarray(data, dtype=float)
+            continue
+        other = next((f"{stem} {imag}" for imag in ("im", "imag", "Im", "Imag")
+                      if part.lower() in ("re", "real") and f"{stem} {imag}" in parts), None)
+        if other is not None:
+            name, data = stem, data + 1j * parts[other][1]
+        symbol = units.get(name, unit)
+        known = si_unit(symbol) if symbol is not None else None
+        if symbol is None:
+            notes.append(f"channel '{name}' has no unit; its values are as in the file")
+        elif known is None:
+            if name in units:
+                raise InputError(f"the unit '{symbol}' given for '{name}' is not known; give one "
+                                 f"like 'mm', 'm/s^2', 'g' or 'kN'")
+            notes.append(f"the unit '{symbol}' of channel '{name}' is not known; its values are as "
+                         f"in the file")
+        si, factor = known or (symbol or "", 1.0)
+        values.append(np.asarray(data) * factor)
+        channels.append(Channel(name, si))
+    if not channels:
+        raise InputError("it has no channels beside its axis")
+    table = np.stack(values, axis=1)
+    if not coherent:
+        return table, tuple(channels), None
+    nothing = np.full(len(table), np.nan)
+    return table, tuple(channels), np.stack(
+        [coherent.get(one.name, nothing) for one in channels], axis=1)

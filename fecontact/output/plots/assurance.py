@@ -1,0 +1,53 @@
+"""Plot of the modal assurance of two sets of modes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fecontact.core.checks import require_kind
+from fecontact.measured.assurance import ModePairs
+from fecontact.output.plots.figure import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WRITTEN = 24  # modes of both sets up to which values are written into the fields
+
+
+def plot_modal_assurance(pairs: ModePairs, *, path: str | Path | None = None) -> "Figure":
+    """Plot the modal assurance of modes of a test and of a model, with frames around the pairs.
+
+    Parameters
+    ----------
+    pairs : ModePairs
+        What :func:`fecontact.measured.pair_modes` found.
+    path : str or Path, optional
+        A .png, .pdf or .svg file to write too; it is replaced if it exists.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or a file that cannot be written.
+    """
+    require_kind("plot_modal_assurance", ModePairs, pairs=pairs)
+    rows, columns = pairs.assurance.shape
+    with new_figure(2.6 + 0.55 * min(columns, 20), 2.0 + 0.45 * min(rows, 20), path) as figure:
+        axis = figure.subplots()
+        image = axis.imshow(pairs.assurance, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto",
+                            origin="lower")
+        axis.grid(False)
+        for row, column in zip(pairs.tested, pairs.computed, strict=True):
+            axis.plot(column + np.array([-0.5, 0.5, 0.5, -0.5, -0.5]),
+                      row + np.array([-0.5, -0.5, 0.5, 0.5, -0.5]), color="#d55e00", linewidth=1.6)
+        if max(rows, columns) <= _WRITTEN:
+            for (row, column), value in np.ndenumerate(pairs.assurance):
+                if value >= 0.05:
+                    axis.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8.0,
+                              color="white" if value > 0.6 else "#303030")
+        axis.set_xticks(range(columns), [f"{f:.4g}" for f in pairs.computed_frequencies],
+                        rotation=60.0 if columns > 8 else 0.0)
+        axis.set_yticks(range(rows), [f"{f:.4g}" for f in pairs.tested_frequencies])
+        axis.set(xlabel="model [Hz]", ylabel="test [Hz]")
+        figure.colorbar(image, ax=axis, label="modal assurance")
+    return figure
