@@ -98,8 +98,11 @@ class FollowedPath:
     message: str
 
 
-def follow(model: FiniteStrainModel, loads: Loads, options: DeflectionSteps) -> FollowedPath:
-    """Follow the equilibria of a body from no load to the load factor 1.
+def follow(
+    model: FiniteStrainModel, loads: Loads, options: DeflectionSteps,
+    stop: Callable[[Array], bool] | None = None,
+) -> FollowedPath:
+    """Follow the equilibria of a body from no load to the load factor 1, or until ``stop``.
 
     Parameters
     ----------
@@ -109,6 +112,8 @@ def follow(model: FiniteStrainModel, loads: Loads, options: DeflectionSteps) -> 
         Forces p (f,) of the whole load at free unknowns q, and their derivative or None.
     options : DeflectionSteps
         Steps.
+    stop : callable, optional
+        True for free unknowns q with which the path ends, at whatever load factor.
     """
     zero = np.zeros(model.expansion.shape[1])
     newton = _Newton(model, loads, options)
@@ -120,9 +125,10 @@ def follow(model: FiniteStrainModel, loads: Loads, options: DeflectionSteps) -> 
     newton.scale = float(np.linalg.norm(newton.linear[:-1]))
     while len(points) <= options.most:
         tangent = newton.tangent(here, heading)
-        last = options.by == "load" and here.factor + length >= 1.0 - 1e-12
+        last = stop is None and options.by == "load" and here.factor + length >= 1.0 - 1e-12
         found = newton.step(here, tangent, (1.0 - here.factor) if last else length, options.by)
-        if found is not None and options.by == "arc" and found[0].factor > 1.0:
+        if (found is not None and stop is None and options.by == "arc"
+                and found[0].factor > 1.0):
             # The path passes the whole load within this step: end on it.
             share = (1.0 - here.factor) / (found[0].factor - here.factor)
             guess = here.q + share * (found[0].q - here.q)
@@ -140,7 +146,7 @@ def follow(model: FiniteStrainModel, loads: Loads, options: DeflectionSteps) -> 
         heading = np.append(there.q - here.q, there.factor - here.factor)
         points.append(there)
         here = there
-        if last:
+        if last or (stop is not None and stop(here.q)):
             return FollowedPath(points, True, "The whole load is reached.")
         length = min(options.largest, length * float(np.clip(
             np.sqrt(_WANTED / max(iterations, 1)), _LEAST, _MOST)))

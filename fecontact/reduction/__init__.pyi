@@ -13,6 +13,8 @@ from .assembly.tightened import TightenedBolts, tightened
 from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
+from .large_deflections.fit import LargeDeflections
+from .large_deflections.forces import LargeDeflectionForces
 from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from .point_masses import point_masses
 from .polynomial_stiffness import polynomial_stiffness
@@ -31,6 +33,8 @@ __all__ = [
     "FaceWeld",
     "Hinge",
     "InterfaceCompliance",
+    "LargeDeflectionForces",
+    "LargeDeflections",
     "ModalRotation",
     "ModeConvergence",
     "ModeShapes",

@@ -20,6 +20,7 @@ from fecontact.reduction.basis_checks import (
     check_sides,
     frozen_arrays,
 )
+from fecontact.reduction.large_deflections.forces import LargeDeflectionForces
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
 
@@ -95,6 +96,9 @@ class ModalBasis(Summarised):
         normal only.
     first_passes : tuple of (str, int)
         Interfaces of two passes, and how many of the nodes belong to the first one.
+    large_deflections : tuple of LargeDeflectionForces
+        Forces of large deflections, of each body that has them; their springs are the last groups
+        of contact nodes, and systems add their laws.
 
     Raises
     ------
@@ -125,6 +129,7 @@ class ModalBasis(Summarised):
     link_load: Array | None = None
     springs: tuple[str, ...] = ()
     first_passes: tuple[tuple[str, int], ...] = ()
+    large_deflections: tuple[LargeDeflectionForces, ...] = ()
 
     def __post_init__(self) -> None:
         if np.ndim(self.T) != 3 or np.shape(self.T)[1] not in (3, 6):
@@ -145,6 +150,8 @@ class ModalBasis(Summarised):
         diagonal = (self.damping == np.diag(np.diag(self.damping))).all()
         full = "full matrix" + _skew(self.damping, ", in part gyroscopic")
         groups = [f"{count} {name}" for name, count in self.groups if name not in self.springs]
+        own = [one.group for one in self.large_deflections]
+        springs = [name for name in self.springs if name not in own]
         return [
             ("modes", f"{self.modes}, {self.rigid_modes} rigid"),
             ("frequencies", f"{', '.join(middle)} Hz" if hertz else "none"),
@@ -159,7 +166,8 @@ class ModalBasis(Summarised):
                 for part in self.parts]))] if self.parts else []),
             ("contact nodes", f"{np.count_nonzero(~self.spring_nodes)}"
              + (f" ({listed(groups)})" if len(groups) > 1 or (groups and self.parts) else "")),
-            *([("nonlinear springs", listed(list(self.springs)))] if self.springs else []),
+            *([("nonlinear springs", listed(springs))] if springs else []),
+            *(line for one in self.large_deflections for line in one.summary()),
             ("points", listed(["B", "C", *self.extra])),
             ("shapes over the body", "none" if self.mode_shapes is None
              else f"at {len(self.mode_shapes.nodes)} nodes"),
@@ -229,6 +237,16 @@ class ModalBasis(Summarised):
         """Whether each contact node (n,) is a nonlinear spring between two points."""
         return np.repeat([name in self.springs for name, _ in self.groups],
                          [count for _, count in self.groups]).astype(bool)
+
+    @property
+    def interface_groups(self) -> tuple[tuple[str, int], ...]:
+        """Names and sizes of the groups whose laws a system gives: all but large deflections."""
+        return self.groups[: len(self.groups) - len(self.large_deflections)]
+
+    @property
+    def interface_nodes(self) -> int:
+        """Number of contact nodes without the springs of large deflections, which follow them."""
+        return sum(count for _, count in self.interface_groups)
 
     @property
     def stiffness_matrix(self) -> Array:
@@ -427,6 +445,10 @@ class ModalBasis(Summarised):
             raise InputError(f"modes {list(modes)} must be different numbers from 0 to "
                              f"{self.modes - 1}, at least one.")
         given, quality, turning = self.mode_shapes, self.quality, self.rotation
+        dropped = np.setdiff1d(np.arange(self.modes), chosen)
+        if self.large_deflections and self.contact_T[self.spring_nodes][..., dropped].any():
+            raise InputError("select would leave out coordinates on which forces of large "
+                             "deflections act; make the basis with fewer modes instead.")
         below = np.searchsorted(chosen, np.arange(self.modes + 1))
         return replace(
             self,
@@ -442,6 +464,8 @@ class ModalBasis(Summarised):
             mode_shapes=None if given is None else replace(
                 given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
             link_load=None if self.link_load is None else self.link_load[chosen],
+            large_deflections=tuple(replace(one, coordinates=one.coordinates[:, chosen])
+                                    for one in self.large_deflections),
             parts=tuple(replace(part, modes=(int(below[first]), int(below[end] - below[first])))
                         for part in self.parts
                         for first, end in [(part.modes[0], sum(part.modes))]),

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import (
@@ -42,6 +43,9 @@ from fecontact.reduction.eigenmodes import (
     free_modes,
     frequencies_of,
 )
+from fecontact.reduction.large_deflections.fit import LargeDeflections, condensed_body
+from fecontact.reduction.large_deflections.forces import large_deflection_forces
+from fecontact.reduction.large_deflections.nodes import with_springs
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.prestress import (
@@ -56,14 +60,16 @@ from fecontact.reduction.static_modes.flexibility import Flexibility
 from fecontact.reduction.static_modes.residual_vectors import flexibility_of, residual_modes
 
 Reduction = Literal["vibration", "residual", "craig-bampton"]
+Names = TypeAliasType("Names", str | Sequence[str])
+Counts = TypeAliasType("Counts", Count | Sequence[Count])
 
 
 def modal_basis(
     body: ElasticBody,
     modes: int = 20,
     *,
-    contact: str | Sequence[str] = "contact",
-    contact_nodes: Count | Sequence[Count] = "all",
+    contact: Names = "contact",
+    contact_nodes: Counts = "all",
     B: Place | None = None,
     C: Place | None = None,
     points: Mapping[str, Place] | None = None,
@@ -73,6 +79,7 @@ def modal_basis(
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
     prestress: BodyFields | None = None,
+    large_deflections: LargeDeflections | None = None,
     rows: Any = (),
     eigensolver: Eigensolver = "auto",
 ) -> ModalBasis:
@@ -104,8 +111,9 @@ def modal_basis(
         Adds static responses to gravity or loads (also moments at reference points).
     rotation : Rotation, optional
         Displacements are those in the frame that rotates with the body, modes those at rest.
-    prestress : BodyFields, optional
-        Static state whose stress stiffens the body; see :mod:`fecontact.reduction.prestress`.
+    prestress, large_deflections : BodyFields and LargeDeflections, optional
+        Stress that stiffens the body, see :mod:`fecontact.reduction.prestress`; forces of large
+        deflections, see :mod:`fecontact.reduction.large_deflections.forces`.
     rows : sequence of sparse (k, d N) arrays
         Further motions with forces; see :func:`fecontact.reduction.reduce_bodies`.
     eigensolver : 'auto', 'direct' or 'iterative'
@@ -141,6 +149,8 @@ def modal_basis(
     if loads and reduction == "vibration":
         raise InputError("loads complete the modes only with reduction = 'residual' or "
                          "'craig-bampton'; choose one of these, or leave loads out.")
+    if large_deflections is not None:
+        _check_large_deflections(large_deflections, reduction, rotation, prestress)
     stress = None if prestress is None else geometric_stiffness(body, prestress)
     held = stress is not None and not resists_rotation(body, stress)
     system = FreeSystem.of(body, eigensolver, stress if held else None)
@@ -156,8 +166,12 @@ def modal_basis(
     row = np.arange(len(flexibility.rows.indptr) - 1)
     is_point = row < at_points.shape[0]
     used = (row < d * (2 + len(face.tributary))) | ~is_point
+    condensed = None if large_deflections is None else condensed_body(
+        body, system, *flexibility.modes, large_deflections)
+    fields = None if condensed is None else condensed.independent_fields(
+        system, flexibility.modes[1])
     w, free_shapes, own = _modes(flexibility.of_rows(used), modes, reduction, tolerance,
-                                 completing)
+                                 completing, fields)
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = frequencies_of(body, shapes[:, elastic], stress if held else None)
@@ -203,7 +217,33 @@ def modal_basis(
         rotation=None if turning is None else replace(turning, speed=0.0),
         stiffness=None if held or stress is None else coupled(w, shapes, stress),
     )
+    if condensed is not None:
+        assert large_deflections is not None
+        numbers = condensed.modes
+        largest = np.linalg.norm(shapes.reshape(-1, d, len(w))[:, :, numbers], axis=1).max(axis=0)
+        bent, elongations = large_deflection_forces(
+            condensed, np.einsum("fk,fij->kij", system.mass @ free_shapes, condensed.fields), w,
+            largest, large_deflections.largest_displacement)
+        return with_springs(basis, bent, elongations)
     return basis if turning is None else basis.with_rotation_speed(turning.speed)
+
+
+def _check_large_deflections(
+    given: LargeDeflections, reduction: Reduction, rotation: Rotation | None,
+    prestress: BodyFields | None,
+) -> None:
+    """Raise InputError for options that do not go with large deflections."""
+    require_kind("modal_basis", LargeDeflections, large_deflections=given)
+    if reduction == "craig-bampton":
+        raise InputError("large_deflections are those of vibration modes; choose reduction = "
+                         "'vibration' or 'residual'.")
+    if rotation is not None:
+        raise InputError("large_deflections and rotation do not go together; leave one of them "
+                         "out.")
+    if prestress is not None:
+        raise InputError("large_deflections and prestress do not go together; leave prestress out "
+                         "and give the load to the system, where the deflection stresses the "
+                         "body.")
 
 
 def reduce_bodies(
@@ -354,6 +394,7 @@ def _joints(
 
 def _modes(
     flexibility: Flexibility, count: int, reduction: Reduction, tolerance: float, loads: Array,
+    fields: Array | None,
 ) -> tuple[Array, Array, int]:
     """Frequencies, shapes and number of the eigenmodes among them."""
     system, (w, shapes) = flexibility.system, flexibility.modes
@@ -361,11 +402,16 @@ def _modes(
         w, shapes = craig_bampton(system, flexibility.rows, count, loads)
         return w, shapes, system.rigid.shape[1]
     if reduction == "vibration":
-        return w, shapes, count
+        if fields is None:
+            return w, shapes, count
+        more, completing = residual_modes(
+            flexibility.of_rows(np.zeros(flexibility.rows.shape[0], bool)), tolerance,
+            np.zeros((len(shapes), 0)), fields)
+        return np.concatenate([w, more]), np.hstack([shapes, completing]), count
     if count < system.rigid.shape[1]:
         raise InputError(f"modes = {count} must be at least the number of rigid modes, "
                          f"{system.rigid.shape[1]}, for reduction = 'residual'.")
-    more, completing = residual_modes(flexibility, tolerance, loads)
+    more, completing = residual_modes(flexibility, tolerance, loads, fields)
     return np.concatenate([w, more]), np.hstack([shapes, completing]), count
 
 

@@ -28,6 +28,7 @@ from fecontact.laws.base import PerNode
 from fecontact.laws.excitation import Load
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
+from fecontact.reduction.large_deflections.fit import LargeDeflections
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.study.materials_section import MaterialSettings
@@ -195,6 +196,8 @@ class BasisSettings:
     prestress : bool
         Whether modes are those about the static state under ``[load]``, whose stress stiffens the
         body, which its supports have to hold.
+    large_deflections : LargeDeflections, optional
+        ``[basis.large_deflections]``: forces of large deflections of some modes.
     """
 
     modes: int = 20
@@ -213,6 +216,7 @@ class BasisSettings:
     select: tuple[int, ...] | None = None
     eigensolver: Literal["auto", "direct", "iterative"] = "auto"
     prestress: bool = False
+    large_deflections: LargeDeflections | None = None
 
     def __post_init__(self) -> None:
         convert_fields(self)
@@ -232,7 +236,8 @@ class BasisSettings:
     @property
     def options(self) -> dict[str, Any]:
         """Options of :func:`fecontact.modal_basis` that concern neither contact nor modes."""
-        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads", "eigensolver")
+        names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads", "eigensolver",
+                 "large_deflections")
         return {name: getattr(self, name) for name in names}
 
     def modal_basis(

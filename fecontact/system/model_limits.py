@@ -33,6 +33,9 @@ DEEPEST = 100.0
 # Rotation beyond which displacements are not linear in it [rad].
 SMALL_ANGLE = 0.1
 
+# Deflections beyond the fitted range of their forces, in this range.
+FITTED = 1.05
+
 # Plausible ranges: extents of bodies [m], Young's moduli [Pa], densities [kg/m^3]. Largest friction
 # coefficient, roughness as a part of the body, speed of the ground [m/s], gap in extents of the
 # body, and duration in periods of the fastest mode or excitation.
@@ -175,7 +178,8 @@ def _turned(system: ContactSystem, times: Array, states: Array) -> str | None:
     rows = basis.T[:, basis.dimension :]
     rows = rows[np.abs(rows).any(axis=(1, 2))]
     # Masses without positions have no rotation in space, only a coordinate of that name.
-    if basis.parts or not len(rows) or not np.ptp(basis.positions, axis=0).any():
+    if (basis.parts or not len(rows) or basis.large_deflections
+            or not np.ptp(basis.positions, axis=0).any()):
         return None
     largest = 0.0
     with np.errstate(over="ignore", invalid="ignore"):
@@ -186,6 +190,18 @@ def _turned(system: ContactSystem, times: Array, states: Array) -> str | None:
         return None
     return (f"the body turns by {largest:.2g} rad; rotations above {SMALL_ANGLE:g} rad are not "
             f"small, as the equations assume, so check the supports and the loads.")
+
+
+def _beyond_fit(system: ContactSystem, times: Array, states: Array) -> str | None:
+    """Deflections beyond the range in which their forces were fitted."""
+    for one in system.basis.large_deflections:
+        with np.errstate(over="ignore", invalid="ignore"):
+            reach = one.reach(states[:, : system.basis.modes])
+        if reach > FITTED:
+            return (f"a mode with large deflections is deflected by {reach:.3g} times the range in "
+                    f"which its forces were fitted, up to {one.largest_displacement:.3g} m; make "
+                    f"the basis with a larger largest_displacement.")
+    return None
 
 
 def _bodies(planned: PlannedBodies) -> Iterator[str]:
@@ -451,4 +467,4 @@ CHECKS_OF_BODIES: tuple[Callable[[PlannedBodies], Iterator[str]], ...] = (_bodie
 CHECKS_BEFORE: tuple[Callable[[Planned], Iterator[str]], ...] = (
     _friction, _roughness, _ground, _duration, _unheld, _gap)
 CHECKS_AFTER: tuple[Callable[[ContactSystem, Array, Array], str | None], ...] = (
-    _too_far, _turned, _too_deep)
+    _too_far, _turned, _too_deep, _beyond_fit)

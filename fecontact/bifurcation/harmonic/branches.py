@@ -279,6 +279,8 @@ def _with_more_harmonics(method: HarmonicBalance, branch: Branch) -> HarmonicBal
     if worst <= method.tolerance:
         return None
     harmonics = int(np.ceil(_MORE * method.highest))
+    # Even numbers stay even, which large deflections need.
+    harmonics += harmonics % 2 if method.highest % 2 == 0 else 0
     if harmonics > method.most_harmonics:
         raise AnalysisError(f"The truncation error of the branch is {worst:.2g} with "
                             f"{method.highest} harmonics, above tolerance = "

@@ -13,6 +13,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.layout import element_rows, layout_of, memory_blocks
 from fecontact.bifurcation.harmonic.memory import Kept
@@ -47,6 +48,8 @@ def problem_for(
     The former grow with the orbit up to the limits (d,), if there are any.
     ``offsets`` (c,) are those of elements that never slide, see :class:`Kept`.
     """
+    if isinstance(field, ContactField) and field.system().basis.large_deflections:
+        _require_even(method)
     layout = layout_of(field)
     kept = Kept(element_rows(field, layout),
                 np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float),
@@ -60,6 +63,21 @@ def problem_for(
         # The problem is new: nobody has it yet.
         object.__setattr__(found, "compiled", CompiledBalance.of(found))
     return found
+
+
+def _require_even(method: HarmonicBalance) -> None:
+    """Raise InputError unless stretching can follow all harmonics of bending.
+
+    Odd harmonics of bending stretch a body with the even ones beside them. A last odd one without
+    its upper neighbour meets a far too stiff body.
+    """
+    even = range(0, method.highest + 1, 2)
+    orders = method.orders or range(method.highest + 1)
+    if method.highest % 2 or set(even) - set(orders):
+        raise InputError(f"HarmonicBalance: harmonics = {method.harmonics!r} do not suit large "
+                         f"deflections, in which the body stretches with twice the frequency of "
+                         f"its bending; give an even number, harmonics = "
+                         f"{method.highest + method.highest % 2}.")
 
 
 def require_mean(method: HarmonicBalance, rest: Array) -> None:

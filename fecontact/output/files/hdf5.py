@@ -25,6 +25,7 @@ from fecontact.core.files.stored import (
 )
 from fecontact.core.progress import held_back_interrupt
 from fecontact.core.types import Array
+from fecontact.reduction.large_deflections.forces import LargeDeflectionForces
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
 from fecontact.reduction.rotating import ModalRotation
@@ -157,6 +158,13 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
         rotation = group.create_group("rotation")
         for name, value in vars(basis.rotation).items():
             rotation.create_dataset(name, data=value)
+    for number, forces in enumerate(basis.large_deflections):
+        stored = group.create_group(f"large_deflections/{number}")
+        for name, value in vars(forces).items():
+            if isinstance(value, np.ndarray):
+                stored.create_dataset(name, data=value)
+            else:
+                stored.attrs[name] = value
     group.attrs["extra"] = list(basis.extra)
     if basis.boundaries:
         group.create_dataset("boundary_rows", data=basis.boundary_rows)
@@ -238,7 +246,24 @@ def stored_basis(group: Any) -> ModalBasis:
         first_passes=tuple((str(name), int(count)) for name, count in zip(*(
             np.atleast_1d(group.attrs.get(key, ())) for key in (
                 "first_passes", "first_pass_sizes")), strict=True)),
-        rotation=_read_rotation(member(group, "rotation"), m) if "rotation" in group else None)
+        rotation=_read_rotation(member(group, "rotation"), m) if "rotation" in group else None,
+        large_deflections=(_read_large_deflections(member(group, "large_deflections"), m)
+                           if "large_deflections" in group else ()))
+
+
+def _read_large_deflections(group: Any, modes: int) -> tuple[LargeDeflectionForces, ...]:
+    found = []
+    for number in range(len(group)):
+        one = member(group, str(number))
+        quadratic = bounded(one, "quadratic", (None,))
+        coordinates = bounded(one, "coordinates", (None, modes))
+        size, force, displacement = (float(one.attrs[name]) for name in (
+            "largest_displacement", "force_error", "displacement_error"))
+        found.append(LargeDeflectionForces(
+            str(one.attrs["group"]), quadratic, bounded(one, "cubic", (len(quadratic),)),
+            coordinates, bounded(one, "ranges", (len(coordinates), 2)), size, force, displacement,
+            int(one.attrs["states"])))
+    return tuple(found)
 
 
 def _read_parts(group: Any) -> tuple[BodyPart, ...]:

@@ -74,11 +74,14 @@ def leading_patterns(whole: Array, kept: Array, tolerance: float | Array) -> Arr
     return np.asarray(patterns[:, :count] * scale[:, None])
 
 
-def residual_modes(flexibility: Flexibility, tolerance: float, loads: Array) -> tuple[Array, Array]:
+def residual_modes(
+    flexibility: Flexibility, tolerance: float, loads: Array, fields: Array | None = None
+) -> tuple[Array, Array]:
     """Frequencies (p,) and shapes (f, p) that complete the modes of a flexibility at its rows.
 
-    They span the residual vectors of the leading force patterns and those of loads (f, l) of whose
-    static response more than the tolerance is missing, are orthogonal to the modes and to each
+    They span the residual vectors of the leading force patterns, those of loads (f, l) of whose
+    static response more than the tolerance is missing, and displacements ``fields`` (f, s). They
+    are orthogonal to the modes and to each
     other in mass and stiffness, and mass-normalised.
     """
     system, (w, shapes) = flexibility.system, flexibility.modes
@@ -90,9 +93,10 @@ def residual_modes(flexibility: Flexibility, tolerance: float, loads: Array) -> 
     whole_work = (loads * deflections).sum(axis=0)
     work = ((loads.T @ shapes[:, w > 0.0] / w[w > 0.0]) ** 2).sum(axis=1)
     lacking = whole_work - work > max(tolerance, 1e-12) * whole_work
-    if not patterns.shape[1] and not lacking.any():
+    fields = np.zeros((len(shapes), 0)) if fields is None else fields
+    if not patterns.shape[1] and not lacking.any() and not fields.shape[1]:
         return np.zeros(0), np.zeros((len(shapes), 0))
-    further = deflections[:, lacking]
+    further = np.hstack([deflections[:, lacking], fields])
     iterated = isinstance(flexibility, IteratedFlexibility)
     vectors = further if iterated else np.hstack([flexibility.deflections(patterns), further])
     inertia = system.mass @ shapes

@@ -1,0 +1,284 @@
+"""Forces of large deflections in modal bases, against beam theory and the whole body."""
+
+from functools import cache
+from itertools import permutations
+
+import numpy as np
+import pytest
+from meshes_for_tests import grid, rectangle
+from scipy.integrate import cumulative_trapezoid
+
+import fecontact as fc
+from fecontact import (
+    BoundaryLoad,
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    InputError,
+    Load,
+    Material,
+    ModelWarning,
+    equilibrium,
+    modal_basis,
+    simulate,
+)
+from fecontact.analysis import DeflectionSteps, deflection_path
+from fecontact.bifurcation import HarmonicBalance, nonlinear_mode
+from fecontact.output.files.hdf5 import read_basis, write_basis
+from fecontact.reduction import LargeDeflections
+from fecontact.reduction.large_deflections.fit import CondensedBody
+from fecontact.reduction.large_deflections.forces import large_deflection_forces
+
+E, L, H, B = 2e11, 1.0, 0.004, 0.01
+STEEL = Material(E, 0.0, 7800.0)
+RADIUS = H / np.sqrt(12.0)  # of gyration
+
+
+def beam(ends, columns=30):
+    """A beam whose ends are clamped or hinged in the middle of their height, or a cantilever."""
+    mesh = rectangle(L, H, columns, 2, points={
+        "first": (0.0, 0.5 * H), "last": (L, 0.5 * H), "middle": (0.5 * L, 0.5 * H)})
+    fixed = {"clamped": {"left": "xy", "right": "xy"}, "hinged": {"first": "xy", "last": "xy"},
+             "sliding": {"first": "xy", "last": "y"}, "cantilever": {"left": "xy"}}[ends]
+    return ElasticBody(mesh, STEEL, thickness=B, fixed=fixed)
+
+
+@cache
+def bent(ends, largest, modes=1, count=1, **options):
+    """Basis with large deflections."""
+    return modal_basis(beam(ends), count, contact=(), points={"middle": "middle", "last": "last"},
+                       large_deflections=LargeDeflections(largest, modes), **options)
+
+
+def backbone(system, largest, observe, at, harmonics=4):
+    """Frequencies at amplitudes, relative to the lowest one."""
+    mode = nonlinear_mode(system, (1e-3 * largest, largest), 1, observe=observe,
+                          method=HarmonicBalance(harmonics, stability=None))
+    assert (np.diff(mode.amplitude) > 0.0).all()
+    return np.interp(at, mode.amplitude, mode.frequency) / mode.frequency[0]
+
+
+@pytest.mark.parametrize(("d", "m"), [(1, 3), (2, 5), (3, 8)])
+def test_springs_have_the_potential(d, m):
+    """V_3 + V_4 - sum w^2 y y^ + sum w^2 y^2 / 2, by central differences."""
+    rng = np.random.default_rng(1)
+
+    def symmetric(indices):
+        given = rng.normal(size=(d,) * indices)
+        return sum(np.transpose(given, order) for order in permutations(range(indices)))
+
+    A, C = symmetric(3), symmetric(4)
+    modes, w = np.arange(d), rng.uniform(1.0, 50.0, m)
+    R = rng.normal(size=(m, d, d))
+    R = R + np.swapaxes(R, 1, 2)
+    ranges = np.outer(rng.uniform(0.5, 2.0, d), [-1.0, 1.5])
+    fitted = CondensedBody(modes, A, C, np.zeros((1, d, d)), ranges, 0.0, 0.0, 1)
+    forces, rows = large_deflection_forces(fitted, R, w, rng.uniform(0.5, 2.0, d), 1.0)
+    R[modes] = 0.0
+
+    def potential(x):
+        q = x[modes]
+        y = 0.5 * np.einsum("kij,i,j->k", R, q, q)
+        return (np.einsum("ijk,i,j,k", A, q, q, q) / 3.0
+                + np.einsum("ijkl,i,j,k,l", C, q, q, q, q) / 4.0
+                + (w**2 * (0.5 * y**2 - x * y)).sum())
+
+    x, h = rng.normal(size=m), 1e-6
+    e = rows @ x
+    found = rows.T @ (forces.quadratic * e**2 + forces.cubic * e**3)
+    slope = [(potential(x + h * v) - potential(x - h * v)) / (2.0 * h) for v in np.eye(m)]
+    assert found == pytest.approx(slope, abs=1e-8 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize(("ends", "modes", "exact"), [
+    ("hinged", 1, 1.317776), ("clamped", 1, 1.085671), ("clamped", (0, 2), 1.085671)])
+def test_beams_with_immovable_ends(ends, modes, exact):
+    """x'' + x + c (a x)^3 = 0, c = 1/4 or 0.0599411, at a = 2 radii of gyration."""
+    basis = bent(ends, 0.6 * H, modes, 1 if modes == 1 else 3)
+    forces = basis.large_deflections[0]
+    assert forces.force_error < 1e-3
+    found = backbone(ContactSystem(basis), 2.1 * RADIUS, ("middle", "y"), [2.0 * RADIUS])
+    assert found == pytest.approx(exact, rel=2e-3)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 0.5, 9.0])
+def test_a_spring_holds_the_end_of_a_beam(stiffness):
+    """k in series with E A / L at a sliding end: c = k / (k + E A / L) / 4, by the map at B."""
+    axial = E * B * H / L
+    basis = bent("sliding", 0.7 * H, B="last", reduction="residual")
+    system = ContactSystem(basis, drive=Drive(stiffness_x=stiffness * axial))
+    a = 2.0
+    found = backbone(system, a * RADIUS, ("middle", "y"), [a * RADIUS])[0]
+    c = 0.25 * stiffness / (1.0 + stiffness)
+    hard = 1.0 + c * a**2
+    from scipy.special import ellipk
+
+    exact = np.pi / 2.0 * np.sqrt(hard) / ellipk(c * a**2 / 2.0 / hard)
+    assert found == pytest.approx(exact, rel=2e-3)
+
+
+def cantilever_coefficient():
+    """Curvature of the backbone of an inextensible cantilever, by Galerkin with its first mode.
+
+    T = (m + b q^2) q'^2 / 2 and V = k q^2 / 2 + k_4 q^4 / 2, with the axial motion
+    u = -int w'^2 / 2 and the curvature w''^2 (1 + w'^2).
+    """
+    s, root = np.linspace(0.0, 1.0, 20001), 1.875104068711961
+    part = (np.cosh(root) + np.cos(root)) / (np.sinh(root) + np.sin(root))
+
+    def shape(sign):
+        return (np.cosh(root * s) - sign * np.cos(root * s)
+                - part * (np.sinh(root * s) - sign * np.sin(root * s)))
+
+    w = shape(1.0)
+    curvature, w = root**2 * shape(-1.0) / w[-1], w / w[-1]
+    slope = np.gradient(w, s, edge_order=2)
+    mass, stiff = np.trapezoid(w**2, s), np.trapezoid(curvature**2, s)
+    quartic = np.trapezoid((curvature * slope) ** 2, s)
+    inertia = np.trapezoid(cumulative_trapezoid(slope**2, s, initial=0.0) ** 2, s)
+    # Harmonic balance of (m + b q^2) q'' + b q q'^2 + k q + 2 k_4 q^3 = 0.
+    return 0.5 * (1.5 * quartic / stiff - 0.5 * inertia / mass)
+
+
+def test_inertia_of_a_cantilever():
+    """Inertia of the axial motion takes nearly all of the hardening: w / w_0 = 1 + 0.019 (a / L)^2.
+
+    Without it the factor would be 0.58.
+    """
+    exact = cantilever_coefficient()
+    assert exact == pytest.approx(0.0194, abs=1e-4)
+    body = ElasticBody(rectangle(L, 0.01 * L, 40, 1, points={"last": (L, 0.0)}), STEEL,
+                       fixed={"left": "xy"})
+    basis = modal_basis(body, 1, contact=(), points={"last": "last"},
+                        large_deflections=LargeDeflections(0.06 * L))
+    a = 0.05 * L
+    found = backbone(ContactSystem(basis), a, ("last", "y"), [a])[0]
+    assert (found - 1.0) / a**2 == pytest.approx(exact, abs=3e-3)
+
+
+def test_statics_of_the_reduced_and_the_whole_body():
+    """A clamped beam under uniform pressure up to a deflection of 1.5 thicknesses."""
+    basis = bent("clamped", 2.5 * H, (0, 2), 3, reduction="residual", loads=("top",))
+    assert basis.large_deflections[0].displacement_error < 0.02
+    load = Load(boundaries=(BoundaryLoad("top", pressure=9e3),))
+    whole = deflection_path(beam("clamped"), load, steps=DeflectionSteps(first=0.5))
+    rest = equilibrium(ContactSystem(basis, load=load))
+    found = basis.point_row("middle", "y") @ rest.modal_coordinates
+    exact = whole.displacement("middle")[-1, 1]
+    assert exact < -1.4 * H
+    assert found == pytest.approx(exact, rel=0.02)
+    assert rest.stable
+
+
+def test_run_keeps_its_energy_and_watches_its_range():
+    """Free vibration of the reduced beam: energy to the tolerance; too far, it says so."""
+    basis = bent("hinged", H)
+    system = ContactSystem(basis)
+    start = np.zeros(system.size)
+    start[0] = 0.8 * basis.large_deflections[0].ranges[0, 1]
+    run = simulate(system, 2.0 / basis.frequencies_hz[0], initial=start, outputs=101)
+    stored = system.stored_energy(np.zeros(basis.contact_nodes))
+    assert not stored
+    total = np.array([
+        0.5 * y[basis.modes :] @ y[basis.modes :]
+        + 0.5 * (basis.angular_frequencies * y[: basis.modes]) @ (
+            basis.angular_frequencies * y[: basis.modes])
+        + system.stored_energy(-(basis.contact_T[:, 1] @ y[: basis.modes]))
+        for y in run.states])
+    assert total == pytest.approx(np.full(len(total), total[0]), rel=1e-2)
+    with pytest.warns(ModelWarning, match="times the range in which its forces were fitted"):
+        simulate(system, 0.5 / basis.frequencies_hz[0], initial=1.5 * start)
+
+
+def test_two_wells_of_a_shallow_arch():
+    """With the rise a = 5 radii of gyration it rests at b = 5 and, beyond b = -1, at b = -4.
+
+    Runs with damping end in the well in which they start.
+    """
+    h, a = 0.01, 5.0
+    radius = h / np.sqrt(12.0)
+
+    def warp(at):
+        return at + np.column_stack([0.0 * at[:, 0], a * radius * np.sin(np.pi * at[:, 0] / L)])
+
+    mesh = grid(np.linspace(0.0, 0.5 * L, 17), np.linspace(-0.5 * h, 0.5 * h, 3), warp=warp,
+                points={"end": (0.0, 0.0)})
+    body = ElasticBody(mesh, STEEL, fixed={"end": "xy", "right": "x"}, thickness=B)
+    basis = modal_basis(body, 1, contact=(), points={"middle": "right"}, damping=0.2,
+                        large_deflections=LargeDeflections(2.4 * a * radius))
+    row = basis.point_row("middle", "y")
+    # (a - b) + b (a^2 - b^2) / 4 = 0 has the roots b = a and b^2 + a b + 4 = 0.
+    other = 0.5 * (-a - np.sqrt(a**2 - 16.0))
+    slow = ContactSystem(basis)
+    q = np.zeros(slow.size)
+    q[0] = (other - a) * radius / row[0]
+    run = simulate(slow, 40.0 / basis.frequencies_hz[0], initial=1.05 * q)
+    assert row @ run.states[-1, : basis.modes] == pytest.approx((other - a) * radius, rel=0.02)
+    run = simulate(slow, 40.0 / basis.frequencies_hz[0], initial=0.1 * q)
+    assert row @ run.states[-1, : basis.modes] == pytest.approx(0.0, abs=0.01 * a * radius)
+    assert basis.large_deflections[0].force_error < 0.1
+
+
+@pytest.mark.long
+def test_clamped_plate_under_pressure():
+    """Levy (NACA TN 847, 1942): p a^4 / (E h^4) = 63.4 and 184 give 0.695 and 1.323 h.
+
+    The whole body, by :func:`deflection_path`, comes to 0.692 and 1.305 with 10 x 10 cells, the
+    reduced one of one mode to a percent less.
+    """
+    a, h, nu = 1.0, 0.02, 0.316
+    x = 0.5 * a * np.linspace(0.0, 1.0, 6) ** 1.8  # finer at the clamped edges
+    mesh = fc.Mesh.grid(x, x, [0.0, h])
+    body = ElasticBody(mesh, Material(E, nu, 7800.0), fixed={
+        "left": "xyz", "front": "xyz", "right": "x", "back": "y"})
+    basis = modal_basis(body, 4, contact=(), points={"middle": (0.5 * a, 0.5 * a, 0.5 * h)},
+                        reduction="residual", loads=["top"],
+                        large_deflections=LargeDeflections(1.7 * h))
+    for pressure, deflection, error in ((63.4, 0.695, 0.02), (184.0, 1.323, 0.03)):
+        load = Load(boundaries=(BoundaryLoad("top", pressure=pressure * E * (h / a) ** 4),))
+        rest = equilibrium(ContactSystem(basis, load=load))
+        found = -basis.point_row("middle", "z") @ rest.modal_coordinates / h
+        assert found == pytest.approx(deflection, rel=error)
+
+
+def test_basis_is_stored_and_assembled(tmp_path):
+    basis = bent("hinged", 0.5 * H)
+    write_basis(tmp_path / "basis.h5", basis)
+    again = read_basis(tmp_path / "basis.h5")
+    for name, value in vars(basis.large_deflections[0]).items():
+        assert np.array_equal(getattr(again.large_deflections[0], name), value)
+    assert (again.T == basis.T).all()
+    both = ContactSystem(bodies={"one": basis, "two": bent("clamped", 0.5 * H)}, interfaces=())
+    state = np.zeros(both.size)
+    state[: both.basis.modes] = np.arange(both.basis.modes) * 1e-3
+    alone = ContactSystem(basis)
+    part = np.zeros(alone.size)
+    part[: basis.modes] = state[: basis.modes]
+    m = both.basis.modes
+    assert both.rhs(0.0, state)[m : m + basis.modes] == pytest.approx(
+        alone.rhs(0.0, part)[basis.modes :], rel=1e-9)
+    assert "modes with large deflections" in str(basis)
+
+
+def test_limits_are_said():
+    body = beam("hinged", 8)
+    given = LargeDeflections(0.5 * H)
+    for options, told in (({"reduction": "craig-bampton"}, "vibration modes"),
+                          ({"rotation": fc.fem.Rotation(1.0)}, "rotation do not go together")):
+        with pytest.raises(InputError, match=told):
+            modal_basis(body, 2, contact=(), large_deflections=given, **options)
+    with pytest.raises(InputError, match="mode 3 is not among the 2 modes"):
+        modal_basis(body, 2, contact=(), large_deflections=LargeDeflections(H, (3,)))
+    free = ElasticBody(rectangle(L, H, 8, 1), STEEL)
+    with pytest.raises(InputError, match="rigid motions"):
+        modal_basis(free, 4, contact=(), large_deflections=given)
+    for modes in (0, 7, (1, 1), (-1,), "a"):
+        with pytest.raises(InputError, match="modes = "):
+            LargeDeflections(H, modes)
+    basis = modal_basis(body, 2, contact=(), points={"middle": "middle"}, large_deflections=given)
+    with pytest.raises(InputError, match="would leave out coordinates"):
+        basis.select([0, 1])
+    for harmonics in (5, [1, 3, 5], [0, 2, 3, 4, 5]):
+        with pytest.raises(InputError, match="large deflections"):
+            nonlinear_mode(ContactSystem(basis), (1e-5, 1e-4), observe=("middle", "y"),
+                           method=HarmonicBalance(harmonics))
