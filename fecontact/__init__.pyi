@@ -2,6 +2,7 @@ from . import (
     analysis,
     bifurcation,
     fem,
+    fitting,
     integrate,
     io,
     laws,
@@ -26,6 +27,7 @@ from .fem.material import Material
 from .fem.mesh import Mesh
 from .fem.mesh_files import read_mesh, write_mesh
 from .fem.points import Patch
+from .fitting.fit_model import fit
 from .integrate.ensembles import ensemble
 from .integrate.events import Event, event
 from .integrate.initial_state import RigidStart
@@ -96,6 +98,8 @@ __all__ = [
     "equilibrium",
     "event",
     "fem",
+    "fit",
+    "fitting",
     "generate",
     "integrate",
     "io",

@@ -1,3 +1,4 @@
+from .fitting.plots import plot_fit, plot_profile
 from .output.plots.amplitude_curve import plot_amplitude_curve
 from .output.plots.analysis import (
     plot_friction_work,
@@ -48,6 +49,7 @@ __all__ = [
     "plot_diameters",
     "plot_eigenvalues",
     "plot_energies",
+    "plot_fit",
     "plot_friction_work",
     "plot_history",
     "plot_loop",
@@ -58,6 +60,7 @@ __all__ = [
     "plot_phase_space",
     "plot_poincare",
     "plot_poincare_scan",
+    "plot_profile",
     "plot_receptance",
     "plot_resonance_curve",
     "plot_response",

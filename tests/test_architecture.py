@@ -13,7 +13,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "fecontact"
 ROOMS = ("core", "fem", "laws", "reduction", "system", "integrate", "analysis", "bifurcation",
-         "measured", "output", "study", "sweeps", "cli")
+         "measured", "output", "study", "sweeps", "fitting", "cli")
 # Rooms that do not know each other, although the one stands above the other.
 STRANGERS = {("laws", "fem"), ("study", "output")}
 # Modules that hold nothing but public names under which people look for them.

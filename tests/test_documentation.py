@@ -385,6 +385,17 @@ def check_measurements(names, printed, folder):
         assert (folder / f"{name}.png").stat().st_size > 10000
 
 
+def check_fitting(names, printed, folder):
+    found = names["found"]
+    for name, truth in (("friction.stiffness", 8e5), ("friction.friction_coefficient", 0.4)):
+        low, high = found.intervals(0.999)[name]
+        assert low < truth < high < 1.1 * low
+    assert names["profile"].interval == pytest.approx(
+        found.intervals()["friction.friction_coefficient"], rel=2e-3)
+    for name in ("fit", "profile"):
+        assert (folder / f"{name}.png").stat().st_size > 10000
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws, "frequency-responses.md": check_frequency_responses,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
@@ -395,7 +406,8 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
           "cyclic-symmetry.md": check_cyclic_symmetry, "bodies.md": check_bodies,
           "solids.md": check_solids,
           "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,
-          "results.md": check_results, "measurements.md": check_measurements}
+          "results.md": check_results, "measurements.md": check_measurements,
+          "fitting.md": check_fitting}
 
 
 def test_every_page_with_code_is_known():

@@ -36,7 +36,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 
 SPACES = ("fem", "reduction", "integrate", "analysis", "bifurcation", "measured", "sweeps",
-          "system", "io")
+          "fitting", "system", "io")
 # What users make and hand over, and what makes its own copies read-only.
 GIVEN = {"Task", "Axis", "PointPairing", "ReportFrame"}
 

@@ -173,7 +173,21 @@ def says_contact_stiffness(printed):
     assert numbers(r"approach ([\d.]+) um", printed) == pytest.approx([15.0, 4.47, 1.41], abs=0.005)
 
 
-SAYS = {"own-mesh": says_own_mesh, "squeal": says_squeal, "basis": says_basis,
+def says_fitted_joint(printed):
+    (value, low, high), (deflection, *ends) = [
+        numbers(r"([\d.]+)", line.partition(":")[2].replace("95 %", "")) for line in
+        printed.splitlines() if ", 95 % from" in line]
+    assert low < 0.3 < high < 1.03 * low
+    assert ends[0] < 4e-4 < ends[1] < 1.06 * ends[0]
+    assert low < value < high
+    assert ends[0] < deflection < ends[1]
+    assert "growing while" in printed
+    linear = numbers(r"([\d.]+) to", printed)
+    assert linear[0] == pytest.approx(linear[1], rel=2e-3)
+
+
+SAYS = {"fitted-joint": says_fitted_joint, "own-mesh": says_own_mesh, "squeal": says_squeal,
+        "basis": says_basis,
         "bifurcation-diagram": says_bifurcation_diagram, "friction-law": says_friction_law,
         "set-valued-or-smoothed": says_set_valued, "which-integrator": says_which_integrator,
         "cluster": says_cluster, "contact-stiffness": says_contact_stiffness}

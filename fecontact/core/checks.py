@@ -11,7 +11,7 @@ import numpy as np
 
 from fecontact.core.errors import LARGEST, InputError, require_positive, shown
 from fecontact.core.resources.memory import available_memory, shown_memory
-from fecontact.core.types import Array, Coordinates, Integers
+from fecontact.core.types import Array, ComplexArray, Coordinates, Integers
 
 _SLOWEST, _FASTEST = 0.01, 1000.0  # [1/s]; the encoder takes two decimals
 _LARGEST = 1e12  # factor of displacements, which are drawn in single precision
@@ -149,6 +149,17 @@ def as_floats(values: Any, what: str) -> Array:
         pass
     raise InputError(f"{what} must be real numbers, not {shown(values)}; give a number, or lists "
                      f"of numbers of equal length.")
+
+
+def as_numbers(values: Any, what: str) -> Array | ComplexArray:
+    """Convert to an array of floats or, if one is complex, of complex numbers; InputError."""
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind == "c":
+            return np.asarray(given, dtype=complex)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    return as_floats(values, what)
 
 
 def is_numeric(values: Any) -> bool:

@@ -86,7 +86,7 @@ class AmplitudeCurve(Summarised):
         return len(self.amplitude)
 
     def at(self, amplitude: ArrayLike) -> tuple[Array, Array]:
-        """Frequency [Hz] and damping ratio at amplitudes, linear over their logarithm.
+        """Frequency [Hz] and damping ratio at amplitudes, by monotone cubics over their logarithm.
 
         Raises
         ------
@@ -94,14 +94,18 @@ class AmplitudeCurve(Summarised):
             If an amplitude lies outside of the curve.
         """
         wanted = as_floats(amplitude, "AmplitudeCurve.at: amplitude")
-        order = np.argsort(self.amplitude, kind="stable")
-        known = self.amplitude[order]
+        from scipy.interpolate import PchipInterpolator
+
+        known, order = np.unique(self.amplitude, return_index=True)
         if not ((wanted >= known[0]) & (wanted <= known[-1])).all():
             raise InputError(f"AmplitudeCurve.at: amplitude = {amplitude!r} must lie within the "
                              f"curve, from {known[0]:.6g} to {known[-1]:.6g} {self.unit}.")
-        place = np.log(wanted)
-        return (np.asarray(np.interp(place, np.log(known), self.frequency[order])),
-                np.asarray(np.interp(place, np.log(known), self.damping_ratio[order])))
+        if len(known) == 1:
+            return (np.full(wanted.shape, self.frequency[order[0]]),
+                    np.full(wanted.shape, self.damping_ratio[order[0]]))
+        found = PchipInterpolator(np.log(known), np.stack(
+            [self.frequency[order], self.damping_ratio[order]], axis=1))(np.log(wanted))
+        return np.asarray(found[..., 0]), np.asarray(found[..., 1])
 
     def summary(self) -> list[tuple[str, str]]:
         """Amplitudes, frequencies, damping ratios, and the note."""

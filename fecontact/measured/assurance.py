@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import as_floats
+from fecontact.core.checks import as_floats, as_numbers
 from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
@@ -87,11 +87,7 @@ def modal_assurance(first: ArrayLike, second: ArrayLike) -> Array:
 
 
 def _shapes(given: ArrayLike, name: str) -> Any:
-    try:
-        shapes = np.asarray(given)
-        shapes = shapes.astype(complex if np.iscomplexobj(shapes) else float)
-    except (TypeError, ValueError):
-        raise InputError(f"modal_assurance: {name} must be an array of numbers.") from None
+    shapes = as_numbers(given, f"modal_assurance: {name}")
     shapes = shapes[:, None] if shapes.ndim == 1 else shapes
     if shapes.ndim != 2 or not shapes.size or not np.isfinite(shapes).all():
         raise InputError(f"modal_assurance: {name} must be finite shapes in the columns of a "
@@ -196,10 +192,7 @@ def scale_question(measured: ArrayLike, computed: ArrayLike, names: Sequence[str
 
 
 def _responses(measured: ArrayLike, computed: ArrayLike) -> tuple[Any, Any]:
-    try:
-        both = [np.asarray(values, dtype=complex) for values in (measured, computed)]
-    except (TypeError, ValueError):
-        raise InputError("response_assurance: responses must be numbers.") from None
+    both = [as_numbers(values, "response_assurance: responses") for values in (measured, computed)]
     both = [values[:, None] if values.ndim == 1 else values for values in both]
     if both[0].shape != both[1].shape or both[0].ndim != 2 or not both[0].size:
         raise InputError(f"response_assurance: the responses have the shapes {both[0].shape} and "

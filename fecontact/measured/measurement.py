@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.core.checks import as_floats
+from fecontact.core.checks import as_floats, as_numbers
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
@@ -105,11 +105,7 @@ class Measurement(Summarised):
 
     def __post_init__(self) -> None:
         places = as_floats(self.abscissa, "Measurement: abscissa")
-        try:
-            values = np.asarray(self.values)
-            values = values.astype(complex if np.iscomplexobj(values) else float)
-        except (TypeError, ValueError):
-            raise InputError("Measurement: values must be numbers.") from None
+        values = as_numbers(self.values, "Measurement: values")
         if values.ndim == 1:
             values = values[:, None]
         channels = ((self.channels,) if isinstance(self.channels, Channel | str)

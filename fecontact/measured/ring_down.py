@@ -22,7 +22,7 @@ _ITERATIONS, _CONVERGED = 60, 1e-13
 _WEAK = 0.2
 # Distances from the mode at which noise is looked at, in inverse lengths of the window, and the
 # number of neighbouring windows over which it is averaged.
-_BESIDE, _AVERAGED = (5.0, 6.0, 7.0, 8.0), 5
+_BESIDE, _AVERAGED = (5.0, 6.0, 7.0, 8.0), 9
 _CHUNK = 400_000  # samples fitted at a time
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fecontact.core.checks import as_floats
+from fecontact.core.checks import as_floats, as_numbers
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.measured.amplitude_curve import AmplitudeCurve
@@ -52,7 +52,8 @@ def swept_curve(
         If the sweep does not determine the modal mass, as that of one side of a resonance.
     """
     f = as_floats(frequency, "swept_curve: frequency")
-    X, P = _complex(response, "response"), _complex(force, "force")
+    X, P = (np.asarray(as_numbers(values, f"swept_curve: {name}"), dtype=complex)
+            for name, values in (("response", response), ("force", force)))
     if f.ndim != 1 or X.shape != f.shape or P.shape not in ((), f.shape) or len(f) < _FEWEST:
         raise InputError(f"swept_curve: frequency, response and force have the shapes {f.shape}, "
                          f"{X.shape} and {P.shape}; give at least {_FEWEST} values of each, or one "
@@ -75,13 +76,6 @@ def swept_curve(
     own = np.sqrt(square)
     return AmplitudeCurve(A, own / (2.0 * np.pi), Z.imag / (2.0 * m * own * w), unit=unit,
                           observed=observed)
-
-
-def _complex(values: ArrayLike, name: str) -> ComplexArray:
-    try:
-        return np.asarray(values, dtype=complex)
-    except (TypeError, ValueError):
-        raise InputError(f"swept_curve: {name} must be complex numbers.") from None
 
 
 def _modal_mass(w: Array, Z: ComplexArray, A: Array) -> float:

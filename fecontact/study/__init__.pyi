@@ -1,5 +1,6 @@
 from .bodies_section import BodyBasisSettings, BodySections, InterfaceSettings, Placement, Reduced
 from .convergence import study_convergence
+from .fit_section import FitParameter
 from .geometry_section import MeshFile
 from .links_section import FaceWeldSettings
 from .materials_section import MaterialSettings
@@ -21,6 +22,7 @@ __all__ = [
     "BodySettings",
     "Distribution",
     "FaceWeldSettings",
+    "FitParameter",
     "InterfaceSettings",
     "MaterialSettings",
     "MeshFile",

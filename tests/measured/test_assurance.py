@@ -82,12 +82,12 @@ def test_responses():
     (lambda x: modal_assurance(x, x[:2]), "at the same places and directions"),
     (lambda x: modal_assurance(x, 0.0 * x), "shape 0 of second is zero"),
     (lambda x: modal_assurance(x, np.nan * x), "must be finite shapes"),
-    (lambda x: modal_assurance("a", x), "must be an array of numbers"),
+    (lambda x: modal_assurance("a", x), "must be real numbers"),
     (lambda x: pair_modes(x, x, [1.0], [1.0, 2.0]), "give one for each"),
     (lambda x: pair_modes(x, x, [1.0, 2.0], [1.0, 2.0], least=2.0), "must be from 0 to 1"),
     (lambda x: response_assurance(x, x[:2]), "at the same frequencies"),
     (lambda x: response_assurance(x, 0.0 * x), "must be finite and not zero"),
-    (lambda x: response_assurance("a", x), "must be numbers"),
+    (lambda x: response_assurance("a", x), "must be real numbers"),
 ])
 def test_wrong_input_is_told_in_one_sentence(call, told):
     with pytest.raises(fc.InputError, match=told):

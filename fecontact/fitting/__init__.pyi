@@ -1,0 +1,26 @@
+from .data import Curve, FitData, FunctionData
+from .data_in_time import DecayData, HistoryData, LoopData
+from .data_of_modes import BackboneData, FrequencyData, ReceptanceData, ResponseData
+from .problem import Problem
+from .profile import ProfileLikelihood, profile_likelihood
+from .result import Fit, FitStart
+from .search import SearchOptions
+
+__all__ = [
+    "BackboneData",
+    "Curve",
+    "DecayData",
+    "Fit",
+    "FitData",
+    "FitStart",
+    "FrequencyData",
+    "FunctionData",
+    "HistoryData",
+    "LoopData",
+    "Problem",
+    "ProfileLikelihood",
+    "ReceptanceData",
+    "ResponseData",
+    "SearchOptions",
+    "profile_likelihood",
+]
