@@ -40,7 +40,7 @@ def usual_point(basis: ModalBasis) -> str | int:
     """Default point: B; the middle contact node if no mode moves B, and C without contact."""
     if basis.T[0].any():
         return "B"
-    return basis.contact_nodes // 2 if basis.contact_nodes else "C"
+    return basis.interface_nodes // 2 if basis.interface_nodes else "C"
 
 
 def duration(trajectory: Trajectory) -> float:

@@ -113,8 +113,8 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
 
     system, points = trajectory.system, study.output.points
     point = points[0] if points else usual_point(system.basis)
-    kinds = ["history", "phase", "energies", *(["contact_map"] if system.basis.contact_nodes
-                                               else [])]
+    touching = (~system.basis.spring_nodes).any()
+    kinds = ["history", "phase", "energies", *(["contact_map"] if touching else [])]
     history, phase, energies, *contact_map = files = [
         folder / f"{study.name}-{kind}.png" for kind in kinds]
     plots.plot_history(trajectory, points, path=history)

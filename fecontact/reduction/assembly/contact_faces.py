@@ -199,6 +199,9 @@ def contact_sides(basis: ModalBasis) -> tuple[Any, Any]:
     weights = sp.coo_array(sum(both[axis::d][:, axis::d] for axis in range(d)))
     weights.sum_duplicates()
     row, node = weights.coords
+    if not len(row):  # springs between coordinates, which lie at no place
+        nowhere = sp.csr_array((d * n, d * len(field.nodes)))
+        return nowhere, nowhere
     # Mesh nodes of one side hang together along the outline, also where a body touches itself.
     entry = sp.csr_array((np.arange(1, len(row) + 1), (row, node)), shape=weights.shape)
     sides = field.outline

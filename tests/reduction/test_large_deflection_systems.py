@@ -1,0 +1,107 @@
+"""Large deflections in runs by all methods, static states, modes about them, responses, studies."""
+
+import numpy as np
+import pytest
+import test_large_deflections as beams
+from scipy.sparse.linalg import eigsh
+
+from fecontact import (
+    BoundaryLoad,
+    ContactSystem,
+    Load,
+    LoadPath,
+    PointLoad,
+    Study,
+    equilibrium,
+    load_history,
+    modal_basis,
+    simulate,
+)
+from fecontact.analysis import DeflectionSteps, complex_modes, deflection_path
+from fecontact.bifurcation import HarmonicBalance, frequency_response, nonlinear_mode
+from fecontact.fem.finite_strain import FiniteStrainModel
+from fecontact.integrate import CVODE, EventDriven, Rodas5P, TimeStepping
+from fecontact.laws import Harmonic
+from fecontact.reduction import LargeDeflections
+
+H = beams.H
+
+
+@pytest.mark.parametrize("solver", [Rodas5P(), EventDriven(), CVODE(), TimeStepping()],
+                         ids=lambda one: type(one).__name__)
+def test_runs_by_all_methods(solver):
+    basis = beams.bent("hinged", 0.6 * H, damping=0.01)
+    system = ContactSystem(basis)
+    start = np.zeros(system.size)
+    start[0] = 0.5 * basis.large_deflections[0].ranges[0, 1]
+    end = 0.3 / basis.frequencies_hz[0]
+    runs = [simulate(system, end, initial=start, outputs=31, rtol=1e-6, solver=one)
+            for one in (solver, Rodas5P())]
+    q, exact = (run.states[:, 0] for run in runs)
+    assert q == pytest.approx(exact, abs=1e-5 * start[0])
+
+
+def test_modes_about_a_deflected_state():
+    """Under pressure the frequency rises as that of the whole body with its tangent stiffness."""
+    basis = beams.bent("clamped", 2.5 * H, (0, 2), 3, reduction="residual", loads=("top",))
+    load = Load(boundaries=(BoundaryLoad("top", pressure=4e3),))
+    system = ContactSystem(basis, load=load)
+    rest = equilibrium(system)
+    found = complex_modes(system, np.append(rest.modal_coordinates, 0.0 * rest.modal_coordinates))
+    body = beams.beam("clamped")
+    path = deflection_path(body, load, steps=DeflectionSteps(first=0.5))
+    model = FiniteStrainModel(body)
+    q = body.expansion.T @ path.displacements[-1].ravel()
+    mass = (body.expansion.T @ body.mass @ body.expansion).tocsc()
+    squares = eigsh(model.state(q).tangent, k=1, M=mass, sigma=0.0)[0]
+    exact = np.sqrt(squares[0]) / (2.0 * np.pi)
+    assert exact > 1.3 * basis.frequencies_hz[0]
+    assert found.frequencies_hz[0] == pytest.approx(exact, rel=0.02)
+    # Loading step by step ends in the same state.
+    history = load_history(system, LoadPath(load_scale=(0.2, 1.0)))
+    assert history.modal_coordinates[-1] == pytest.approx(
+        rest.modal_coordinates, abs=1e-6 * np.abs(rest.modal_coordinates).max())
+
+
+def test_response_peaks_on_the_backbone():
+    """At the peak of the forced response the amplitude is that of the nonlinear mode."""
+    basis = beams.bent("hinged", 0.7 * H, damping=0.005)
+    mode = nonlinear_mode(ContactSystem(basis), (1e-5, 0.6 * H), observe=("middle", "y"),
+                          method=HarmonicBalance(4, 48, stability=None))
+    f = basis.frequencies_hz[0]
+    system = ContactSystem(basis, load=Load(forces=(
+        PointLoad("middle", "y", signal=Harmonic(0.008, 2.0 * np.pi * 0.9 * f)),)))
+    response = frequency_response(
+        system, (0.9 * 2.0 * np.pi * f, 1.25 * 2.0 * np.pi * f),
+        "load.forces.0.signal.angular_frequency", observe=("middle", "y"),
+        method=HarmonicBalance(4, 48, stability=None))
+    amplitude = response.amplitude()
+    frequency = response.branches[0].parameter / (2.0 * np.pi)
+    peak = int(np.argmax(amplitude))
+    at = np.interp(amplitude[peak], mode.amplitude, mode.frequency)
+    assert amplitude[peak] > 0.2 * H
+    assert frequency[peak] == pytest.approx(at, rel=3e-3)
+    assert at > 1.05 * f
+
+
+STUDY = """
+geometry = { shape = "beam", length = 1.0, height = 0.004, element_size = 0.05 }
+body = { material = "steel", thickness = 0.01, fixed = { left = "xy", right = "xy" } }
+simulation = { t_end = 0.01, outputs = 11 }
+
+[basis]
+modes = 1
+contact = []
+large_deflections = { largest_displacement = 2e-3 }
+"""
+
+
+def test_study():
+    """The study has the basis that Python makes, with the same forces."""
+    study = Study.from_toml(STUDY)
+    basis = study.modal_basis()
+    made = modal_basis(study.elastic_body(), 1, contact=(),
+                       large_deflections=LargeDeflections(2e-3))
+    for one, other in zip(basis.large_deflections, made.large_deflections, strict=True):
+        assert (one.cubic == other.cubic).all()
+    assert study.run().status.name.lower() == "finished"
