@@ -24,6 +24,11 @@ BENCHMARKS = {
     "harmonic": ((), [(r"^Duffing .* peak +(\S+)$", 0.0, 1e-3),
                       (r"^Jenkins .* peak +(\S+)$", 0.0, 3e-3),
                       (r"^harmonic balance .* error (\S+)$", 0.0, 1e-5)]),
+    # The frequency of the whole body, and the largest difference of both motions.
+    "large_deflections": ((), [(r"^ +0.50 +(\S+) ", 22.927, 0.02),
+                               (r"^ +0.50 +\S+ +(\S+) ", 22.927, 0.02),
+                               (r"^ +0.50 +\S+ +\S+ +(\S+) ", 22.927, 0.02),
+                               (r"^ +0.50 +\S+ +\S+ +\S+ +(\S+) ", 0.0, 0.012)]),
     "laws": ((), [(r"lugre .* us, (\d) internal", 1.0, 0.0),
                    (r"iwan .* us, (\d) internal", 8.0, 0)]),
     "many_contacts": ((), [(r"^ +400 .* (\S+) +\S+$", 0.1, 0.03)]),

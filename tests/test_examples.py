@@ -64,6 +64,11 @@ EXAMPLES = {
                                 (r"^diameter 4 at .* (\S+) Hz backwards", 785.9, 0.5)],
                      {f"out/{name}.png" for name in ("wheel_diameters", "wheel_modes",
                                                      "blade_tips")}),
+    # A clamped panel whose pull reaches friction; cycles of slip begin at 2^(1/2) times that.
+    "bolted_panel": (("out",), [(r"^400 N: slips at (\S+) mm", 0.821, 0.05),
+                                (r"each cycle from (\S+) mm", 1.161, 0.06),
+                                (r"^held: \S+ Hz, (\S+) Hz", 65.1, 0.3)],
+                     {"out/bolted_panel.png"}),
     "friction_damper": (("out",), [(r"^free: .* at (\S+) Hz", 92.80, 0.01),
                                    (r"^stuck: .* at (\S+) Hz", 113.18, 0.02),
                                    (r"^best load (\S+) N", 5.0, 0.5)], {"out/friction_damper.png"}),

@@ -19,7 +19,8 @@ GROUPS = {
     "Contact pressure and partial slip": (
         "line_contact", "two_bodies", "two_spheres", "pressed_sphere", "stacked_blocks",
         "contact_convergence"),
-    "Joints and dampers": ("lap_joint", "bolted_plate", "clamped_layers", "friction_damper",
+    "Joints and dampers": ("lap_joint", "bolted_plate", "bolted_panel", "clamped_layers",
+                           "friction_damper",
                            "frequency_response", "blade_pair", "bladed_wheel", "nonlinear_modes"),
     "Solids": ("sliding_box", "thrown_block", "dithered_friction", "tipping_pad"),
     "Own laws, other programs, many computers": (

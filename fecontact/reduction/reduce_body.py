@@ -224,7 +224,9 @@ def modal_basis(
         bent, elongations = large_deflection_forces(
             condensed, np.einsum("fk,fij->kij", system.mass @ free_shapes, condensed.fields), w,
             largest, large_deflections.largest_displacement)
-        return with_springs(basis, bent, elongations)
+        least = 2.0 * large_deflections.stretching_damping * w * (np.arange(len(w)) >= own)
+        added = np.diag(np.maximum(least - np.diag(basis.damping), 0.0))
+        return with_springs(replace(basis, damping=basis.damping + added), bent, elongations)
     return basis if turning is None else basis.with_rotation_speed(turning.speed)
 
 

@@ -21,7 +21,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from fecontact.core.errors import AnalysisError, InputError, require_positive
+from fecontact.core.errors import AnalysisError, InputError, require_not_negative, require_positive
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
@@ -52,6 +52,10 @@ class LargeDeflections:
     modes : int or sequence of int
         Number of modes with large deflections, lowest first, or their numbers from 0; six at most.
         All other coordinates of the basis stay linear beside them.
+    stretching_damping : float
+        Least damping ratio of the vectors that complete the modes, from zero to below 1. Without
+        damping they keep ringing at frequencies far above those of the modes, which runs have to
+        resolve; 0.1 takes the ringing away and hardly changes the motion of the modes.
 
     Raises
     ------
@@ -61,9 +65,14 @@ class LargeDeflections:
 
     largest_displacement: Annotated[float, Unit("m")]
     modes: int | tuple[int, ...] = 1
+    stretching_damping: float = 0.0
 
     def __post_init__(self) -> None:
         require_positive("LargeDeflections", largest_displacement=self.largest_displacement)
+        require_not_negative("LargeDeflections", stretching_damping=self.stretching_damping)
+        if self.stretching_damping >= 1.0:
+            raise InputError(f"LargeDeflections: stretching_damping = {self.stretching_damping!r} "
+                             f"must be below 1.")
         given = self.modes
         chosen = range(given) if type(given) is int else given
         if not isinstance(chosen, range | tuple | list) or not 1 <= len(chosen) <= MOST or (
